@@ -18,8 +18,8 @@ import typer
 import trihedron
 from trihedron.cli import COMMANDS, build_app
 from trihedron.records.finding import FindingCode
-from trihedron.report.effects.catalogue import ENTRIES as EFFECTS
-from trihedron.report.effects.reasons import REASONS
+from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
+from trihedron.report.effects.catalogue import REASONS
 from trihedron.report.effects.relations import FAMILIES
 from trihedron.report.findings.catalogue import ENTRIES as FINDINGS
 from trihedron.report.findings.phrases import LINES, PHRASES
@@ -143,9 +143,9 @@ def sentences() -> Iterator[tuple[str, str]]:
     for entry in FINDINGS:
         for text in (entry.seen, entry.cause, entry.action):
             yield f"finding {entry.code.value} {entry.case}", text
-    for effect in EFFECTS:
+    for effect_id, effect in EFFECTS.items():
         for text in (effect.mechanism, effect.experiment, effect.experiment_at_rest, *effect.said.values()):
-            yield f"effect {effect.id}", text
+            yield f"effect {effect_id}", text
     for name, text in {**PHRASES, **LINES, **REASONS}.items():
         yield f"phrase {name}", text
     for name, family in FAMILIES.items():
@@ -243,7 +243,7 @@ def names() -> Iterator[str]:
         elif callable(public):
             yield from (f"{name}.{parameter}" for parameter in inspect.signature(public).parameters)
     yield from (code.value for code in FindingCode)
-    yield from (effect.id for effect in EFFECTS)
+    yield from EFFECTS
 
 
 RETIRED_IN_NAMES = re.compile(

@@ -18,18 +18,15 @@ from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
 from trihedron.report.diagnosis_overview_charts import traces_chart
-from trihedron.report.disc import drawn_disc
+from trihedron.report.directions import drawn_disc
 from trihedron.report.document import Picture, Table
-from trihedron.report.effect_rest_charts import rest_panels
+from trihedron.report.effect_charts import rest_panels
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
-from trihedron.report.many_charts import sessions_chart
-from trihedron.report.notes import _box, _covered, apart
+from trihedron.report.layout import Places, _box, _covered, apart, ticks
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
-from trihedron.report.places import Places
 from trihedron.report.segments import signals_picture
-from trihedron.report.sessions import DRIFTING, sessions_report
-from trihedron.report.ticks import ticks
+from trihedron.report.sessions import DRIFTING, sessions_chart, sessions_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import AccelerationUnit, RateUnit
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.records.diagnosis import NoiseDifference
-from trihedron.report.diagnosis_against_charts import (
+from trihedron.report.diagnosis_charts import (
     allan_chart,
     allan_of,
     noise_pictures,

@@ -78,7 +78,7 @@ def calibrate_many(
         raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
     from trihedron.api import sessions
     from trihedron.report import sessions_report
-    from trihedron.report.sessions import sessions_record
+    from trihedron.report.machine import sessions_record
 
     words = None if labels is None else [word.strip() for word in labels.split(",")]
     given = sources.each()

@@ -41,7 +41,7 @@ def experiment_for(effect_id: str, *, at_rest: bool = False) -> Words:
 
 
 def why_not(name: str, /, **values: Any) -> Words:
-    """Why a recording cannot show an effect, by its id (``report/effects/reasons.py``).
+    """Why a recording cannot show an effect, by its id (``report/effects/catalogue.py``).
 
     Raises
     ------

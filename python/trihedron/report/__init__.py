@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from trihedron.report.calibration import calibration_report
     from trihedron.report.check import check_report
-    from trihedron.report.demonstration import demonstration_report
+    from trihedron.report.demonstration import demonstration_report, disagreement_report
     from trihedron.report.diagnosis import diagnosis_report
-    from trihedron.report.disagreement import disagreement_report
     from trihedron.report.document import Document
     from trihedron.report.kalman import kalman_report
     from trihedron.report.segments import segments_report
@@ -32,7 +31,7 @@ __all__ = [
     "verification_report",
 ]
 
-_HOME = {"Document": "document", "to_text": "text"}
+_HOME = {"Document": "document", "to_text": "text", "disagreement_report": "demonstration"}
 
 
 def __getattr__(name: str) -> Any:

@@ -30,9 +30,5 @@ def ascii_of(text: str) -> str:
         return text
     text = re.sub("[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda found: "^" + found[0].translate(_RAISED), text)
     text = re.sub(r"√(\w+)", r"sqrt(\1)", text).translate(_TABLE)
-    return "".join(c if c.isascii() else _bare(c) for c in text)
-
-
-def _bare(character: str) -> str:
-    plain = unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode()
-    return plain or ("" if unicodedata.combining(character) else "?")
+    bare = {c: unicodedata.normalize("NFKD", c).encode("ascii", "ignore").decode() for c in set(text)}
+    return "".join(bare[c] or ("" if unicodedata.combining(c) else "?") for c in text)

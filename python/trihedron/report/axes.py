@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.records import SensorCalibration
+from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
@@ -29,6 +29,12 @@ def axis_in_print(name: str) -> str:
 def channel_in_print(channel: str) -> str:
     """``gx`` and ``vx`` as ``X``; names other than axes (``norm``, ``angle``) unchanged."""
     return channel[-1].upper() if len(channel) <= LETTERS else channel
+
+
+def calibrated_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
+    """Names and parameters of the sensors that were calibrated."""
+    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
+    return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,9 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
-from trihedron.report.axes import Axes, axes_of
-from trihedron.report.calibration_charts import (
-    correlations,
-    strong_correlations,
-)
-from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor
+from trihedron.report.axes import Axes, axes_of, calibrated_sensors
+from trihedron.report.calibration_charts import correlations, strong_correlations
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
 from trihedron.report.calibration_pictures import (
     before_words,
     correlation_picture,
@@ -22,11 +19,11 @@ from trihedron.report.calibration_pictures import (
     lead_picture,
     uncalibrated_error,
 )
-from trihedron.report.calibration_residuals import residual_tables
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import (
     duration,
+    each_with_sigma,
     engineering_exponent,
     how_many,
     in_mm_s2,
@@ -34,7 +31,6 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
     unit_in_print,
-    with_sigma,
 )
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
@@ -57,10 +53,8 @@ def calibration_report(
     figures = tuple(figure_blocks(calibration, segments, recording))
     if figures:
         sections.append(Section("Figures", figures))
-    sections += [
-        Section("Axes", _meaning(calibration)),
-        Section("Uncertainty", tuple(_certainty(calibration))),
-    ]
+    axes = tuple(_axes_block(name, sensor) for name, sensor in calibrated_sensors(calibration))
+    sections += [Section("Axes", axes), Section("Uncertainty", tuple(_certainty(calibration)))]
     residuals = tuple(residual_tables(calibration, segments))
     if residuals:
         sections.append(Section("Residuals", residuals))
@@ -81,9 +75,9 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:
-        rms, kind = (
-            (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "cross-validated")
-        )
+        rms, kind = quality.rms, "in sample"
+        if quality.held_out_rms is not None:
+            rms, kind = quality.held_out_rms, "cross-validated"
         beside = f"rms, {kind}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
         out.append(Headline("gravity error in static poses", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
     gyroscope = calibration.gyroscope
@@ -92,7 +86,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
         if seen:
             beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(move_floor(gyroscope.quality))}°"
             out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
-    for name, sensor in _sensors(calibration):
+    for name, sensor in calibrated_sensors(calibration):
         with suppress(ValueError):
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
             out.append(Headline(f"{name} scale uncertainty", worst, "%", "1 σ, worst axis"))
@@ -101,12 +95,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict in one sentence: usable or not."""
-    return verdict_of(
-        calibration.findings,
-        "OK: no problems found.",
-        "Usable",
-        "NOT TO BE TRUSTED",
-    )
+    return verdict_of(calibration.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED")
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:
@@ -118,29 +107,26 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
-    for name, sensor in _sensors(calibration):
+    for name, sensor in calibrated_sensors(calibration):
         rows = fit_in_words(name, sensor)
         if name == "accelerometer" and segments is not None:
-            rows += before_in_words(calibration, segments)
+            rows += _before_in_words(calibration, segments)
         blocks += [parameter_table(name, sensor), Facts(tuple(rows))]
     strong = strong_correlations(calibration)
     if strong:
-        blocks.append(Facts((("correlations above 0.5", _pairs(strong)),)))
+        pairs = ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS])
+        pairs += f"; {len(strong) - MOST_PAIRS} more (section Uncertainty)" if len(strong) > MOST_PAIRS else ""
+        blocks.append(Facts((("correlations above 0.5", pairs),)))
     return tuple(blocks)
 
 
-def before_in_words(calibration: Calibration, segments: Segments) -> list[tuple[str, str]]:
+def _before_in_words(calibration: Calibration, segments: Segments) -> list[tuple[str, str]]:
     """The gravity error of the same poses without this calibration."""
     means = segments.accelerometer_mean
     if means is None or len(means) == 0:
         return []
     rms = float(np.sqrt(np.nanmean(uncalibrated_error(calibration, means) ** 2)))
     return [("  before calibration", f"{in_mm_s2(rms)} rms, {before_words(calibration)}")]
-
-
-def _sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
-    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
-    return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
 def parameter_table(name: str, sensor: SensorCalibration) -> Table:
@@ -157,7 +143,7 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
         row
         for i in range(3)
         for row in (
-            (f"{true}_{AXES[i]} =", *(with_sigma(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
+            (f"{true}_{AXES[i]} =", *each_with_sigma(value[i], sigma[i])),
             ("", *(_percent(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
         )
     )
@@ -174,15 +160,6 @@ def _percent(value: float, sigma: float) -> str:
     return f"± {plain_number(100.0 * sigma / abs(value), 2)} %" if 0.0 < sigma < abs(value) else ""
 
 
-def _pairs(strong: list[tuple[str, str, float]]) -> str:
-    more = f"; {len(strong) - MOST_PAIRS} more (section Uncertainty)" if len(strong) > MOST_PAIRS else ""
-    return ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS]) + more
-
-
-def _meaning(calibration: Calibration) -> tuple[Block, ...]:
-    return tuple(_axes_block(name, sensor) for name, sensor in _sensors(calibration))
-
-
 def _axes_block(name: str, sensor: SensorCalibration) -> Block:
     try:
         return axes_table(name, sensor, axes_of(sensor))
@@ -193,49 +170,34 @@ def _axes_block(name: str, sensor: SensorCalibration) -> Block:
 def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     raw, si = unit_in_print(sensor.raw_unit), unit_in_print(sensor.si_unit)
     head = ["", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ [%]"]
-    rows = [
-        [
-            XYZ[i],
-            with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
-            plain_number(100.0 * axes.scale_sigma[i], 2),
-        ]
-        for i in range(3)
+    columns = [
+        list(XYZ),
+        each_with_sigma(axes.sensitivity, axes.sigma_sensitivity),
+        [plain_number(100.0 * sigma, 2) for sigma in axes.scale_sigma],
     ]
     if raw != si:
         # For readings in SI it equals the bias except for the scale, and is omitted.
         head.append(f"reading at zero input, −S⁻¹ b [{raw}]")
-        for i, row in enumerate(rows):
-            row.append(with_sigma(axes.at_zero[i], axes.sigma_at_zero[i]))
-    skew = [
-        f"{pair} {with_sigma(mrad_from_radians(axes.skew_rad[k]), mrad_from_radians(axes.sigma_skew_rad[k]))} mrad"
-        for k, pair in enumerate(("X-Y", "X-Z", "Y-Z"))
-    ]
-    return Table(
-        tuple(head),
-        tuple(tuple(row) for row in rows),
-        f"{name.capitalize()} axes; angles between axes exceed 90° by {', '.join(skew)}",
-    )
+        columns.append(each_with_sigma(axes.at_zero, axes.sigma_at_zero))
+    skew = each_with_sigma(axes.skew_rad, axes.sigma_skew_rad, mrad_from_radians(1.0))
+    beyond = ", ".join(f"{pair} {angle} mrad" for pair, angle in zip(("X-Y", "X-Z", "Y-Z"), skew, strict=True))
+    caption = f"{name.capitalize()} axes; angles between axes exceed 90° by {beyond}"
+    return Table(tuple(head), tuple(zip(*columns, strict=True)), caption)
 
 
 def _certainty(calibration: Calibration) -> list[Block]:
     blocks: list[Block] = []
-    for name, sensor in _sensors(calibration):
+    for name, sensor in calibrated_sensors(calibration):
         seen = sensor.observability
         if seen is None:
             continue
-        rows = [
-            (
-                name,
-                f"{seen.rank} of {seen.n_parameters} parameters determined, condition {plain_number(seen.condition)}",
-            )
-        ]
+        determined = f"{seen.rank} of {seen.n_parameters} parameters determined"
+        rows = [(name, f"{determined}, condition {plain_number(seen.condition)}")]
         if seen.weakest:
             rows.append(("least certain", seen.weakest))
         # Without a problem one pose is enough; findings name all that are missing.
         if seen.advice:
-            rows.append(
-                ("most useful next pose" if name == "accelerometer" else "most useful next move", seen.advice[0])
-            )
+            rows.append((f"most useful next {'pose' if name == 'accelerometer' else 'move'}", seen.advice[0]))
         if sensor.quality is not None and sensor.quality.dof > 0:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))

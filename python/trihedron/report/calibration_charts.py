@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
+from trihedron.report.axes import calibrated_sensors
 from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Panel, Points, Scale
-from trihedron.report.disc import equal_area
+from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -32,29 +33,22 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
     label = [f"pose {k + 1}" for k in range(len(pose))] if names is None else list(names)
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
-    marks: list[Band | Level | Points] = [
-        Band(edge, -np.repeat(limit, 2), np.repeat(limit, 2), "3 σ of noise alone"),
-        Level(y=0.0),
-    ]
-    has_held = quality.held_out is not None and bool(np.any(np.isfinite(quality.held_out)))
-    held_sigma: FloatArray | None = None
-    held = np.zeros(0)
-    if quality.held_out is not None and has_held:
+    reach = np.repeat(limit, 2)
+    marks: list[Band | Level | Points] = [Band(edge, -reach, reach, "3 σ of noise alone"), Level(y=0.0)]
+    top = None
+    if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
         told = [
-            said(f"cross-validated, {name}", "", v, "mm/s²", None if held_sigma is None else s)
+            said(f"cross-validated, {name}", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
-        marks.append(
-            Points(
-                pose + 0.17, held, told, held_sigma, "cross-validated (predicted by a fit without it)", "accent", True
-            )
-        )
-    told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
+        name = "cross-validated (predicted by a fit without it)"
+        marks.append(Points(pose + 0.17, held, told, held_sigma, name, "accent", True))
+        top = _highest(held, held_sigma, residual, limit)
+    told = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
-    top = _highest(held, held_sigma, residual, limit) if has_held else None
     y = Scale("|f| − |g|  [mm/s²]", "mm/s²", limits=None if top is None else (-top, top))
     return Chart((Panel(x, y, tuple(marks)),))
 
@@ -80,31 +74,28 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     assert quality.angle_deg is not None
     n = len(quality.angle_deg)
     move = np.arange(1, n + 1, dtype=np.float64)
-    is_out = np.zeros(n, dtype=bool)
-    if quality.weights is not None and len(quality.weights) == n:
-        is_out = quality.weights == 0.0
+    is_out = excluded_moves(quality)
     moves = segments.moves if segments is not None and len(segments.moves) == n else None
     names = [
         f"move {k + 1}" + ("" if moves is None else f" (pose {moves[k].pose_before + 1} → {moves[k].pose_after + 1})")
         for k in range(n)
     ]
     told = [
-        f"{said(w, '', v, '°')}{', excluded' if out else ''}"
+        f"{said(w, v, '°')}{', excluded' if out else ''}"
         for w, v, out in zip(names, quality.angle_deg, is_out, strict=True)
     ]
     noise = move_noise_deg(quality)
     marks: list[Bars | Points] = []
     held = quality.held_out_angle_deg
-    width = 0.38 if held is not None else 0.7
-    shift = 0.2 if held is not None else 0.0
+    width, shift = (0.7, 0.0) if held is None else (0.38, 0.2)
     inside = np.where(is_out, np.nan, quality.angle_deg)
     marks.append(Bars(move - shift, inside, width, told, "in sample", "c1"))
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
     if held is not None:
-        told_held = [said(f"cross-validated, {w}", "", v, "°") for w, v in zip(names, held, strict=True)]
+        told_held = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
         marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "cross-validated", "accent"))
-    told_noise = [said(f"noise alone, {w}", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
+    told_noise = [said(f"noise alone, {w}", v, "° rms") for w, v in zip(names, noise, strict=True)]
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
@@ -112,6 +103,14 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
     y = Scale("tilt error  [°]", "°", limits=(0.0, top))
     return Chart((Panel(Scale("move", limits=(0.3, n + 0.7), whole=True), y, tuple(marks), height_px=200),))
+
+
+def excluded_moves(quality: FitQuality) -> BoolArray:
+    """(m,) whether the fit excluded a move."""
+    n = 0 if quality.angle_deg is None else len(quality.angle_deg)
+    if quality.weights is None or len(quality.weights) != n:
+        return np.zeros(n, dtype=bool)
+    return np.asarray(quality.weights == 0.0)
 
 
 def move_noise_deg(quality: FitQuality) -> FloatArray:
@@ -163,8 +162,8 @@ def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]
 
 def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
-    both = (("accel", calibration.accelerometer), ("gyro", calibration.gyroscope))
-    names = [f"{prefix} {name}" for prefix, sensor in both if sensor is not None for name in PARAMETER_NAMES]
+    prefixes = {"accelerometer": "accel", "gyroscope": "gyro"}
+    names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibrated_sensors(calibration) for name in PARAMETER_NAMES]
     sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])

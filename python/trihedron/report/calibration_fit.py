@@ -1,4 +1,4 @@
-"""Figures of fit of S and b, with one definition each in every report."""
+"""Residuals of the fit of S and b in words and tables, with one definition each in every report."""
 
 from __future__ import annotations
 
@@ -6,20 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from trihedron.arrays import XYZ
-from trihedron.records import Calibration, FitQuality, SensorCalibration
+from trihedron.arrays import XYZ, FloatArray
+from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
 from trihedron.report.axes import BIAS, axes_of
-from trihedron.report.calibration_charts import move_noise_deg
-from trihedron.report.document import Table
-from trihedron.report.many_charts import shown
-from trihedron.report.numbers import how_many, in_mm_s2, plain_number, with_sigma
-from trihedron.units import degrees_from_radians
+from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
+from trihedron.report.document import Block, Table
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-METHODS = {
-    "joint": "both sensors in one fit of poses and moves",
-    "moves": "gravity after rotations between poses",
-}
+METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
 """Words for methods that records store as ids; other methods are words already."""
 
 
@@ -44,11 +40,10 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
     except ValueError:
         return []
     factor, unit = shown(sensor.si_unit)
-    values = zip(XYZ, factor * axes.bias, factor * axes.sigma_bias, strict=True)
-    said = ", ".join(f"{axis} {with_sigma(v, s)}" for axis, v, s in values) + f" {unit}"
+    bias = each_with_sigma(axes.bias, axes.sigma_bias, factor)
+    said = ", ".join(f"{axis} {one}" for axis, one in zip(XYZ, bias, strict=True)) + f" {unit}"
     if sensor.raw_unit == "counts":
-        raw = (with_sigma(v, s) for v, s in zip(axes.at_zero, axes.sigma_at_zero, strict=True))
-        said += f" ({', '.join(raw)} counts)"
+        said += f" ({', '.join(each_with_sigma(axes.at_zero, axes.sigma_at_zero))} counts)"
     return [("bias", f"{said}; {BIAS}")]
 
 
@@ -122,3 +117,66 @@ def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> T
         f"poses with {AT_REST}, rotations with the {AFTER_MOVES}"
     )
     return Table(head, tuple((row[0], session_fit.get(row[0], "–"), *row[1:]) for row in rows), caption)
+
+
+def residual_tables(calibration: Calibration, segments: Segments | None) -> list[Block]:
+    """Residuals pose by pose and move by move."""
+    blocks: list[Block] = []
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        blocks.append(_pose_table(calibration.accelerometer, quality, segments))
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
+        blocks.append(_move_table(gyroscope.quality, segments))
+    return blocks
+
+
+def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segments | None) -> Table:
+    is_known = segments is not None and segments.n_poses == len(quality.residual)
+    rows = []
+    for k, (residual, sigma) in enumerate(zip(quality.residual, quality.sigma, strict=True)):
+        row = [str(k + 1)]
+        if is_known and segments is not None:
+            row += [plain_number(segments.time_mid_s[k], 4), plain_number(segments.duration_s[k], 2)]
+            mean = segments.accelerometer_mean
+            row.append("" if mean is None else direction(sensor.S @ mean[k] + sensor.b))
+        row.append(with_sigma(mm_s2_from_m_s2(float(residual)), mm_s2_from_m_s2(float(sigma))))
+        row.append(_held_out_cell(quality, k))
+        rows.append(tuple(row))
+    known = ("mid [s]", "length [s]", "up (body frame)") if is_known else ()
+    head = ("pose", *known, "residual [mm/s²]", "cross-validated [mm/s²]")
+    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
+
+
+def _held_out_cell(quality: FitQuality, k: int) -> str:
+    if quality.held_out is None or not np.isfinite(quality.held_out[k]):
+        return "–"
+    sigma = float("nan") if quality.held_out_sigma is None else float(quality.held_out_sigma[k])
+    return with_sigma(mm_s2_from_m_s2(float(quality.held_out[k])), mm_s2_from_m_s2(sigma))
+
+
+def direction(force: FloatArray) -> str:
+    """A unit vector with two decimals."""
+    unit = force / np.linalg.norm(force)
+    return " ".join(f"{c:+.2f}".replace("-", "−") for c in unit)
+
+
+def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
+    assert quality.angle_deg is not None
+    moves = segments.moves if segments is not None and len(segments.moves) == len(quality.angle_deg) else None
+    rows = []
+    noise, is_out, held = move_noise_deg(quality), excluded_moves(quality), quality.held_out_angle_deg
+    for k, angle in enumerate(quality.angle_deg):
+        row = [str(k + 1)]
+        if moves is not None:
+            row.append(f"{moves[k].pose_before + 1} → {moves[k].pose_after + 1}")
+        row += [
+            plain_number(float(angle), 2),
+            "–" if held is None else plain_number(float(held[k]), 2),
+            plain_number(float(noise[k]), 2),
+            "excluded" if is_out[k] else "",
+        ]
+        rows.append(tuple(row))
+    figures = ("in sample [°]", "cross-validated [°]", "noise alone [°]", "used")
+    head = ("move", *(("poses",) if moves is not None else ()), *figures)
+    return Table(head, tuple(rows), "Gyroscope: tilt error after every rotation, predicted against measured gravity")

@@ -16,7 +16,7 @@ from trihedron.report.calibration_charts import (
     residual_chart,
     sphere_chart,
 )
-from trihedron.report.calibration_residuals import direction
+from trihedron.report.calibration_fit import direction
 from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
@@ -32,34 +32,20 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
-    circles = (
-        "; circles: cross-validated, predicted by a fit that did not see that pose, bars: 1 σ"
-        if _is_held(quality)
-        else ""
-    )
-    caption = f"Norm of gravity minus its true value in every pose, against 3 σ of noise alone{circles}."
+    caption = "Norm of gravity minus its true value in every pose, against 3 σ of noise alone"
+    if _is_held(quality):
+        caption += "; circles: cross-validated, predicted by a fit that did not see that pose, bars: 1 σ"
+    caption += "."
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
-        chart = partial(lead_chart, calibration, means)
+        chart = partial(_lead_chart, calibration, means)
         caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
-    return Picture(
-        "residuals",
-        caption,
-        chart,
-    )
+    return Picture("residuals", caption, chart)
 
 
-def lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
+def _lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
     """Residual of every pose, and |gravity error| before and after calibration; ``means`` (n, 3) raw readings."""
-    quality = calibration.accelerometer.quality
-    assert quality is not None
-    residual = residual_chart(quality)
-    return Chart((*residual.panels, before_after_panel(calibration, means)), columns=2)
-
-
-def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
-    """|Gravity error| in every pose: of the readings as logged, and calibrated."""
     quality = calibration.accelerometer.quality
     assert quality is not None
     before = mm_s2(uncalibrated_error(calibration, means))
@@ -71,16 +57,14 @@ def before_after_panel(calibration: Calibration, means: FloatArray) -> Panel:
     held = _is_held(quality)
     kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
     for values, name, colour in kinds:
-        told = [said(f"pose {k}", "", v, "mm/s²") for k, v in enumerate(values, 1)]
+        told = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
         marks.append(Points(pose, size, told, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
-    return Panel(
-        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
-        Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True),
-        tuple(marks),
-        title=f"{rms[0]} → {rms[1]} mm/s² rms",
-    )
+    x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
+    y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
+    sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms")
+    return Chart((*residual_chart(quality).panels, sizes), columns=2)
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:
@@ -131,28 +115,16 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
                 "Drag to turn."
             )
             blocks.append(Picture("orientation", caption, partial(orientation_chart, calibration.accelerometer, means)))
-        blocks.append(_poses_picture(calibration.accelerometer, means))
+        caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
+        caption += "not recorded; triangles are the most useful next poses, in that order."
+        blocks.append(Picture("poses", caption, partial(sphere_chart, calibration.accelerometer, means)))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
-        blocks.append(
-            Picture(
-                "moves",
-                "Tilt error after every rotation, in sample and cross-validated (held out).",
-                partial(move_chart, gyroscope.quality, segments),
-            )
-        )
+        caption = "Tilt error after every rotation, in sample and cross-validated (held out)."
+        blocks.append(Picture("moves", caption, partial(move_chart, gyroscope.quality, segments)))
     if segments is not None and recording is not None:
         blocks.append(signals_picture(recording, segments))
     return blocks
-
-
-def _poses_picture(sensor: SensorCalibration, means: FloatArray) -> Picture:
-    return Picture(
-        "poses",
-        "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
-        "not recorded; triangles are the most useful next poses, in that order.",
-        partial(sphere_chart, sensor, means),
-    )
 
 
 def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
@@ -162,7 +134,7 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     values = mm_s2(_unseen(sensor.quality))
     limit = float(np.nanmax(np.abs(values), initial=0.0))
     told = [
-        f"{said(f'pose {k}', '', v, 'mm/s²')}, up {direction(f)}"
+        f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"
         for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
@@ -202,7 +174,7 @@ def _over_time(
     for k, name in enumerate(names):
         values = mm_s2(residual[:, k])
         told = [
-            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", "", v, "mm/s²")
+            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", v, "mm/s²")
             for n, (t, v) in enumerate(zip(time_s, values, strict=True), 1)
         ]
         colour = AXIS_COLOURS[k] if name else "accent"
@@ -212,15 +184,9 @@ def _over_time(
 
 def correlation_picture(calibration: Calibration) -> Picture | None:
     """Correlations of the free parameters of both sensors."""
-    names, _ = correlations(calibration)
+    names, r = correlations(calibration)
     if len(names) < FEWEST_NAMES:
         return None
-    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope), orange positive, blue negative."
-    return Picture("correlations", caption, partial(matrix_chart, calibration))
-
-
-def matrix_chart(calibration: Calibration) -> Chart:
-    """Correlations as a triangle of cells."""
-    names, r = correlations(calibration)
     short = tuple(name.replace("accel ", "a ").replace("gyro ", "w ") for name in names)
-    return Chart((Matrix("correlations", short, r),), legend=False)
+    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope), orange positive, blue negative."
+    return Picture("correlations", caption, lambda: Chart((Matrix("correlations", short, r),), legend=False))

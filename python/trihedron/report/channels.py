@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.records import Recording
 from trihedron.records.channel_facts import Limit, LowPass
 from trihedron.report.document import Table
@@ -17,7 +16,8 @@ UNKNOWN = "not known"
 def channels_table(recording: Recording) -> Table:
     """A row per axis, or one per sensor where its axes are equal."""
     rows: list[tuple[str, ...]] = []
-    for name, unit in _sensors(recording).items():
+    for name, _, raw_unit in logged_sensors(recording):
+        unit = unit_in_print(raw_unit)
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         cells = [
             (
@@ -37,7 +37,7 @@ def channels_table(recording: Recording) -> Table:
 def channels_record(recording: Recording) -> dict[str, Any]:
     """For JSON: ``resolution`` (3,), ``range_limits`` and ``low_pass`` of every axis, raw units and Hz."""
     out: dict[str, Any] = {}
-    for name in _sensors(recording):
+    for name, *_ in logged_sensors(recording):
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         out[name] = {
             "resolution": facts.step,
@@ -47,15 +47,13 @@ def channels_record(recording: Recording) -> dict[str, Any]:
     return out
 
 
-def _sensors(recording: Recording) -> Mapping[str, str]:
-    return {
-        name: unit_in_print(unit)
-        for name, readings, unit in (
-            ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
-            ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
-        )
-        if readings is not None
-    }
+def logged_sensors(recording: Recording) -> list[tuple[str, FloatArray, str]]:
+    """Name, readings (n, 3) and raw unit of the sensors that the log holds."""
+    both = (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
+    )
+    return [(name, readings, unit) for name, readings, unit in both if readings is not None]
 
 
 def _ends(limits: list[Limit], unit: str) -> str:
@@ -73,7 +71,8 @@ def _filter(one: LowPass) -> str:
 
 
 def _filter_record(one: LowPass) -> dict[str, Any]:
-    if one.corner_hz is None:
+    corner = one.corner_hz
+    if corner is None:
         return {"corner_hz": None, "above_hz": one.above_hz}
-    return {"corner_hz": one.corner_hz.value, "lower_hz": one.corner_hz.lower, "upper_hz": one.corner_hz.upper,
-            "order": one.shape or None}  # fmt: skip
+    ends = {"lower_hz": corner.lower, "upper_hz": corner.upper}
+    return {"corner_hz": corner.value, **ends, "order": one.shape or None}

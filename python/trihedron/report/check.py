@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.records.sampling import TimestampKind
-from trihedron.report.axes import axes_of
+from trihedron.report.axes import axes_of, calibrated_sensors
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.many_charts import shown
-from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.numbers import how_many, plain_number, shown
 from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
+
+NONE = "–"
 
 
 def check_report(
@@ -22,8 +23,12 @@ def check_report(
     """Lay out the audit; ``calibration`` gives the uncertainties to expect."""
     blocks: list[Block] = [channels_table(recording)]
     if calibration is not None:
-        blocks.append(_expected(calibration))
+        rows = tuple((name, *cells) for name, cells in _expected_cells(calibration).items())
+        head = ("", "scale", "bias", "angles between axes")
+        blocks.append(Table(head, rows, "Expected standard uncertainty (1 σ), worst axis"))
         blocks += _advice(calibration)
+    # A log without timestamps needs its rate again.
+    rate = f" --rate {recording.rate_hz:.6g}" if recording.sampling.kind is TimestampKind.NONE else ""
     return Document(
         title="Check of a log",
         subtitle=recording.source,
@@ -35,63 +40,42 @@ def check_report(
         ),
         headlines=tuple(_headlines(segments, calibration)),
         lead=signals_picture(recording, segments),
-        next_step=f"Calibrate: trihedron calibrate LOG{_rate(recording)} --latitude DEG -o FILE.",
+        next_step=f"Calibrate: trihedron calibrate LOG{rate} --latitude DEG -o FILE.",
     )
-
-
-def _rate(recording: Recording) -> str:
-    """The option --rate, which a log without timestamps needs to be read at this rate."""
-    return "" if recording.sampling.kind is not TimestampKind.NONE else f" --rate {recording.rate_hz:.6g}"
 
 
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
     out = []
-    for name, sensor in (
-        (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)) if calibration else ()
-    ):
-        if sensor is None:
+    expected = {} if calibration is None else _expected_cells(calibration)
+    for name, (scale, *_) in expected.items():
+        if scale == NONE:
             out.append(Headline(f"{name} scale", "none", "", "this log does not determine it"))
-            continue
-        scale = _expected_cells(sensor)[0]
-        out.append(Headline(f"expected {name} scale uncertainty", scale, "", "1 σ, worst axis"))
+        else:
+            out.append(Headline(f"expected {name} scale uncertainty", scale, "", "1 σ, worst axis"))
     out.append(Headline("poses", str(segments.n_poses), "", how_many(len(segments.moves), "move")))
     return out
 
 
-def _expected(calibration: Calibration) -> Table:
-    rows = []
-    for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
-        if sensor is None:
-            rows.append((name, "–", "–", "–"))
+def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]:
+    """Standard uncertainty of scale, bias and angles, on the worst axis of each sensor."""
+    cells = {"accelerometer": (NONE, NONE, NONE), "gyroscope": (NONE, NONE, NONE)}
+    for name, sensor in calibrated_sensors(calibration):
+        try:
+            axes = axes_of(sensor)
+        except ValueError:
+            cells[name] = ("not determined", "not determined", "not determined")
             continue
-        rows.append((name, *_expected_cells(sensor)))
-    head = ("", "scale", "bias", "angles between axes")
-    return Table(head, tuple(rows), "Expected standard uncertainty (1 σ), worst axis")
-
-
-def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:
-    try:
-        axes = axes_of(sensor)
-    except ValueError:
-        return ("not determined", "not determined", "not determined")
-    scale = 100.0 * float(np.max(axes.scale_sigma))
-    factor, unit = shown(sensor.si_unit)
-    skew = mrad_from_radians(float(np.max(axes.sigma_skew_rad)))
-    return (
-        f"{plain_number(scale, 2)} %",
-        f"{plain_number(factor * float(np.max(axes.sigma_bias)), 2)} {unit}",
-        f"{plain_number(skew, 2)} mrad",
-    )
+        factor, unit = shown(sensor.si_unit)
+        sigmas = (100.0 * axes.scale_sigma, factor * axes.sigma_bias, mrad_from_radians(1.0) * axes.sigma_skew_rad)
+        scale, bias, skew = (plain_number(float(np.max(sigma)), 2) for sigma in sigmas)
+        cells[name] = (f"{scale} %", f"{bias} {unit}", f"{skew} mrad")
+    return cells
 
 
 def _advice(calibration: Calibration) -> list[Block]:
-    rows = []
-    for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
-        if sensor is not None and sensor.observability is not None and sensor.observability.advice:
-            rows.append(
-                (
-                    f"most useful next pose, {name}" if name == "accelerometer" else f"most useful next move, {name}",
-                    sensor.observability.advice[0],
-                )
-            )
-    return [Facts(tuple(rows))] if rows else []
+    rows = tuple(
+        (f"most useful next {'pose' if name == 'accelerometer' else 'move'}, {name}", sensor.observability.advice[0])
+        for name, sensor in calibrated_sensors(calibration)
+        if sensor.observability is not None and sensor.observability.advice
+    )
+    return [Facts(rows)] if rows else []

@@ -1,17 +1,40 @@
-"""Report of the demonstration: steps, results, and errors relative to the truth."""
+"""Report of the demonstration: a session against its truth, and a simulation that a log contradicts."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from trihedron.records import Calibration, Comparison, Finding, Recording, Segments, Severity, Verification
+from trihedron.records.diagnosis import Diagnosis
 from trihedron.report.calibration import parameter_table
+from trihedron.report.diagnosis import effects_blocks
+from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
+from trihedron.report.diagnosis_words import MEANING, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block
-from trihedron.report.numbers import duration, engineering_exponent, in_mm_s2, plain_number, power_of_ten, with_sigma
+from trihedron.report.numbers import (
+    duration,
+    engineering_exponent,
+    in_mm_s2,
+    listed,
+    plain_number,
+    power_of_ten,
+    with_sigma,
+)
 from trihedron.report.verification import facts_of
+
+_MOST_NUMBERS = 6
+_FILES = {
+    "unit.csv": "the log of the unit",
+    "simulation.toml": "the simulation as it was",
+    "improved.toml": "the simulation with the parameters of the log; your comments stay",
+    "disagreement.html": "the whole diagnosis, with figures",
+    "sealed.json": "what was drawn",
+}
 
 
 def demonstration_report(
@@ -25,6 +48,8 @@ def demonstration_report(
     files: tuple[tuple[Path, str], ...],
 ) -> Document:
     """Lay out the demonstration."""
+    before = f"{in_mm_s2(uncalibrated_rms_m_s2)} rms with the data sheet's scale"
+    verified = (("gravity error before", before), *facts_of(verification))
     return Document(
         title="A complete session, on a simulated sensor",
         subtitle="Everything below was computed from the CSV log; only section 4 uses the truth.",
@@ -33,7 +58,7 @@ def demonstration_report(
         sections=(
             Section("1  The session", (Paragraph(_session(segments, recording)),)),
             Section("2  Calibrate", _calibrated(calibration, latitude_deg)),
-            Section("3  Verify on another session", _verified(verification, uncalibrated_rms_m_s2)),
+            Section("3  Verify on another session", (Facts(verified), *_warnings(verification.findings))),
             Section("4  Compare with the truth", (_truth_table(comparison), Paragraph(_coverage(comparison)))),
             Section("5  Files", (Facts(tuple((str(path), what) for path, what in files)),)),
             Section("Your own sensor", (_next_steps(),)),
@@ -71,11 +96,6 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
     if calibration.gyroscope is not None:
         blocks.append(parameter_table("gyroscope", calibration.gyroscope))
     return (*blocks, *_warnings(calibration.findings))
-
-
-def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
-    uncalibrated = ("gravity error before", f"{in_mm_s2(before)} rms with the data sheet's scale")
-    return (Facts((uncalibrated, *facts_of(verification))), *_warnings(verification.findings))
 
 
 def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:
@@ -127,3 +147,50 @@ def _next_steps() -> Facts:
             ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
         )
     )
+
+
+def disagreement_report(
+    found: Diagnosis,
+    improved: Diagnosis,
+    sealed: Mapping[str, Any],
+    sizes: Mapping[str, Mapping[str, Any]],
+    folder: Path,
+    seed: int,
+) -> Document:
+    """Lay out the disagreement, differing parameters and missing effects, the improved simulation, the answer."""
+    numbers = differing_numbers(found)
+    more = len(numbers) - _MOST_NUMBERS
+    words = [*numbers[:_MOST_NUMBERS], *([f"and {more} more"] if more > 0 else ())]
+    told = [("", word) for word in words or ["none differs"]]
+    is_right = [e.id for e in found.effects][:1] == [sealed["effect"]]
+    beside = any(sealed["effect"] in e.confounded_with for e in found.effects[:1])
+    answer = "Found: it is the first effect named." if is_right else "Not found: another effect is named first."
+    if beside:
+        answer = "The drawn effect is confounded with the first one named in this recording, and the report says so."
+    return Document(
+        title="A simulation and a log that disagree",
+        subtitle=f"One effect, drawn at random (--seed {seed} repeats it), was sealed before the diagnosis.",
+        verdict=verdict_in_words(found),
+        is_trustworthy=True,
+        sections=(
+            Section("Parameters: this unit differs from the data sheet", (Facts(tuple(told)),)),
+            Section("Physics: effects missing from the simulation", effects_blocks(found)),
+            Section("Stage by stage", stages_blocks(found, MEANING)),
+            Section("The improved simulation, compared with the same log", (Paragraph(verdict_in_words(improved)),)),
+            Section("The drawn effect", (*_opened(sealed, sizes), Paragraph(answer))),
+            Section("Files", (Facts(tuple((str(folder / name), what) for name, what in _FILES.items())),)),
+        ),
+    )
+
+
+def _opened(sealed: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Any]]) -> tuple[Block, ...]:
+    said = sizes.get(str(sealed["effect"]), {})
+    rows = [("drawn", str(sealed["effect"]))]
+    for key, true in sealed["size"].items():
+        rows.append((key, f"drawn {_numbers(true)}; found {_numbers(said[key]) if key in said else '–'}"))
+    return (Facts(tuple(rows)),)
+
+
+def _numbers(value: Any) -> str:
+    flat = np.ravel(np.asarray(value, dtype=np.float64))
+    return listed([plain_number(float(v), 3) for v in flat])

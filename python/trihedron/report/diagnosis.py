@@ -12,21 +12,10 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
-from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
-from trihedron.report.diagnosis_charts import before_after_chart
-from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relations_blocks
-from trihedron.report.diagnosis_numbers import (
-    differing_blocks,
-    noise_blocks,
-    numbers_blocks,
-    stages_blocks,
-)
-from trihedron.report.diagnosis_overview_charts import (
-    forest_pictures,
-    ratio_pictures,
-    strengths_picture,
-    traces_picture,
-)
+from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
+from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
+from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
+from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     MEANING,
     differing_headline,
@@ -43,15 +32,10 @@ from trihedron.report.diagnosis_words import (
     where_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.effect_charts import effect_chart
-from trihedron.report.effect_rest_charts import rest_panels
+from trihedron.report.effect_charts import effect_chart, rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
-from trihedron.report.numbers import (
-    how_many,
-    listed,
-    plain_number,
-)
+from trihedron.report.numbers import capital, how_many, listed, plain_number
 from trihedron.report.reference import beside_reference
 
 _CAPTIONS = {
@@ -73,11 +57,11 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     ``improved`` the scenario written with the parameters of the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
-        about = (*forest_pictures(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
+        about = (forest_picture(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
         sections.append(Section("Parameters that differ", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
-        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
+        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", candidates_blocks(diagnosis)),
         Section("Calibration and noise", models_blocks(diagnosis)),
@@ -87,7 +71,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Stage by stage", stages))
         sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
-        noise = (*ratio_pictures(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
+        noise = (*ratios_picture(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
@@ -122,25 +106,22 @@ def _distrust(diagnosis: Diagnosis) -> str:
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     after = {d.domain: d for d in diagnosis.remaining}
-    has_effects = bool(diagnosis.effects)
     # Most important columns first: on a narrow terminal the others move below.
-    rows = tuple(
+    head: tuple[str, ...] = ("residual", "linear model", "rms", "χ²/dof", "p")
+    rows: list[tuple[str, ...]] = [
         (
-            MEANING[d.domain],
-            "disagrees" if d.disagrees else "agrees",
-            *([_judged_after(d, after.get(d.domain))] if has_effects else []),
-            rms_in_words(d),
-            plain_number(d.chi2_per_dof),
-            p_in_words(d.p_value),
-            *(_figures_after(after.get(d.domain)) if has_effects else ()),
+            MEANING[d.domain], "disagrees" if d.disagrees else "agrees",
+            rms_in_words(d), plain_number(d.chi2_per_dof), p_in_words(d.p_value),
         )
         for d in diagnosis.domains
-    )
-    judged, figures = (("with the effects",), ("rms with them", "χ²/dof with them")) if has_effects else ((), ())
-    head = ("residual", "linear model", *judged, "rms", "χ²/dof", "p", *figures)
+    ]  # fmt: skip
+    if diagnosis.effects:
+        head = (*head[:2], "with the effects", *head[2:], "rms with them", "χ²/dof with them")
+        with_them = [_after(d, after.get(d.domain)) for d in diagnosis.domains]
+        rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
     caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
-    blocks: list[Block] = [Table(head, rows, caption)]
+    blocks: list[Block] = [Table(head, tuple(rows), caption)]
     # Parameters that differ have a section of their own.
     places = tuple(
         (MEANING[d.domain], place)
@@ -156,17 +137,15 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _judged_after(before: DomainTest, test: DomainTest | None) -> str:
+def _after(before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
+    """Judgement, rms and χ²/dof of a domain with the effects."""
     if test is None:
-        return "–"
+        return "–", "–", "–"
+    judged = "disagrees" if test.disagrees else "agrees"
     if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
         # An effect that leaves the residual unchanged explains it: disturbed poses, a spectral line.
-        return "explained"
-    return "disagrees" if test.disagrees else "agrees"
-
-
-def _figures_after(test: DomainTest | None) -> tuple[str, str]:
-    return ("–", "–") if test is None else (rms_in_words(test), plain_number(test.chi2_per_dof))
+        judged = "explained"
+    return judged, rms_in_words(test), plain_number(test.chi2_per_dof)
 
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -180,21 +159,16 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             ("", _evidence(effect)),
         ]
         if effect.confounded_with:
-            rows.append(
-                ("", f"Confounded with {listed(list(effect.confounded_with))} in this recording. To separate them: ")
-            )
-            rows[-1] = ("", rows[-1][1] + (effect.separating_experiment or "record other poses and moves") + ".")
+            rivals = listed(list(effect.confounded_with))
+            separating = effect.separating_experiment or "record other poses and moves"
+            rows.append(("", f"Confounded with {rivals} in this recording. To separate them: {separating}."))
         blocks.append(Facts(tuple(row for row in rows if row[1])))
     return tuple(blocks)
 
 
 def _without_strongest(statement: str) -> str:
     """The sentence without its strongest term, which is listed below it with its uncertainty."""
-    return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
 
 
 def _parameters(effect: AcceptedEffect) -> str:
@@ -204,17 +178,14 @@ def _parameters(effect: AcceptedEffect) -> str:
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
         scale, shared = parameter_unit(unit, max(abs(p.value) for p in members))
-        words = [
-            f"{_parameter(p.name)} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]
-        ]
-        more = len(members) - MOST_PARAMETERS
-        groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
+        words = []
+        for p in members[:MOST_PARAMETERS]:
+            # A symbol with its axis (K2_x) stays as it is, words (accelerometer_delay) get spaces.
+            name = p.name if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
+            words.append(f"{name} {value_in_words(scale * p.value, scale * p.std)}")
+        words += [f"{len(members) - MOST_PARAMETERS} more"] if len(members) > MOST_PARAMETERS else []
+        groups.append(", ".join(words) + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
-
-
-def _parameter(name: str) -> str:
-    """A printed name: a symbol with its axis (``K2_x``) unchanged, words (``accelerometer_delay``) with spaces."""
-    return name if len(name.rpartition("_")[2]) <= LETTERS else name.replace("_", " ")
 
 
 def _evidence(effect: AcceptedEffect) -> str:
@@ -226,10 +197,15 @@ def _evidence(effect: AcceptedEffect) -> str:
 
 def _improvement(held: HeldOut) -> str:
     chi2 = f"χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
+    before, after = _before_and_after(held)
+    return f"{quantity(held)} {chi2}" if before == "–" else f"{quantity(held)} from {before} to {after} rms ({chi2})"
+
+
+def _before_and_after(held: HeldOut) -> tuple[str, str]:
+    """The rms without and with an effect; dashes where a domain has none."""
     if held.rms_before == held.rms_after == 0.0:
-        return f"{quantity(held)} {chi2}"
-    before, after = (size_in_words(rms, held.unit) for rms in (held.rms_before, held.rms_after))
-    return f"{quantity(held)} from {before} to {after} rms ({chi2})"
+        return "–", "–"
+    return size_in_words(held.rms_before, held.unit), size_in_words(held.rms_after, held.unit)
 
 
 def _remaining(diagnosis: Diagnosis) -> str:
@@ -242,7 +218,7 @@ def _remaining(diagnosis: Diagnosis) -> str:
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]
-    return _capital("; ".join(said) + ".")
+    return capital("; ".join(said) + ".")
 
 
 def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -250,10 +226,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             effect.id,
             quantity(held),
-            *(
-                "–" if held.rms_before == held.rms_after == 0.0 else size_in_words(v, held.unit)
-                for v in (held.rms_before, held.rms_after)
-            ),
+            *_before_and_after(held),
             plain_number(held.chi2_per_dof_before),
             plain_number(held.chi2_per_dof_after),
         )
@@ -288,8 +261,7 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effect in diagnosis.effects:
         chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: {_drawn_in_words(effect)}. "
-            caption += _without_strongest(effect.statement)
+            caption = f"{effect.id}: {_drawn_in_words(effect)}. {_without_strongest(effect.statement)}"
             out.append(Picture(f"effect-{effect.id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
 
@@ -305,14 +277,11 @@ def _drawn_in_words(effect: AcceptedEffect) -> str:
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
-    has_effects = bool(diagnosis.effects)
-
-    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; "
-    caption += "error bars: ± 2 σ of the predicted noise."
+    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
-    chart = partial(before_after_chart, residuals, has_effects=has_effects)
-    return Picture(f"{residuals.domain}", caption, chart)
+    chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects))
+    return Picture(residuals.domain, caption, chart)
 
 
 def _counted(residuals: DomainResiduals) -> str:

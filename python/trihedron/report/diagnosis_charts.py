@@ -1,29 +1,43 @@
-"""Charts of a diagnosis: residuals of each domain before and after the effects."""
+"""Charts of a diagnosis: residuals before and after the effects; of a model: errors by stage, spectra, Allan curves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.domains import DomainResiduals
-from trihedron.report.axes import channel_in_print
+from trihedron.report.axes import axis_in_print, channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.report.numbers import SHOWN, plain_number, shown
 
-PRINTED = {
-    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "deg": (1.0, "°"),
-    "m/s": (1.0, "m/s"),
+Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
+WORDS = {
+    "static-accel": "gravity error in static poses",
+    "static-gyro": "gyro rate in static poses",
+    "moves": "tilt error after rotations",
+    "dynamics": "velocity error over a rotation",
+    "noise": "noise, octave by octave",
 }
+SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
+FEWEST_STAGES = 3
+FEWEST_OCTAVES = 2
+PER_OCTAVE = 24
+"""Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
+SENSORS = ("accelerometer", "gyroscope")
+Spectrum = tuple[FloatArray, FloatArray, FloatArray]
+"""Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
 
 
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
-    factor, unit = PRINTED[residuals.unit]
+    factor, unit = shown(residuals.unit)
     sides = [
         (
             "linear model" if has_effects else "fitted model",
@@ -32,34 +46,19 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
             residuals.sigma_before,
             residuals.names_before,
         ),
-        (
-            "with the effects",
-            residuals.time_after_s,
-            residuals.after,
-            residuals.sigma_after,
-            residuals.names_after,
-        ),
+        ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after, residuals.names_after),
     ][: 2 if has_effects else 1]
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
     times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])
     start, end = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
     room = 0.02 * (end - start) or 1.0
+    x = Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room))
+    y = Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high))
     panels = []
     for title, time_s, value, sigma, names in sides:
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
-        panels.append(
-            Panel(
-                Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room)),
-                Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high)),
-                marks,
-                title=title,
-                height_px=200,
-            )
-        )
+        panels.append(Panel(x, y, marks, title=title, height_px=200))
     return Chart(tuple(panels), columns=len(panels))
-
-
-Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
 
 
 def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[float, float]:
@@ -81,7 +80,7 @@ def _domain_marks(
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
         axis = channel_in_print(channel)
-        told = [said(f"{name}, {axis}", "", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
+        told = [said(f"{name}, {axis}", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
         marks.append(Points(time_s, value[:, k], told, None, axis, colour))
     return tuple(marks)
 
@@ -92,3 +91,126 @@ def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> 
     x = np.column_stack([time_s, time_s, np.full(len(time_s), np.nan)]).ravel()
     y = np.column_stack([low, 2.0 * sigma, np.full(len(time_s), np.nan)]).ravel()
     return Line(x, y, "2 σ of noise", "shade")
+
+
+def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Cross-validated misfit after every stage."""
+    if len(diagnosis.stages) < FEWEST_STAGES:
+        return ()
+    caption = "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each "
+    caption += "domain against its own first stage."
+    return (Picture("stages", caption, partial(stages_chart, diagnosis)),)
+
+
+def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Spectra and Allan curves of both logs."""
+    seen = _spectra(diagnosis.noise_compared)
+    if not seen:
+        return ()
+    first = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
+    second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
+    spectra = Picture("spectra-both", first, partial(spectra_chart, diagnosis))
+    if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):
+        return (spectra,)
+    return spectra, Picture("allan-both", second, partial(allan_chart, diagnosis))
+
+
+def stages_chart(diagnosis: Diagnosis) -> Chart:
+    """One line per domain: rms after every stage over that of the first, since units differ."""
+    names = tuple(stage.stage.replace("-", " ") for stage in diagnosis.stages)
+    marks: list[Mark] = []
+    least = 1.0
+    for (domain, words), colour in zip(WORDS.items(), SLOPES, strict=True):
+        found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
+        found = [(k, d) for k, d in found if d.unit in SHOWN and d.rms > 0.0]
+        if len(found) < FEWEST_OCTAVES:
+            continue
+        factor, unit = SHOWN[found[0][1].unit]
+        x = np.array([k for k, _ in found], dtype=np.float64)
+        y = 100.0 * np.array([d.rms for _, d in found]) / found[0][1].rms
+        told = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
+        marks += [Line(x, y, "", colour), Points(x, y, told, None, words, colour)]
+        least = min(least, float(y.min()))
+    along = Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names)
+    up = Scale("rms left [% of the first stage]", "%", is_log=True, limits=(0.6 * least, 160.0))
+    return Chart((Panel(along, up, tuple(marks), height_px=260),))
+
+
+def spectra_chart(diagnosis: Diagnosis) -> Chart:
+    """A panel per sensor and axis: noise density in every octave, constant over its band."""
+    panels = []
+    for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
+        unit = f"{_unit(sensor)}/√Hz"
+        x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
+        lines = _both(x, np.repeat(model, 3), np.repeat(own, 3))
+        scales = Scale("frequency [Hz]", "Hz", is_log=True), Scale(f"density [{unit}]", unit, is_log=True)
+        panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
+    return Chart(tuple(panels), columns=3)
+
+
+def allan_chart(diagnosis: Diagnosis) -> Chart:
+    """A panel per sensor and axis: Allan deviation of a spectrum that is constant within its octaves.
+
+    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, for τ from half a period of the highest frequency to a quarter
+    of the lowest's: for longer τ, noise below the lowest octave would be missing.
+    """
+    panels = []
+    for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
+        unit = _unit(sensor)
+        edges, model, own = _without_gaps(edges, model, own)
+        if len(edges) < FEWEST_OCTAVES:
+            continue
+        tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
+        lines = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
+        scales = Scale("averaging time τ [s]", "s", is_log=True), Scale(f"Allan deviation [{unit}]", unit, is_log=True)
+        panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
+    return Chart(tuple(panels), columns=3)
+
+
+def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> FloatArray:
+    """(k,) Allan deviation at ``tau_s`` (k,) of root densities (m,) in bands ``edges_hz`` (m, 2), their unit·√Hz."""
+    out = np.zeros(len(tau_s))
+    for (low, high), root in zip(edges_hz, density, strict=True):
+        f = low + (high - low) * (np.arange(PER_OCTAVE) + 0.5) / PER_OCTAVE
+        x = np.pi * np.multiply.outer(tau_s, f)
+        out += 4.0 * root**2 * (np.sin(x) ** 4 / x**2).mean(axis=1) * (high - low)
+    return np.sqrt(out)
+
+
+def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Line, Line]:
+    return (Line(x, own, "recording", "accent"), Line(x, model, "model", "ink", is_dashed=True))
+
+
+def _panel(scales: tuple[Scale, Scale], lines: tuple[Line, Line], title: str) -> Panel:
+    seen = np.concatenate([line.y[np.isfinite(line.x)] for line in lines])
+    limits = (float(seen.min()) / 1.6, float(seen.max()) * 1.6)
+    return Panel(scales[0], replace(scales[1], limits=limits), lines, title=title)
+
+
+def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spectrum]:
+    """Octaves of model and recording by sensor and axis, lowest first."""
+    rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
+    for n in compared:
+        if n.band_hz is not None and n.model and n.recording and n.sensor in SENSORS:
+            rows.setdefault((n.sensor, n.axis), []).append((*n.band_hz, n.model, n.recording))
+    out = {}
+    for key, found in rows.items():
+        if len(found) >= FEWEST_OCTAVES:
+            table = np.array(sorted(found))
+            out[key] = table[:, :2], table[:, 2], table[:, 3]
+    return out
+
+
+def _without_gaps(edges: FloatArray, model: FloatArray, own: FloatArray) -> Spectrum:
+    """The longest run of contiguous octaves: a missing band would appear as a dip and a ripple."""
+    runs = np.split(np.arange(len(edges)), 1 + np.flatnonzero(~np.isclose(edges[1:, 0], edges[:-1, 1])))
+    longest = max(runs, key=len)
+    return edges[longest], model[longest], own[longest]
+
+
+def _unit(sensor: str) -> str:
+    return "m/s²" if sensor == "accelerometer" else "rad/s"
+
+
+def _said(sensor: str) -> str:
+    return "gyro" if sensor == "gyroscope" else sensor

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from trihedron.arrays import AXES
-from trihedron.records.diagnosis import Candidate, Diagnosis, Relation
-from trihedron.report.diagnosis_words import (
-    parameter_in_words,
-    size_in_words,
-    value_in_words,
-)
+from trihedron.records.diagnosis import Diagnosis, Relation
+from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.numbers import (
     MINUS,
@@ -18,8 +14,9 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
     unit_in_print,
-    with_sigma,
 )
+
+MOST_COEFFICIENTS = 6
 
 
 def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -44,24 +41,22 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         blocks.append(Table(head, tuple(rows), caption))
     gravity = getattr(diagnosis, "gravity_source", "")
     facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
-    for name in ("accelerometer", "gyroscope"):
+    for name, si in (("accelerometer", "m/s^2"), ("gyroscope", "rad/s")):
         density = diagnosis.noise.get(f"{name}_density")
         if density is not None:
-            unit = str(diagnosis.noise.get(f"{name}_unit", ""))
             words = ", ".join(plain_number(float(d)) for d in density)
-            words += f" {unit_in_print(unit)}"
+            words += f" {unit_in_print(str(diagnosis.noise.get(f'{name}_unit', '')))}"
             corner = diagnosis.noise[f"{name}_corner_s"]
             if corner is not None:
                 words += f"; bias random walk beyond {plain_number(float(corner))} s"
             facts.append((f"{name} noise", words))
         hidden = diagnosis.noise.get(f"{name}_bias")
         if hidden:
-            unit = "m/s^2" if name == "accelerometer" else "rad/s"
             bound = ", at its upper bound" if hidden["is_at_edge"] else ""
-            words = f"changes {size_in_words(hidden['rms'], unit)} RMS between poses (random walk{bound})"
-            words += f"; uncertainty of a pose's mean {size_in_words(hidden['noise'], unit)}"
+            words = f"changes {size_in_words(hidden['rms'], si)} RMS between poses (random walk{bound})"
+            words += f"; uncertainty of a pose's mean {size_in_words(hidden['noise'], si)}"
             if "flicker" in hidden:
-                words += f", {size_in_words(hidden['flicker'], unit)} of it flicker noise seen inside poses"
+                words += f", {size_in_words(hidden['flicker'], si)} of it flicker noise seen inside poses"
             facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
@@ -89,19 +84,21 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if not candidate.applicable:
             missing.setdefault(candidate.reason, []).append(candidate.id)
     rows = tuple((listed(names), f"not applicable: {reason}") for reason, names in missing.items())
-    return (candidates_table(diagnosis), Facts(rows)) if rows else (candidates_table(diagnosis),)
+    return (candidates_table(diagnosis), *((Facts(rows),) if rows else ()))
 
 
 def candidates_table(diagnosis: Diagnosis) -> Table:
     """Every effect that was tried: its score, the limit on its size, and the outcome."""
     accepted = {effect.id for effect in diagnosis.effects}
-    tried = sorted((c for c in diagnosis.candidates if c.applicable), key=_order)
+    tried = [c for c in diagnosis.candidates if c.applicable]
+    redundant = {c.id: f"redundant with {c.superseded_by}" for c in tried if c.superseded_by is not None}
+    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
     rows = [
         (
             c.id,
             "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
             "–" if c.limit95 is None or c.id in accepted else parameter_in_words(c.limit95, c.size[0].unit),
-            "accepted" if c.id in accepted else _outcome(c),
+            "accepted" if c.id in accepted else redundant.get(c.id) or c.reason or "not needed",
         )
         for c in tried
     ]
@@ -109,28 +106,10 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
     return Table(("effect", "score", "at most (95 %)", "outcome"), tuple(rows), caption)
 
 
-def _order(candidate: Candidate) -> float:
-    return 2.0 if candidate.p_value is None else candidate.p_value
-
-
-def _outcome(candidate: Candidate) -> str:
-    """Why an effect that was tried was not accepted: redundant, a stated reason, or not needed."""
-    if candidate.superseded_by is not None:
-        return f"redundant with {candidate.superseded_by}"
-    return candidate.reason or "not needed"
-
-
-MOST_COEFFICIENTS = 6
-
-
-def relations_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """One block per empirical relation."""
-    return tuple(Facts(_rows(one)) for one in diagnosis.relations)
-
-
-def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
+def relation_facts(relation: Relation) -> Facts:
+    """An empirical relation with its coefficients, and what would confirm it."""
     shown = relation.coefficients[:MOST_COEFFICIENTS]
-    words = [f"{c.name} {_value(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
+    words = [f"{c.name} {value_in_words(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
     more = len(relation.coefficients) - len(shown)
     rows = [
         ("empirical relation", relation.statement),
@@ -140,8 +119,4 @@ def _rows(relation: Relation) -> tuple[tuple[str, str], ...]:
         rows.append(("", f"Similar to {listed(list(relation.resembles))}; similarity is no proof."))
     if relation.experiment:
         rows.append(("", f"To confirm it: {relation.experiment}."))
-    return tuple(rows)
-
-
-def _value(value: float, sigma: float) -> str:
-    return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 3)
+    return Facts(tuple(rows))

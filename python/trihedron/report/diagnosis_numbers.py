@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
 from trihedron.report.axes import BIAS
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
-from trihedron.report.numbers import MINUS, decimals_of, how_many, plain_number, unit_in_print, with_sigma, with_unit
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.report.numbers import (
+    MINUS,
+    capital,
+    decimals_of,
+    how_many,
+    plain_number,
+    shown,
+    unit_in_print,
+    with_sigma,
+    with_unit,
+)
 
 NAMED_SIGMAS = 3.0
 """Components of a differing group are listed from this many σ; the largest always is."""
@@ -39,37 +49,35 @@ _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
-_STAGES = {
-    "as-given": "as given",
-    "parameters": "parameters",
-    "noise": "noise",
-    "effects": "effects",
-}
 
 
 def differing_numbers(diagnosis: Diagnosis) -> list[str]:
     """``gyro Z bias +0.31 ± 0.01 °/s`` for every parameter that differs."""
     said = []
-    groups: dict[str, list[ParameterDifference]] = {}
-    for p in diagnosis.parameters:
-        if p.significant:
-            groups.setdefault(p.id, []).append(p)
-    for members in groups.values():
+    for members in _groups_that_differ(diagnosis).values():
         size = [_in_sigmas(p) for p in members]
         said += [
             f"{named(p)} {_difference(p)}"
             for p, s in zip(members, size, strict=True)
             if s > NAMED_SIGMAS or s == max(size)
         ]
-        said += list(dict.fromkeys(p.remark for p in members if p.remark))
+        said += _remarks(members)
     return said
+
+
+def _groups_that_differ(diagnosis: Diagnosis) -> dict[str, list[ParameterDifference]]:
+    groups: dict[str, list[ParameterDifference]] = {}
+    for p in diagnosis.parameters:
+        if p.significant:
+            groups.setdefault(p.id, []).append(p)
+    return groups
 
 
 def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """The parameters that differ as a table; likely mistakes, and noise that differs, as sentences."""
-    shown = [p for p in diagnosis.parameters if p.significant]
-    rows = tuple(map(_row, shown))
-    sentences = [*_remarks_in_order(shown), *differing_noise(diagnosis)]
+    differing = [p for p in diagnosis.parameters if p.significant]
+    rows = tuple(map(_row, differing))
+    sentences = [*_remarks(differing), *differing_noise(diagnosis)]
     if not rows and not sentences:
         return (Paragraph("None of the given parameters differs."),)
     blocks: list[Block] = []
@@ -80,7 +88,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _remarks_in_order(parameters: list[ParameterDifference]) -> list[str]:
+def _remarks(parameters: Iterable[ParameterDifference]) -> list[str]:
     return list(dict.fromkeys(p.remark for p in parameters if p.remark))
 
 
@@ -89,11 +97,14 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 
     The most significant first; the rest is counted.
     """
-    clauses = {said: _as_clause(together) for said, together in _noise_in_words(diagnosis).items()}
-    noise = list(clauses.values())
+    # A sentence about noise as a clause is cut at its first semicolon.
+    clauses = {
+        said: (together[0].lower() + together[1:]).split("; ")[0].rstrip(".")
+        for said, together in _noise_in_words(diagnosis).items()
+    }
     whole = [clauses[_sentence(n)] for n in _noise_that_differs(diagnosis) if n.term in _SENTENCES_FIRST]
-    noise = list(dict.fromkeys([*whole, *noise]))
-    numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis)]
+    noise = list(dict.fromkeys([*whole, *clauses.values()]))
+    numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis.parameters)]
     if len(numbers) > MOST_NUMBERS:
         numbers = _groups_in_short(diagnosis)
     # Together with parameters, only noise terms that affect every reading of a sensor are listed.
@@ -104,33 +115,22 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     return [*numbers[:MOST_NUMBERS], *named, *more]
 
 
-def _as_clause(sentence: str) -> str:
-    """A sentence about noise as a clause, cut at its first semicolon."""
-    return (sentence[0].lower() + sentence[1:]).split("; ")[0].rstrip(".")
-
-
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
     """Groups that differ, the most significant first, each with its largest significant member."""
-    groups: dict[str, list[ParameterDifference]] = {}
-    for p in diagnosis.parameters:
-        if p.significant:
-            groups.setdefault(p.id, []).append(p)
     said = []
-    for name, members in sorted(groups.items(), key=lambda group: group[1][0].p_value):
+    for name, members in sorted(_groups_that_differ(diagnosis).items(), key=lambda group: group[1][0].p_value):
         clear = max(map(_in_sigmas, members))
         largest = max(
             (p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, clear)), key=lambda p: abs(p.difference)
         )
-        said.append(f"{GROUPS.get(name, name)} by up to {_size(largest)}")
+        scale, unit = in_print(largest)
+        size = with_unit(plain_number(abs(scale * largest.difference), 2), unit)
+        said.append(f"{GROUPS.get(name, name)} by up to {size}")
     return said
 
 
 def _in_sigmas(p: ParameterDifference) -> float:
     return abs(p.difference) / max(p.std, 1e-300)
-
-
-def _remarks(diagnosis: Diagnosis) -> set[str]:
-    return {p.remark for p in diagnosis.parameters if p.remark}
 
 
 def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:
@@ -139,7 +139,7 @@ def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:
 
 def _sentence(n: NoiseDifference) -> str:
     said = n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's"
-    return said[0].upper() + said[1:].rstrip(".") + "."
+    return capital(said).rstrip(".") + "."
 
 
 def differing_noise(diagnosis: Diagnosis) -> list[str]:
@@ -158,10 +158,10 @@ def _noise_in_words(diagnosis: Diagnosis) -> dict[str, str]:
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """The parameters of the model that agree with the recording's; the others have a table of their own."""
-    shown = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
-    if not shown:
+    agreeing = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
+    if not agreeing:
         return ()
-    return (Table(_HEAD, tuple(map(_row, shown)), f"Parameters of the groups that agree; a bias is {BIAS}"),)
+    return (Table(_HEAD, tuple(map(_row, agreeing)), f"Parameters of the groups that agree; a bias is {BIAS}"),)
 
 
 def _row(p: ParameterDifference) -> tuple[str, ...]:
@@ -173,9 +173,8 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
             f"{_sensor(n)} {n.axis.upper()}".strip(),
-            _term(n),
-            _plain(n.model),
-            _plain(n.recording),
+            f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term,
+            *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
             _ratio(n),
             unit_in_print(n.unit),
             "differs" if n.significant else "agrees",
@@ -190,46 +189,29 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _term(n: NoiseDifference) -> str:
-    """The term, or the band of an octave."""
-    return f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term
-
-
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
     """Prediction errors of the recording by stage; ``size`` names the domains.
 
     A stage equal to the one before it has no column, a domain that no stage changes no row.
     """
     stages = [one for k, one in enumerate(diagnosis.stages) if not k or one.domains != diagnosis.stages[k - 1].domains]
-    domains = list(dict.fromkeys(d.domain for stage in stages for d in stage.domains))
-    cells = {d: [_stage(stage, d) for stage in stages] for d in domains}
-    changed = [d for d in domains if len(stages) == 1 or len(set(cells[d])) > 1]
-    rows = tuple((f"{size.get(d, d)} [{_unit_of(stages, d)}]", *cells[d]) for d in changed)
+    units = {d.domain: shown(d.unit)[1] for stage in stages for d in stage.domains}
+    cells = {domain: [_stage(stage, domain) for stage in stages] for domain in units}
+    changed = [d for d in units if len(stages) == 1 or len(set(cells[d])) > 1]
+    rows = tuple((f"{size.get(d, d)} [{units[d]}]", *cells[d]) for d in changed)
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
-    same = [_STAGES[stage.stage] for stage in diagnosis.stages if stage.stage not in kept]
+    same = [stage.stage for stage in diagnosis.stages if stage.stage not in kept]
     caption = "Cross-validated rms after each stage"
     caption += f"; no change by {' and '.join(same)}" if same else ""
-    unchanged = [size.get(d, d) for d in domains if d not in changed]
+    unchanged = [size.get(d, d) for d in units if d not in changed]
     caption += f"; {' and '.join(unchanged)}: no change in any stage" if unchanged else ""
-    return (Table(("rms", *(_STAGES[stage.stage] for stage in stages)), rows, caption),)
-
-
-def _unit_of(stages: list[Stage], domain: str) -> str:
-    return next(_printed(d.rms, d.unit)[1] for stage in stages for d in stage.domains if d.domain == domain)
+    return (Table(("rms", *(stage.stage.replace("-", " ") for stage in stages)), rows, caption),)
 
 
 def _stage(stage: Stage, domain: str) -> str:
-    return next((plain_number(_printed(d.rms, d.unit)[0]) for d in stage.domains if d.domain == domain), "–")
-
-
-def _printed(value: float, unit: str) -> tuple[float, str]:
-    if unit == "m/s^2":
-        return mm_s2_from_m_s2(value), "mm/s²"
-    if unit == "rad/s":
-        return degrees_from_radians(value), "°/s"
-    return value, "°" if unit == "deg" else unit_in_print(unit)
+    return next((plain_number(shown(d.unit)[0] * d.rms) for d in stage.domains if d.domain == domain), "–")
 
 
 def named(p: ParameterDifference) -> str:
@@ -243,51 +225,32 @@ def in_print(p: ParameterDifference) -> tuple[float, str]:
 
 
 def _difference(p: ParameterDifference) -> str:
-    scale, unit = _unit(p, is_difference=True)
+    scale, unit = in_print(p)
     text = with_sigma(scale * p.difference, scale * p.std)
     return with_unit(("" if text.startswith(MINUS) else "+") + text, unit)
-
-
-def _size(p: ParameterDifference) -> str:
-    scale, unit = _unit(p, is_difference=True)
-    return with_unit(plain_number(abs(scale * p.difference), 2), unit)
 
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
     # The standard error of a scale is relative.
     sigma = p.std * abs(value) if p.id in ("accel-scale", "gyro-scale") else scale * p.std
-    return with_unit(_as_known(scale * value, sigma), unit)
-
-
-def _as_known(value: float, sigma: float) -> str:
-    """Decimals by the uncertainty of the difference; six digits where it is exact."""
     if not 0.0 < sigma < float("inf"):
-        return plain_number(value, 6)
+        # Exact.
+        return with_unit(plain_number(scale * value, 6), unit)
     places = decimals_of(sigma)
     # Adding 0.0 turns -0.0 into 0.0.
-    return f"{round(value, places) + 0.0:.{places}f}".replace("-", MINUS)
+    return with_unit(f"{round(scale * value, places) + 0.0:.{places}f}".replace("-", MINUS), unit)
 
 
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
     """Factor from SI and customary unit for a parameter of this kind."""
     if p.id not in _WORDS:
         return 1.0, "" if p.unit == "1" else unit_in_print(p.unit)
-    if p.unit == "1":
-        return (100.0, "%") if is_difference else (1.0, "")
-    if p.unit == "rad/s":
-        return degrees_from_radians(1.0), "°/s"
-    if p.unit == "m/s^2":
-        return mm_s2_from_m_s2(1.0), "mm/s²"
-    return degrees_from_radians(1.0), "°"
+    return (1.0, "") if p.unit == "1" and not is_difference else shown(p.unit)
 
 
 def _sensor(n: NoiseDifference) -> str:
     return {"gyroscope": "gyro", "both": "sampling"}.get(n.sensor, n.sensor)
-
-
-def _plain(value: float | None) -> str:
-    return "–" if value is None else plain_number(value)
 
 
 def _ratio(n: NoiseDifference) -> str:

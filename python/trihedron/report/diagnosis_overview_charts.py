@@ -36,6 +36,11 @@ SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
 CORRECTED = "corrected"
 RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
 """Terms whose ratio is drawn; octaves are drawn as spectra."""
+Models = tuple[Calibration | None, Calibration | None]
+"""The recording's own parameters and those of the simulation."""
+Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
+"""Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
+the recording's noise."""
 
 
 def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
@@ -46,10 +51,10 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
     caption += "noise alone; inside the shade the domain agrees (a healthy recording leaves one of them in "
     caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
     caption += "pose, line or time."
-    return Picture("strengths", caption, partial(strengths_chart, diagnosis))
+    return Picture("strengths", caption, partial(_strengths_chart, diagnosis))
 
 
-def strengths_chart(diagnosis: Diagnosis) -> Chart:
+def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     """A row per domain: its limit, and dots without and with the effects."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
     after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
@@ -78,27 +83,24 @@ def strengths_chart(diagnosis: Diagnosis) -> Chart:
     return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=ROW_PX * (len(tests) + 1)),))
 
 
-def forest_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+def forest_picture(diagnosis: Diagnosis) -> Picture:
     """Parameters of the recording relative to those of the model, as a forest plot."""
-    out: list[Block] = []
-    if diagnosis.parameters:
-        caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
-        caption += "the group differs."
-        out.append(Picture("forest", caption, partial(forest_chart, diagnosis.parameters)))
-    return tuple(out)
+    caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
+    caption += "the group differs."
+    return Picture("forest", caption, partial(_forest_chart, diagnosis.parameters))
 
 
-def ratio_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+def ratios_picture(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Ratios of noise and sampling, model over recording."""
     rows = [n for n in diagnosis.noise_compared if n.ratio and n.ratio > 0.0 and n.term in RATIOS]
     if not rows:
         return ()
     caption = "Noise and sampling of the model over the recording's, with the interval where there is one; orange: "
     caption += "differs; 1: the same."
-    return (Picture("ratios", caption, partial(ratios_chart, rows)),)
+    return (Picture("ratios", caption, partial(_ratios_chart, rows)),)
 
 
-def forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
+def _forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
     """A panel for every group of parameters."""
     groups: dict[str, list[ParameterDifference]] = {}
     for p in parameters:
@@ -122,18 +124,18 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     dots = Points(value, place, told, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
     x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=(0.0,))
     names = tuple(axis_in_print(p.name) for p in members)
-    height = ROW_PX * len(members) + ROW_PX
-    return Panel(x, Scale("", names=names), (Level(x=0.0, name="model"), dots), title=title, height_px=height)
+    marks = (Level(x=0.0, name="model"), dots)
+    return Panel(x, Scale("", names=names), marks, title=title, height_px=ROW_PX * (len(members) + 1))
 
 
-def ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
+def _ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
     """A row per term and axis, on one logarithmic scale."""
+    names = tuple(map(_row_name, rows))
     place = -np.arange(1.0, len(rows) + 1.0)
     ratio = np.array([n.ratio for n in rows], dtype=np.float64)
     ends = np.array([n.interval or (math.nan, math.nan) for n in rows])
     x = np.column_stack([ends, np.full(len(rows), math.nan)]).ravel()
     marks: list[Mark] = [Level(x=1.0, name="the same"), Line(x, np.repeat(place, 3), "", "soft")]
-    names = tuple(_row_name(n) for n in rows)
     for is_other, name, colour in ((False, "agrees", "c1"), (True, "differs", "accent")):
         picked = np.array([bool(n.significant) == is_other for n in rows])
         if np.any(picked):
@@ -151,15 +153,12 @@ def _row_name(n: NoiseDifference) -> str:
 
 
 def _ratio_words(n: NoiseDifference, name: str) -> str:
-    both = [f"{plain_number(v)}" for v in (n.model, n.recording) if v is not None]
-    unit = unit_in_print(n.unit)
-    beside = f" (model {both[0]}, recording {both[1]} {unit})" if len(both) > 1 else ""
     assert n.ratio is not None
+    beside = ""
+    if n.model is not None and n.recording is not None:
+        model, own = plain_number(n.model), plain_number(n.recording)
+        beside = f" (model {model}, recording {own} {unit_in_print(n.unit)})"
     return f"{_row_name(n)}: {plain_number(n.ratio)}{beside}, {name}"
-
-
-Models = tuple[Calibration | None, Calibration | None]
-"""The recording's own parameters and those of the simulation."""
 
 
 def traces_picture(
@@ -205,11 +204,6 @@ def traces_chart(
         y = Scale(f"{'reading' if is_as_read else CORRECTED} [{unit}]", unit)
         panels.append(Panel(x, y, lines, title=title, height_px=190))
     return Chart(tuple(panels), columns=len(panels), is_linked=True)
-
-
-Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
-"""Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
-the recording's noise."""
 
 
 def _both_sides(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> list[Side]:

@@ -11,12 +11,13 @@ from trihedron.report.numbers import (
     engineering_exponent,
     listed,
     plain_number,
+    shown,
     unit_in_print,
     unit_with_power,
     with_sigma,
     with_unit,
 )
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
+from trihedron.units import degrees_from_radians
 
 LEVELS: dict[str, Level] = {
     "consistent": "good",
@@ -43,18 +44,12 @@ LEAST_SHARE = 0.005
 MOST_NAMED = 4
 
 
-def _followed(diagnosis: Diagnosis) -> str:
-    """Variables that the residuals follow, those of the largest relation first."""
-    names = list(dict.fromkeys(name for one in diagnosis.relations for name in one.depends_on))
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return listed(names[:MOST_NAMED]) + more
-
-
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and its reasons in one sentence."""
     off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
     left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
+    missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if _dependent(diagnosis) else ""
         return (
@@ -62,16 +57,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
-        named = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
-        off = (left or off) if named else off
-        verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
-        beside = f" ({listed(named)} {verbs} little)" if named else ""
-        return (
-            f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect explains it{beside}"
-            + (f": the misfit follows {_followed(diagnosis)}" if diagnosis.relations else "")
-            + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
-        )
+        return _unexplained(diagnosis, (left or off) if missing else off, missing)
     if diagnosis.verdict == "not-testable":
         tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
@@ -81,13 +67,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
-    missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
     surplus = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "model"))
-    tail = (
-        f"; {listed(left)} still {'disagree' if len(left) > 1 else 'disagrees'}."
-        if left
-        else "; nothing else disagrees."
-    )
+    tail = f"; {listed(left)} still {_disagree(left)}." if left else "; nothing else disagrees."
     said = []
     if missing:
         said.append(f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing from the model")
@@ -96,6 +77,26 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if numbers:
         said.append(f"parameters differ ({listed(numbers)})")
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
+
+
+def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
+    """The verdict on residuals ``off`` that the effects ``named`` do not explain."""
+    text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
+    text += "effect explains it"
+    if named:
+        verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
+        text += f" ({listed(named)} {verbs} little)"
+    if diagnosis.relations:
+        # Those of the largest relation first.
+        names = list(dict.fromkeys(name for one in diagnosis.relations for name in one.depends_on))
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        text += f": the misfit follows {listed(names[:MOST_NAMED])}{more}"
+    numbers = differing_in_short(diagnosis)
+    return text + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
+
+
+def _disagree(subjects: list[str]) -> str:
+    return "disagree" if len(subjects) > 1 else "disagrees"
 
 
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
@@ -159,9 +160,8 @@ def _footnotes(diagnosis: Diagnosis) -> str:
 
 def quantity(held: HeldOut) -> str:
     """The quantity of a cross-validated figure; effects on the acceleration during rotations are judged by that."""
-    return (
-        "acceleration during rotations" if (held.domain, held.unit) == ("dynamics", "m/s^2") else MEANING[held.domain]
-    )
+    is_acceleration = (held.domain, held.unit) == ("dynamics", "m/s^2")
+    return "acceleration during rotations" if is_acceleration else MEANING[held.domain]
 
 
 def rms_in_words(test: DomainTest) -> str:
@@ -170,23 +170,14 @@ def rms_in_words(test: DomainTest) -> str:
 
 def size_in_words(value: float, unit: str) -> str:
     """A residual in the customary unit of its kind."""
-    if unit == "m/s^2":
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
-    if unit == "rad/s":
-        return f"{plain_number(degrees_from_radians(value))} °/s"
-    if unit == "s":
-        return f"{plain_number(ms_from_s(value))} ms"
-    return with_unit(plain_number(value), "" if unit == "raw" else printed_unit(unit))
-
-
-def printed_unit(unit: str) -> str:
-    return {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
+    factor, printed = (1.0, "") if unit in ("1", "raw") else shown(unit)
+    return with_unit(plain_number(factor * value), printed)
 
 
 def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
     """Factor and unit for parameters of an effect whose largest is ``largest``: rates in °/s, a power of ten where
     numbers are small or large."""
-    factor, printed = 1.0, printed_unit(unit)
+    factor, printed = 1.0, {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
     if unit.startswith(("rad/s", "(rad/s)")):
         factor, printed = degrees_from_radians(1.0), printed.replace("rad", "°", 1)
     exponent = engineering_exponent(factor * largest)
@@ -211,15 +202,11 @@ def where_in_words(test: DomainTest) -> str:
     parts = []
     if where.channels:
         parts.append("channel " + ", ".join(where.channels))
+    spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
     if where.segments:
-        segments = list(where.segments)
-        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
-        named = [
-            f"{name} ({span})" for name, span in zip(segments, spans + [""] * len(segments), strict=False) if span
-        ] or segments
-        parts.append("most in " + ", ".join(named[:MOST_NAMED]))
-    elif where.times_s:
-        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
+        named = [f"{name} ({span})" for name, span in zip(where.segments, spans, strict=False)]
+        parts.append("most in " + ", ".join((named or where.segments)[:MOST_NAMED]))
+    elif spans:
         parts.append("at " + ", ".join(spans[:MOST_NAMED]))
     if where.frequencies_hz:
         parts.append("at " + ", ".join(f"{plain_number(f, 4)} Hz" for f in where.frequencies_hz))

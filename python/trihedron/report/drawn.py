@@ -25,13 +25,9 @@ from trihedron.report.chart import (
     Sphere,
     limits_of,
 )
-from trihedron.report.disc import drawn_disc
-from trihedron.report.matrix import drawn_matrix
-from trihedron.report.notes import apart
-from trihedron.report.numbers import plain_number
-from trihedron.report.places import UNITS, Places
-from trihedron.report.sphere import drawn_sphere
-from trihedron.report.ticks import ticks
+from trihedron.report.directions import drawn_disc, drawn_matrix, drawn_sphere
+from trihedron.report.layout import UNITS, Places, apart, ticks
+from trihedron.report.numbers import plain_number, with_sigma
 
 COARSE = 10
 """Resolution of long curves, in units of a panel; finer steps are not visible."""
@@ -174,11 +170,9 @@ def _mark(mark: Mark, at: Places) -> str:
         return _band(mark, at)
     if isinstance(mark, Level):
         dash = " dash" if mark.is_dashed else ""
-        where = (
-            f"M0 {float(at.y(mark.y)):.0f}H{UNITS}"
-            if mark.y is not None
-            else f"M{float(at.x(mark.x or 0.0)):.0f} 0V{UNITS}"
-        )
+        where = f"M{float(at.x(mark.x or 0.0)):.0f} 0V{UNITS}"
+        if mark.y is not None:
+            where = f"M0 {float(at.y(mark.y)):.0f}H{UNITS}"
         return f'<path class="level {mark.colour}{dash}" d="{where}"/>'
     return ""
 
@@ -223,11 +217,8 @@ def _points(mark: Points, at: Places) -> str:
     sigma = np.zeros(len(xs)) if mark.sigma is None else np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
     out = []
     if mark.sigma is not None:
-        ends = (
-            (at.x(mark.x - sigma), at.x(mark.x + sigma))
-            if mark.is_across
-            else (at.y(mark.y - sigma), at.y(mark.y + sigma))
-        )
+        place, middle = (at.x, mark.x) if mark.is_across else (at.y, mark.y)
+        ends = (place(middle - sigma), place(middle + sigma))
         bars = "".join(
             f"M{a:.0f} {y:.0f}H{b:.0f}" if mark.is_across else f"M{x:.0f} {a:.0f}V{b:.0f}"
             for x, y, a, b in zip(xs, ys, *ends, strict=True)
@@ -258,13 +249,15 @@ def shared_ends(said: Sequence[str]) -> tuple[str, str]:
     """Common beginning and end of all tooltips, written once per path to keep the page small."""
     if len(said) < FEWEST_SAID:
         return "", ""
-    least, most = min(said), max(said)
-    n = next((k for k, (a, b) in enumerate(zip(least, most, strict=False)) if a != b), len(least))
-    turned = [one[::-1] for one in said]
-    least, most = min(turned), max(turned)
-    m = next((k for k, (a, b) in enumerate(zip(least, most, strict=False)) if a != b), len(least))
-    m = min(m, min(map(len, said)) - n)
+    n = _shared(said)
+    m = min(_shared([one[::-1] for one in said]), min(map(len, said)) - n)
     return said[0][:n], said[0][len(said[0]) - m :]
+
+
+def _shared(texts: Sequence[str]) -> int:
+    """Number of letters with which all texts begin."""
+    least, most = min(texts), max(texts)
+    return next((k for k, (a, b) in enumerate(zip(least, most, strict=False)) if a != b), len(least))
 
 
 def _bars(mark: Bars, at: Places) -> str:
@@ -304,18 +297,14 @@ def envelope(x: FloatArray, y: FloatArray, most: int = 1000) -> tuple[FloatArray
     block = -(-n // (most // 2))
     whole = n // block * block
     parts = y[:whole].reshape(-1, block)
-    empty = ~np.isfinite(parts).any(axis=1)
-    low_high = np.column_stack(
-        [np.where(np.isfinite(parts), parts, np.inf).min(1), np.where(np.isfinite(parts), parts, -np.inf).max(1)]
-    )
-    low_high[empty] = np.nan
+    good = np.isfinite(parts)
+    low_high = np.column_stack([np.where(good, parts, np.inf).min(1), np.where(good, parts, -np.inf).max(1)])
+    low_high[~good.any(axis=1)] = np.nan
     middle = x[:whole].reshape(-1, block)
     return np.column_stack([middle[:, 0], middle[:, block // 2]]).ravel(), low_high.ravel()
 
 
-def said(what: str, x: str, value: float, unit: str, sigma: float | None = None) -> str:
+def said(what: str, value: float, unit: str, sigma: float | None = None) -> str:
     """Tooltip of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
-    from trihedron.report.numbers import with_sigma
-
     number = plain_number(value) if sigma is None else with_sigma(value, sigma)
-    return f"{what}{' ' if x else ''}{x}: {number} {unit}".strip()
+    return f"{what}: {number} {unit}".strip()

@@ -12,15 +12,17 @@ from trihedron.records.diagnosis import AcceptedEffect, EffectCurve
 from trihedron.records.domains import DomainResiduals
 from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
-from trihedron.report.diagnosis_charts import PRINTED
 from trihedron.report.drawn import said
-from trihedron.report.effect_rest_charts import rest_panels
-from trihedron.report.numbers import plain_number
+from trihedron.report.numbers import SHOWN, plain_number, shown
 from trihedron.units import degrees_from_radians
 
 HALF_WINDOW_S = 0.3
 """Half the interval [s] about an instant over which readings are averaged."""
 TWO_SIGMA = 2.0
+MOST = 200
+"""Most dots per axis of a static log; neighbours in time are averaged."""
+POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
+"""Parameters of the polynomial of temperature, about the mean temperature of the log."""
 # Driving variable for the chart of effects that are not functions of a single variable.
 _FORCE = ("accel-saturation", "accel-hysteresis", "quantisation", "earth-rate")
 _RATE = (
@@ -38,13 +40,14 @@ def effect_chart(
 ) -> Chart | None:
     """Curves of an effect over the variable that drives it, with the data of poses; for one without such data also the
     residual that it explains over force, rate or time."""
-    panels = curve_panels(effect.curves) or rest_panels(effect)
-    if not rest_panels(effect) and not any(len(one.data) for one in effect.curves):
+    of_static_log = rest_panels(effect)
+    panels = _curve_panels(effect.curves) or of_static_log
+    if not of_static_log and not any(len(one.data) for one in effect.curves):
         panels += _explained(effect, residuals, recording, segments, calibration)
     return Chart(tuple(panels), columns=min(3, len(panels))) if panels else None
 
 
-def curve_panels(curves: Sequence[EffectCurve]) -> list[Panel]:
+def _curve_panels(curves: Sequence[EffectCurve]) -> list[Panel]:
     """A panel for every variable (and sensor): curves with ± 2 σ, and poses as dots."""
     keys = list(dict.fromkeys((one.sensor, one.driver, one.driver_axis, one.is_relative) for one in curves))
     panels = []
@@ -70,7 +73,7 @@ def _curve_marks(one: EffectCurve, factor: float, unit_x: str) -> list[Mark]:
     said_x = [f"{plain_number(float(factor * a))} {unit_x}" for a in one.data_x]
     axis = XYZ[one.axis]
     told = [
-        f"{said(f'pose {k + 1}, {axis}', '', float(v), unit)} at {at}"
+        f"{said(f'pose {k + 1}, {axis}', float(v), unit)} at {at}"
         for k, v, at in zip(one.poses, scale * one.data, said_x, strict=True)
     ]
     marks: list[Mark] = [
@@ -97,7 +100,7 @@ def _driver_in_words(one: EffectCurve) -> tuple[str, float, str]:
 
 
 def _added_in_print(one: EffectCurve) -> tuple[float, str]:
-    return (100.0, "%") if one.is_relative else PRINTED["m/s^2" if one.sensor == "accelerometer" else "rad/s"]
+    return (100.0, "%") if one.is_relative else shown("m/s^2" if one.sensor == "accelerometer" else "rad/s")
 
 
 def _explained(
@@ -120,19 +123,10 @@ def _explained(
 def _drivers(
     effect_id: str, seen: DomainResiduals, recording: Recording, segments: Segments, calibration: Calibration
 ) -> list[tuple[str, str, FloatArray]]:
-    if (
-        effect_id in _RATE
-        and seen.kind == "move"
-        and recording.gyroscope is not None
-        and calibration.gyroscope is not None
-    ):
-        return [
-            (
-                "fastest rate of the move [°/s]",
-                "°/s",
-                fastest_rate(seen.time_before_s, recording, segments, calibration),
-            )
-        ]
+    has_gyroscope = recording.gyroscope is not None and calibration.gyroscope is not None
+    if effect_id in _RATE and seen.kind == "move" and has_gyroscope:
+        fastest = fastest_rate(seen.time_before_s, recording, segments, calibration)
+        return [("fastest rate of the move [°/s]", "°/s", fastest)]
     if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
         return [(f"f_{AXES[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
@@ -170,15 +164,14 @@ def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, c
 
 def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> Panel:
     """Residuals without the effects as dots; the part that the effects explain as circles, for equal rows."""
-    factor, unit = PRINTED[seen.unit]
-    kind = "pose" if seen.kind == "pose" else "move"
+    factor, unit = shown(seen.unit)
     marks: list[Mark] = [Level(y=0.0)]
     is_same = seen.before.shape == seen.after.shape and np.allclose(seen.time_before_s, seen.time_after_s, atol=1e-6)
     for k, channel in enumerate(map(channel_in_print, seen.channels)):
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
         told = [
-            f"{said(f'{kind} {n}, {channel}', '', float(v), unit)}, "
+            f"{said(f'{seen.kind} {n}, {channel}', float(v), unit)}, "
             f"{label.split(' [')[0]} {plain_number(float(a))} {unit_x}"
             for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
         ]
@@ -186,13 +179,73 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
         # Tilt errors are angles between vectors: their difference is not the explained part.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
-            told = [said(f"{kind} {n}, with the effects", "", float(v), unit) for n, v in enumerate(after, 1)]
+            told = [said(f"{seen.kind} {n}, with the effects", float(v), unit) for n, v in enumerate(after, 1)]
             marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
                 order = np.argsort(x)
                 marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
                 continue
-            told = [said(f"{kind} {n}, model", "", float(v), unit) for n, v in enumerate(data - after, 1)]
+            told = [said(f"{seen.kind} {n}, model", float(v), unit) for n, v in enumerate(data - after, 1)]
             marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
+
+
+def rest_panels(effect: AcceptedEffect) -> list[Panel]:
+    """Of a static log: bias about its mean and its polynomial of temperature, axis by axis, or its drift over time."""
+    variant, series = effect.model.get("variant"), effect.model.get("curve", {})
+    if variant == "rest-curve" and "temperature_degc" in series:
+        return _over_temperature(effect)
+    return [_over_time(effect)] if variant == "rest-drift" else []
+
+
+def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
+    series = effect.model["curve"]
+    heat = np.asarray(series["temperature_degc"], dtype=np.float64)
+    values = np.asarray(series["value"], dtype=np.float64)
+    pose = np.asarray(series["pose"])
+    factor, unit = SHOWN.get(series["unit"], (1.0, "counts"))
+    about = float(heat.mean())
+    along = np.linspace(heat.min(), heat.max(), 80)
+    sizes = {one.name: one.value for one in effect.parameters}
+    at = _averaged(heat)
+    panels = []
+    for k, axis in enumerate(XYZ):
+        slopes = [sizes.get(f"{name}_{axis.lower()}", 0.0) for name in POWERS]
+        # Biases are relative to the mean of their orientation: add the mean of the curve there.
+        of_heat = _polynomial(heat - about, slopes)
+        mean = np.array([of_heat[pose == p].mean() for p in range(pose.max() + 1)])[pose]
+        dots = factor * _averaged(values[k] + mean - of_heat.mean())
+        curve = factor * (_polynomial(along - about, slopes) - of_heat.mean())
+        told = [f"{said(axis, float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)]
+        marks: tuple[Mark, ...] = (
+            Level(y=0.0),
+            Points(at, dots, told, None, f"{axis}: log", AXIS_COLOURS[k]),
+            Line(along, curve, "curve, at constant temperature", "ink"),
+        )
+        y = Scale(f"bias, about its mean [{unit}]", unit)
+        panels.append(Panel(Scale("temperature [°C]", "°C"), y, marks, title=axis, height_px=220))
+    return panels
+
+
+def _over_time(effect: AcceptedEffect) -> Panel:
+    series = effect.model["curve"]
+    factor, unit = SHOWN.get(series["unit"], (1.0, "counts"))
+    time_s = np.asarray(series["time_s"], dtype=np.float64)
+    marks: list[Mark] = [Level(y=0.0)]
+    for k, axis in enumerate(XYZ):
+        value, half = (factor * np.asarray(series[name][k], dtype=np.float64) for name in ("value", "sigma"))
+        marks.append(Band(time_s, value - TWO_SIGMA * half, value + TWO_SIGMA * half, "2 σ of the curve"))
+        marks.append(Line(time_s, value, axis, AXIS_COLOURS[k]))
+    return Panel(Scale("time [s]", "s"), Scale(f"bias, about its mean [{unit}]", unit), tuple(marks), height_px=220)
+
+
+def _polynomial(apart: FloatArray, slopes: list[float]) -> FloatArray:
+    return np.asarray(apart[:, None] ** np.arange(1, len(slopes) + 1) @ np.array(slopes))
+
+
+def _averaged(values: FloatArray) -> FloatArray:
+    """(..., m) means of neighbours of (..., n), m no more than ``MOST``."""
+    starts = np.unique(np.linspace(0, values.shape[-1], MOST, endpoint=False).astype(int))
+    counts = np.diff([*starts, values.shape[-1]])
+    return np.asarray(np.add.reduceat(values, starts, axis=-1) / counts)

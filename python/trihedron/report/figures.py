@@ -34,7 +34,7 @@ from trihedron.report.chart import (
     Span,
     Sphere,
 )
-from trihedron.report.disc import equal_area
+from trihedron.report.directions import equal_area
 
 # The axes: distinct for colour-blind readers and in grey (Okabe and Ito).
 COLOURS: dict[Colour, str] = {
@@ -111,10 +111,8 @@ def draw_chart(chart: Callable[[], Chart]) -> Figure:
         axis.tick_params(labelsize=8.5, color=COLOURS["ink"])
         _draw_any(axis, panel)
         if laid_out.legend and columns == 1 and (named := _named([axis])):
-            beside = (1.0, 1.0)
-            axis.legend(
-                named.values(), named.keys(), loc="upper left", bbox_to_anchor=beside, frameon=False, fontsize=7
-            )
+            marks, names = named.values(), named.keys()
+            axis.legend(marks, names, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=7)
     for k, (axis, panel) in enumerate(zip(axes, panels, strict=False)):
         if isinstance(panel, Panel) and (len(along) > 1 or k + columns >= len(panels)):
             # The lowest panel of its column shows the labels that a shared axis hides.
@@ -210,7 +208,8 @@ def _decades(axis: Axis, limits: tuple[float, float] | None) -> None:
 def _name_below(axis: Axes, scale: Scale) -> None:
     if scale.names and len(scale.names) <= MOST_NAMES:
         places = range(1, len(scale.names) + 1)
-        axis.set_xticks(places, [_short(n) for n in scale.names], rotation=20, ha="right", fontsize=7)
+        names = [n if len(n) <= MOST_LETTERS else f"…{n[1 - MOST_LETTERS :]}" for n in scale.names]
+        axis.set_xticks(places, names, rotation=20, ha="right", fontsize=7)
     else:
         axis.set_xlabel(scale.label, fontsize=8)
 
@@ -246,7 +245,3 @@ def _draw(axis: Axes, mark: Mark) -> None:
         axis.axvspan(mark.first, mark.last, color=colour, alpha=alpha, linewidth=0, zorder=0, label=mark.name or None)
     elif isinstance(mark, Note):
         axis.annotate(mark.text, (mark.x, mark.y), xytext=(3, 3), textcoords="offset points", fontsize=7, color=colour)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}"

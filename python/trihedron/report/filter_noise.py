@@ -5,18 +5,24 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from trihedron.arrays import XYZ
-from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share, StaticNoise
+import numpy as np
+
+from trihedron.arrays import XYZ, FloatArray
+from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
 from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
+from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
-from trihedron.report.filter_noise_charts import OF_SENSOR, horizon_chart
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
-from trihedron.report.numbers import how_many, listed, plain_number, unit_in_print
+from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print
 from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians
 
+OF_SENSOR = {
+    "gyroscope": (degrees_from_radians(1.0), "°", "attitude error"),
+    "accelerometer": (1.0, "m/s", "velocity error"),
+}
 NEXT = "Put these values into your filter: --to kalibr -o imu.yaml (other targets: --help)."
 CAUSE_WORDS = {
     "rest": ("static noise", "a better sensor; nothing else"),
@@ -35,22 +41,19 @@ def filter_noise_report(found: FilterNoise) -> Document:
     tables: list[Block] = [values_table(found)]
     tables += [Facts(facts)] if (facts := _facts(found)) else []
     sections = [Section("N and K", tuple(tables))]
-    shares: list[Block] = [block for one in found.sensors if one.shares for block in (_shares(one), _advice(one))]
+    shares: list[Block] = [block for one in found.sensors if one.shares for block in _shares(one)]
     if shares:
         sections.append(Section("What the error is made of", tuple(shares)))
     tested = [one for one in found.sensors if one.consistency]
     if tested:
-        sections.append(
-            Section("Cross-validation: the second half predicted from the first", tuple(_tested(one) for one in tested))
-        )
+        heading = "Cross-validation: the second half predicted from the first"
+        sections.append(Section(heading, tuple(map(_tested, tested))))
     sections.append(Section("Findings", (findings_block(found.findings),)))
-    chart = partial(horizon_chart, found)
-    picture = Picture(
-        "horizon",
-        "Error by the gyro (velocity: the accelerometer) alone after each horizon, the reference's own error with it: "
-        "predicted from N and K, and actual; cross-validated.",
-        chart,
-    )
+    caption = "Error by the gyro (velocity: the accelerometer) alone after each horizon, the reference's own error "
+    caption += "with it: predicted from N and K, and actual; cross-validated."
+    picture = Picture("horizon", caption, partial(horizon_chart, found))
+    # Where a calibration removes most of the error, it comes first.
+    uncalibrated = (f.action for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",
@@ -60,7 +63,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
-        next_step=_next_step(found) if is_trustworthy else "",
+        next_step=next(uncalibrated, NEXT) if is_trustworthy else "",
     )
 
 
@@ -75,29 +78,23 @@ def _good(found: FilterNoise) -> str:
     return f"OK: no problems found; {listed(largest)}." if largest else "OK: no problems found."
 
 
-def _next_step(found: FilterNoise) -> str:
-    """Advice to use N and K, unless most of the error is removed by a calibration."""
-    first = (f.action for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
-    return next(first, NEXT)
-
-
 def _headlines(one: SensorFilterNoise) -> list[Headline]:
     """N and K for the filter."""
-    static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
-    return [
-        Headline(
-            f"{one.sensor} {name}",
-            _number(value),
-            f"{unit_in_print(one.unit)}/{per}",
-            _beside(value, at_rest),
-        )
-        for name, value, at_rest, per in (("N", one.N, static[0], "√Hz"), ("K", one.K, static[1], "√s"))
-    ]
+    out = []
+    for name, per, value, static in _terms(one):
+        beside = "95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"
+        beside += "" if static is None else f"; static {_number(static)}"
+        out.append(Headline(f"{one.sensor} {name}", _number(value), f"{unit_in_print(one.unit)}{per}", beside))
+    return out
 
 
-def _beside(value: Bounded, static: Bounded | None) -> str:
-    said = ["95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"]
-    return "; ".join([*said, *([] if static is None else [f"static {_number(static)}"])])
+def _terms(one: SensorFilterNoise) -> tuple[tuple[str, str, Bounded, Bounded | None], ...]:
+    """Name and unit of N and K, their values for the filter and at rest."""
+    static = one.static
+    return (
+        ("N", "/√Hz", one.N, None if static is None else static.N),
+        ("K", "/√s", one.K, None if static is None else static.K),
+    )
 
 
 def values_table(found: FilterNoise) -> Table:
@@ -105,22 +102,16 @@ def values_table(found: FilterNoise) -> Table:
     rows = []
     for one in found.sensors:
         unit = unit_in_print(one.unit)
-        static: tuple[Bounded | None, ...] = (None, None) if one.static is None else (one.static.N, one.static.K)
-        for name, value, beside in (("N", one.N, static[0]), ("K", one.K, static[1])):
-            per = "/√Hz" if name == "N" else "/√s"
-            rows.append(
-                (
-                    f"{one.sensor} {name} [{unit}{per}]", _number(value), _interval(value),
-                    "–" if beside is None else _number(beside), _factor(value, beside),
-                )
-            )  # fmt: skip
+        for name, per, value, static in _terms(one):
+            beside = "–" if static is None else _number(static)
+            label = f"{one.sensor} {name} [{unit}{per}]"
+            rows.append((label, _number(value), _interval(value), beside, _factor(value, static)))
         rows += [
             (f"{one.sensor} N, {axis} [{unit}/√Hz]", _number(n), _interval(n), "–", "–")
             for axis, n in zip(XYZ, one.axes_N, strict=False)
         ]
-    return Table(
-        ("", "for the filter", "95 % interval", "static", "factor"), tuple(rows), "White density N, random walk K"
-    )
+    head = ("", "for the filter", "95 % interval", "static", "factor")
+    return Table(head, tuple(rows), "White density N, random walk K")
 
 
 def _number(one: Bounded) -> str:
@@ -151,16 +142,11 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
             said = f"drifts by {word}{plain_number(slow, 2)}° within {plain_number(one.reference.slow_s, 2)} s"
             facts.append((f"its error, seen by the {one.sensor}", said))
     if found.tilt is not None:
-        actual, predicted = (
-            plain_number(degrees_from_radians(v), 2) for v in (found.tilt.actual, found.tilt.predicted)
-        )
-        facts.append(
-            (
-                "tilt error after a rotation",
-                f"{actual}° rms over {how_many(found.tilt.n, 'move')}; static N predicts {predicted}° (residual "
-                "calibration error, vibration and bias are in the difference; the heading is not seen)",
-            )
-        )
+        tilt = found.tilt
+        actual, predicted = (plain_number(degrees_from_radians(v), 2) for v in (tilt.actual, tilt.predicted))
+        said = f"{actual}° rms over {how_many(tilt.n, 'move')}; static N predicts {predicted}° (residual calibration "
+        said += "error, vibration and bias are in the difference; the heading is not seen)"
+        facts.append(("tilt error after a rotation", said))
     if found.intervals is not None:
         facts += _of_intervals(found.intervals)
     return tuple(facts)
@@ -182,7 +168,7 @@ def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
     ]
 
 
-def _shares(one: SensorFilterNoise) -> Table:
+def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
     horizons = sorted({share.horizon_s for share in one.shares})
     by = {(share.cause, share.horizon_s): share.share for share in one.shares}
     rows = tuple(
@@ -191,21 +177,18 @@ def _shares(one: SensorFilterNoise) -> Table:
         if (cause, horizons[0]) in by
     )
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
-    return Table(head, rows, "Shares of the mean square error, 95 % intervals")
+    # Measures that lower the three largest shares.
+    advice = Facts(tuple(CAUSE_WORDS[share.cause] for share in _ranked(one)[:3]))
+    return Table(head, rows, "Shares of the mean square error, 95 % intervals"), advice
 
 
 def _percent(one: Bounded) -> str:
-    return f"below {plain_number(100 * one.upper, 2)}" if one.is_limit else (
-        f"{plain_number(100 * one.value, 2)} ({plain_number(100 * one.lower, 2)} … {plain_number(100 * one.upper, 2)})"
-    )  # fmt: skip
-
-
-def _advice(one: SensorFilterNoise) -> Facts:
-    """Measures that lower the three largest shares at ten seconds (or the nearest horizon)."""
-    return Facts(tuple((CAUSE_WORDS[s.cause][0], CAUSE_WORDS[s.cause][1]) for s in _ranked(one)[:3]))
+    value, lower, upper = (plain_number(100 * share, 2) for share in (one.value, one.lower, one.upper))
+    return f"below {upper}" if one.is_limit else f"{value} ({lower} … {upper})"
 
 
 def _ranked(one: SensorFilterNoise) -> list[Share]:
+    """Shares at ten seconds (or the nearest horizon), the largest first."""
     near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
     return sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
 
@@ -230,9 +213,7 @@ def _tested(one: SensorFilterNoise) -> Block:
         "NEES, static",
         f"static [{unit}]",
     )
-    return Table(
-        head, rows, f"{what[0].upper()}{what[1:]}; NEES 3 is right; static: static N and K, reference taken as exact"
-    )
+    return Table(head, rows, f"{capital(what)}; NEES 3 is right; static: static N and K, reference taken as exact")
 
 
 def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
@@ -252,16 +233,40 @@ def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
 
 def filter_noise_columns(found: FilterNoise) -> Columns:
     """A row per sensor and term: value for the filter, interval, whether it is a limit, static value, unit."""
-    rows = [
-        {
-            "sensor": one.sensor, "term": term, "value": value.filter_value, "lower": value.lower, "upper": value.upper,
-            "is_limit": value.is_limit, "static": _static(one.static, term), "unit": f"{one.unit}{per}",
-        }
-        for one in found.sensors
-        for term, value, per in (("N", one.N, "/√Hz"), ("K", one.K, "/√s"))
-    ]  # fmt: skip
-    return of_rows(rows, ("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"))
+    rows = []
+    for one in found.sensors:
+        for term, per, value, static in _terms(one):
+            at_rest = None if static is None else static.filter_value
+            unit = f"{one.unit}{per}"
+            rows.append((one.sensor, term, value.filter_value, value.lower, value.upper, value.is_limit, at_rest, unit))
+    return of_rows(("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"), rows)
 
 
-def _static(static: StaticNoise | None, term: str) -> float | None:
-    return None if static is None else (static.N if term == "N" else static.K).filter_value
+def horizon_chart(found: FilterNoise) -> Chart:
+    """One panel per sensor with a cross-validation on the other half."""
+    panels = tuple(_panel(one) for one in found.sensors if one.consistency)
+    return Chart(panels, columns=len(panels))
+
+
+def _panel(one: SensorFilterNoise) -> Panel:
+    factor, unit, what = OF_SENSOR[one.sensor]
+    h = np.array([c.horizon_s for c in one.consistency])
+
+    def both(predicted: str, actual: str) -> tuple[FloatArray, FloatArray, list[str]]:
+        pairs = np.array([(getattr(c, predicted), getattr(c, actual)) for c in one.consistency], dtype=np.float64)
+        expected, seen = factor * pairs.T
+        return (
+            expected,
+            seen,
+            [f"{plain_number(a)} {unit} over {plain_number(s)} s" for a, s in zip(seen, h, strict=True)],
+        )
+
+    predicted, actual, told = both("predicted", "actual")
+    marks: list[Mark] = [Line(h, predicted, "predicted, effective N and K", "c1")]
+    marks.append(Points(h, actual, told, None, "actual error", "c1"))
+    if one.consistency[0].static_predicted is not None:
+        predicted, actual, told = both("static_predicted", "static_actual")
+        marks.append(Line(h, predicted, "predicted, static N and K", "accent", is_dashed=True))
+        marks.append(Points(h, actual, told, None, "actual error of that filter", "accent", is_hollow=True))
+    x, y = Scale("horizon [s]", "s", is_log=True), Scale(f"{what} [{unit}]", unit, is_log=True)
+    return Panel(x, y, tuple(marks), title=one.sensor)

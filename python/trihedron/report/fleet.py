@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections import Counter
 from functools import partial
 
+import numpy as np
+
 from trihedron.records.fleet import FleetLog, FleetSummary
-from trihedron.records.sessions import Change, Repeated
+from trihedron.records.sessions import PARAMETERS, Parameter
 from trihedron.report.axes import axis_in_print
+from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.many_charts import fleet_chart, shown
-from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.drawn import said
+from trihedron.report.numbers import capital, how_many, plain_number, shown
+from trihedron.report.sessions import change_in_words, repeated_cells
 
 MOST_NAMED = 4
-MOST_LEADING = 4
-"""Most devices in a sentence, and most parameters in the first picture."""
+"""Most devices or logs in a sentence, and most parameters in the first picture."""
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -37,7 +39,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
-        sections.append(Section("Logs that were not calibrated", (_bad(bad),)))
+        reasons = tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in bad)
+        sections.append(Section("Logs that were not calibrated", (Facts(reasons),)))
     if mixed:
         sections.append(Section("Logs taken for one device that are not", tuple(_mixed(summary))))
     if summary.n_diagnosed:
@@ -50,7 +53,11 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
+    lead = None
     if n_done:
+        caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median "
+        caption += "of devices; bars: 1 σ."
+        lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
         caption = "Every parameter by device, a point for each log (bars: 1 σ); the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
@@ -77,7 +84,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict=verdict,
         is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
-        lead=_lead(summary) if n_done else None,
+        lead=lead,
         headlines=_headlines(summary),
         next_step="" if mixed else _next_step(summary, strays, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or n_open or strays or moved) else None,
@@ -101,8 +108,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     steps += [f"calibrate those that changed anew before use{doubt}"] if moved else []
     if usable:
         steps.append("use each device's own calibration (a file of calibrations/): trihedron apply FILE LOG")
-    said = "; ".join(steps)
-    return f"{said[0].upper()}{said[1:]}." if said else ""
+    return capital("; ".join(steps)) + "." if steps else ""
 
 
 def _is_usable(log: FleetLog) -> bool:
@@ -136,12 +142,6 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
     return tuple(out)
 
 
-def _lead(summary: FleetSummary) -> Picture:
-    caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median of "
-    caption += "devices; bars: 1 σ."
-    return Picture("differ", caption, partial(fleet_chart, summary, MOST_LEADING))
-
-
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     status = Counter(log.status for log in summary.logs)
     doubtful = [log for log in summary.logs if log.status == "done" and not log.is_trustworthy]
@@ -161,24 +161,13 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     seconds = [log.seconds for log in summary.logs if log.seconds is not None]
     if seconds:
         facts.append(
-            (
-                "work",
-                f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log",
-            )
+            ("work", f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log")
         )
     return tuple(facts)
 
 
-def _bad(logs: list[FleetLog]) -> Facts:
-    return Facts(tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in logs))
-
-
 def _mixed(summary: FleetSummary) -> list[Block]:
-    rows = []
-    for one in summary.mixed:
-        factor, unit = shown(one.parameter.unit)
-        by = f"{plain_number(one.difference * factor, 2)} {unit}"
-        rows.append((one.serial, str(one.n_logs), f"{one.parameter.id} {axis_in_print(one.parameter.name)}", by))
+    rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
     said = (
         "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
         "folder; until then these logs are compared with nothing."
@@ -187,6 +176,12 @@ def _mixed(summary: FleetSummary) -> list[Block]:
         Paragraph(said),
         Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows), "Logs too unlike"),
     ]
+
+
+def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
+    """A parameter, and a difference of it."""
+    factor, unit = shown(parameter.unit)
+    return f"{parameter.id} {axis_in_print(parameter.name)}", f"{plain_number(difference * factor, 2)} {unit}"
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -209,7 +204,10 @@ def _spread(summary: FleetSummary) -> list[Block]:
     is_grouped = any(one.between is not None for one in summary.repeated)
     head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
-    rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
+    rows = [
+        tuple(repeated_cells(one, (one.between, one.within) if is_grouped else (one.within,)))
+        for one in summary.repeated
+    ]
     said = "Standard deviations beyond each log's uncertainty. Scales are relative to their mean; misalignments are "
     said += "departures from 90°."
     if summary.passed_over:
@@ -217,35 +215,16 @@ def _spread(summary: FleetSummary) -> list[Block]:
     return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices and of one device")]
 
 
-def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
-    factor, unit = shown(one.parameter.unit)
-    value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
-    is_scale = one.parameter.id.endswith("scale")
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
-    cells.append(f"± {plain_number(one.std * factor, 2)}" if is_scale else with_sigma(value * factor, one.std * factor))
-    for spread in (one.between, one.within) if is_grouped else (one.within,):
-        if spread is None:
-            cells += ["–", "–"]
-            continue
-        sd = "not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2)
-        cells += [sd, f"{plain_number(spread.low * factor, 2)} to {plain_number(spread.high * factor, 2)}"]
-    return cells
-
-
 def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
         return [Paragraph("No device lies outside what the others make likely (1 % over all devices and parameters).")]
-    rows = []
-    for one in summary.outliers:
-        factor, unit = shown(one.parameter.unit)
-        away = f"{plain_number(one.deviation * factor, 2)} {unit}"
-        cells = (
-            one.serial,
-            f"{one.parameter.id} {axis_in_print(one.parameter.name)}",
-            away,
-            plain_number(one.sigmas, 2),
+    rows = [
+        (
+            one.serial, *_by(one.parameter, one.deviation),
+            plain_number(one.sigmas, 2), plain_number(one.p_adjusted, 1),
         )
-        rows.append((*cells, plain_number(one.p_adjusted, 1)))
+        for one in summary.outliers
+    ]  # fmt: skip
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
@@ -257,26 +236,14 @@ def _drift(summary: FleetSummary) -> list[Block]:
     )
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
-    rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
-    return [
-        Paragraph(f"Tested: {tested}"),
-        Table(("device", "parameter", "how", "by", "p"), rows, "Changes between sessions"),
-    ]
-
-
-def _drift_cells(change: Change) -> tuple[str, str, str]:
-    factor, unit = shown(change.unit)
-    k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
-    how = {
-        "differs": "second less first",
-        "apart": f"{change.where} apart",
-        "step": f"from {change.where} on",
-        "trend": "each session",
-        "scatter": "every session",
-    }[change.kind]
-    value = change.size[k] * factor
-    amount = plain_number(value, 2) if change.kind == "scatter" else with_sigma(value, change.std[k] * factor)
-    return how, f"{amount} {unit} in {change.names[k]}", plain_number(change.p_adjusted, 1)
+    rows = []
+    for change in moved:
+        how, sizes, unit = change_in_words(change)
+        k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
+        size = f"{sizes[k]} {unit} in {change.names[k]}"
+        rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
+    head = ("device", "parameter", "how", "by", "p")
+    return [Paragraph(f"Tested: {tested}"), Table(head, tuple(rows), "Changes between sessions")]
 
 
 def _logs(summary: FleetSummary) -> Table:
@@ -292,8 +259,41 @@ def _logs(summary: FleetSummary) -> Table:
         )
         for log in summary.logs
     )
-    return Table(
-        ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]"),
-        rows,
-        "What became of every log",
-    )
+    head = ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]")
+    return Table(head, rows, "What became of every log")
+
+
+def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
+    """One panel per parameter: devices along the axis, one point per log with its standard error, about the median.
+
+    ``most``: only that many parameters, those in which devices differ most relative to their standard errors.
+    """
+    logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
+    n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
+    serials = list(dict.fromkeys(log.serial for log in logs))
+    strays = {(one.serial, one.parameter) for one in summary.outliers}
+    serial_of = np.array([serials.index(log.serial) for log in logs])
+    order = np.array([int(np.sum(serial_of[:k] == serial_of[k])) for k in range(len(logs))])
+    count = np.bincount(serial_of, minlength=len(serials))[serial_of]
+    across = 1.0 + serial_of + 0.5 * ((order + 0.5) / count - 0.5)
+    numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
+    errors = np.array([log.std[:n] for log in logs if log.std is not None])
+    x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    panels = []
+    apart = numbers - np.median(numbers, axis=0)
+    strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
+    chosen = range(n) if most is None else sorted(np.argsort(-strength)[:most].tolist())
+    for k in chosen:
+        parameter = PARAMETERS[k]
+        factor, unit = shown(parameter.unit)
+        centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
+        values, error = (numbers[:, k] - centre) * factor, errors[:, k] * factor
+        is_stray = np.array([(log.serial, parameter) in strays for log in logs])
+        marks: list[Level | Points] = [Level(y=0.0)]
+        for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
+            if part.any():
+                told = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                marks.append(Points(across[part], values[part], told, error[part], name, colour))
+        y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
+        panels.append(Panel(x, y, tuple(marks), height_px=150))
+    return Chart(tuple(panels), columns=3 if most is None else 2)

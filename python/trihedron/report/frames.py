@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,9 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.sessions import SessionsModel, Spread
+from trihedron.report.axes import calibrated_sensors
+from trihedron.report.channels import logged_sensors
 from trihedron.report.noise_units import PER_UNIT
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
@@ -37,8 +41,6 @@ def made_by(library: str, columns: Columns) -> Any:
     """
     if library not in {"polars", "pandas"}:
         raise RefusedError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
-    from importlib import import_module
-
     try:
         frames = import_module(library)
     except ModuleNotFoundError:
@@ -50,38 +52,28 @@ def made_by(library: str, columns: Columns) -> Any:
     return frames.DataFrame(owned)
 
 
-def of_rows(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Columns:
+def of_rows(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Columns:
     """Columns of these names from rows, of which there may be none."""
-    return {name: [row[name] for row in rows] for name in names}
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
 def recording_columns(recording: Recording) -> Columns:
     """A row per sample, units in the names."""
     columns: Columns = {"time_s": recording.time_s}
-    for name, readings, unit in (
-        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
-        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
-    ):
-        if readings is not None:
-            columns |= {f"{name}_{axis} [{unit}]": readings[:, k] for k, axis in enumerate(AXES)}
-    if recording.temperature_degc is not None:
-        columns["temperature_degc"] = recording.temperature_degc
-    if recording.supply_v is not None:
-        columns["supply_v"] = recording.supply_v
+    for name, readings, unit in logged_sensors(recording):
+        columns |= {f"{name}_{axis} [{unit}]": readings[:, k] for k, axis in enumerate(AXES)}
+    for name in ("temperature_degc", "supply_v"):
+        if (values := getattr(recording, name)) is not None:
+            columns[name] = values
     return columns
 
 
 def segments_columns(segments: Segments) -> Columns:
     """A row per pose: samples, duration, mean readings with standard errors in the unit of the log."""
-    columns: Columns = {
-        "pose": [pose.index for pose in segments.poses],
-        "start": [pose.start for pose in segments.poses],
-        "stop": [pose.stop for pose in segments.poses],
-        "time_mid_s": segments.time_mid_s,
-        "duration_s": segments.duration_s,
-        "n_averaged": segments.n_averaged,
-        "is_unsteady": [pose.is_unsteady for pose in segments.poses],
-    }
+    names = {"pose": "index", "start": "start", "stop": "stop"}
+    columns: Columns = {key: [getattr(pose, name) for pose in segments.poses] for key, name in names.items()}
+    columns |= {name: getattr(segments, name) for name in ("time_mid_s", "duration_s", "n_averaged")}
+    columns["is_unsteady"] = [pose.is_unsteady for pose in segments.poses]
     for name in ("accelerometer_mean", "accelerometer_sigma_mean", "gyroscope_mean", "gyroscope_sigma_mean"):
         values = getattr(segments, name)
         if values is not None:
@@ -92,16 +84,13 @@ def segments_columns(segments: Segments) -> Columns:
 def calibration_columns(calibration: Calibration) -> Columns:
     """A row per parameter of each sensor: value, standard error, unit."""
     rows = []
-    for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
-        if sensor is None:
-            continue
+    for name, sensor in calibrated_sensors(calibration):
         values = (*sensor.S.ravel(), *sensor.b)
         sigmas = (*sensor.sigma_S.ravel(), *sensor.sigma_b)
         for parameter, value, sigma in zip(PARAMETER_NAMES, values, sigmas, strict=True):
             unit = sensor.si_unit if parameter.startswith("b") else f"{sensor.si_unit} per {sensor.raw_unit}"
-            row = {"sensor": name, "parameter": parameter, "value": float(value), "sigma": float(sigma), "unit": unit}
-            rows.append(row)
-    return of_rows(rows, ("sensor", "parameter", "value", "sigma", "unit"))
+            rows.append((name, parameter, float(value), float(sigma), unit))
+    return of_rows(("sensor", "parameter", "value", "sigma", "unit"), rows)
 
 
 def verification_columns(verification: Verification) -> Columns:
@@ -113,19 +102,19 @@ def verification_columns(verification: Verification) -> Columns:
         ("pose", "m/s^2", zip(poses, v.norm_error, v.norm_noise, v.norm_sigma, strict=True)),
         ("move", "deg", zip(v.moves.tolist(), v.angle_deg, v.angle_noise_deg, v.angle_sigma_deg, strict=True)),
     ):
-        for k, error, noise, sigma in told:
-            row = {"kind": kind, "index": k, "error": float(error), "noise": float(noise), "sigma": float(sigma)}
-            rows.append({**row, "unit": unit})
-    return of_rows(rows, ("kind", "index", "error", "noise", "sigma", "unit"))
+        rows += [(kind, k, *map(float, sizes), unit) for k, *sizes in told]
+    return of_rows(("kind", "index", "error", "noise", "sigma", "unit"), rows)
 
 
 def diagnosis_columns(diagnosis: Diagnosis) -> Columns:
     """A row per parameter of every accepted effect."""
+    names = ("name", "value", "std", "unit")
     rows = [
-        {"effect": effect.id, **parameter.to_dict()} for effect in diagnosis.effects for parameter in effect.parameters
+        (effect.id, *(getattr(parameter, name) for name in names))
+        for effect in diagnosis.effects
+        for parameter in effect.parameters
     ]
-    names = list(rows[0]) if rows else ["effect", "name", "value", "std", "unit"]
-    return of_rows(rows, names)
+    return of_rows(("effect", *names), rows)
 
 
 def noise_columns(noise: Noise) -> Columns:
@@ -133,35 +122,33 @@ def noise_columns(noise: Noise) -> Columns:
     rows = []
     for axis in noise.axes:
         for term in TermName:
-            found = axis.terms[term]
-            rows.append(
-                {
-                    "axis": axis.name,
-                    "term": term.value,
-                    "is_present": found.is_present,
-                    "value": found.value,
-                    "sigma": _finite(found.sigma),
-                    "lower": _finite(found.lower),
-                    "upper": _finite(found.upper),
-                    "unit": f"{axis.unit}{PER_UNIT[term]}",
-                }
-            )
-    return of_rows(rows, ("axis", "term", "is_present", "value", "sigma", "lower", "upper", "unit"))
+            found, unit = axis.terms[term], f"{axis.unit}{PER_UNIT[term]}"
+            sizes = (found.sigma, found.lower, found.upper)
+            known = (math.nan if size is None else float(size) for size in sizes)
+            rows.append((axis.name, term.value, found.is_present, found.value, *known, unit))
+    return of_rows(("axis", "term", "is_present", "value", "sigma", "lower", "upper", "unit"), rows)
 
 
 def curve_columns(curve: AllanCurve) -> Columns:
     """A row per averaging time and channel: deviation with its interval."""
     k, channels = len(curve.clusters), curve.n_channels
-    columns: Columns = {
+    return {
         "channel": [name for name in curve.names for _ in range(k)],
         "tau_s": np.tile(curve.tau_s, channels),
         "cluster": np.tile(curve.clusters, channels),
+        **{name: getattr(curve, name).reshape(k, -1).T.ravel() for name in ("deviation", "lower", "upper", "edf")},
+        "unit": [unit for unit in curve.units for _ in range(k)],
     }
-    for name in ("deviation", "lower", "upper", "edf"):
-        columns[name] = getattr(curve, name).reshape(k, -1).T.ravel()
-    columns["unit"] = [unit for unit in curve.units for _ in range(k)]
-    return columns
 
 
-def _finite(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+def sessions_columns(model: SessionsModel) -> Columns:
+    """A row per parameter: common value, standard error, spreads with their intervals (SI)."""
+    columns: dict[str, list[Any]] = {
+        name: [getattr(one.parameter, name) for one in model.repeated] for name in ("id", "name", "unit")
+    }
+    columns |= {name: [getattr(one, name) for one in model.repeated] for name in ("value", "std")}
+    for kind in ("within", "between"):
+        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
+        for part in ("sd", "low", "high"):
+            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
+    return dict(columns)

@@ -3,47 +3,33 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any, TypeVar
 
 from trihedron.records import Finding
 
-_PARAMETERS = {
+_SAME = (
+    "accuracy alpha baud by calibration columns current-parameters device instance labels loss noise protocol "
+    "reference reference-columns serial static time-unit topic workers"
+)
+"""Options whose parameters have the same name."""
+_PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | {
     "--accel-unit": "accelerometer_unit",
     "--gyro-unit": "gyroscope_unit",
     "--accel-lsb": "accelerometer_lsb",
     "--gyro-lsb": "gyroscope_lsb",
     "--gyro-nominal": "gyroscope_nominal",
-    "--time-unit": "time_unit",
-    "--columns": "columns",
     "--rate": "rate_hz",
     "--samples": "n_samples",
-    "--device": "device",
-    "--topic": "topic",
-    "--instance": "instance",
     "--accel": "accelerometer_path",
     "--gyro": "gyroscope_path",
     "--gravity": "gravity_m_s2",
     "--latitude": "latitude_deg",
     "--height": "height_m",
     "--turns": "turns_deg",
-    "--alpha": "alpha",
-    "--accuracy": "accuracy",
-    "--noise": "noise",
-    "--reference": "reference",
-    "--reference-columns": "reference_columns",
-    "--calibration": "calibration",
-    "--current-parameters": "current_parameters",
-    "--loss": "loss",
-    "--by": "by",
-    "--labels": "labels",
-    "--serial": "serial",
-    "--workers": "workers",
-    "--static": "static",
     "--band": "band_hz",
-    "--baud": "baud",
-    "--protocol": "protocol",
     "--force": "overwrite=True",
     "--extended": "trihedron.extend",
 }
@@ -61,54 +47,38 @@ _COMMANDS = {
 Value = TypeVar("Value")
 
 
-@dataclass(frozen=True)
-class _Patterns:
-    """Patterns for flags and commands; compiled on first use, since most commands need none."""
-
-    columns: re.Pattern[str]
-    turns: re.Pattern[str]
-    quoted: re.Pattern[str]
-    method: re.Pattern[str]
-    flag: re.Pattern[str]
-    command: re.Pattern[str]
-
-
 @cache
-def _patterns() -> _Patterns:
+def _replacements() -> tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...]:
+    """Patterns of flags and commands with what replaces them; compiled on first use, as most commands need none."""
     # A placeholder after a flag (`--latitude DEG`) is dropped: the parameter's name has the same meaning.
     place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|FILE|ALLAN\.json)\b)?"
     flags, commands = (
         "|".join(sorted(map(re.escape, words), key=len, reverse=True)) for words in (_PARAMETERS, _COMMANDS)
     )
-    return _Patterns(
-        columns=re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?"),
-        turns=re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\."),
-        quoted=re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"),
-        method=re.compile(r"--method (\w+)"),
-        flag=re.compile(rf"({flags})(?![\w-]){place}"),
-        command=re.compile(f"`({commands})`"),
+    columns = r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?"
+    return (
+        (re.compile(columns), lambda m: f'columns="{m[1]}{m[2] or ""}"'),
+        (re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\."), lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]"),
+        (re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"), lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"'),
+        (re.compile(r"--method (\w+)"), lambda m: f'method="{m[1]}"'),
+        (re.compile(f"`({commands})`"), lambda m: f"`{_COMMANDS[m[1]]}`"),
+        (re.compile(rf"({flags})(?![\w-]){place}"), lambda m: _PARAMETERS[m[1]]),
     )
 
 
 def in_python(text: str) -> str:
     """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as their parameters."""
-    if "--" not in text and "`trihedron " not in text:
-        return text
-    said = _patterns()
-    text = said.columns.sub(lambda m: f'columns="{m[1]}{m[2] or ""}"', text)
-    text = said.turns.sub(lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]", text)
-    text = said.quoted.sub(lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"', text)
-    text = said.method.sub(lambda m: f'method="{m[1]}"', text)
-    text = said.command.sub(lambda m: f"`{_COMMANDS[m[1]]}`", text)
-    return said.flag.sub(lambda m: _PARAMETERS[m[1]], text)
+    if "--" in text or "`trihedron " in text:
+        for pattern, replaced in _replacements():
+            text = pattern.sub(replaced, text)
+    return text
 
 
 def finding_in_python(finding: Finding) -> Finding:
     """A finding whose sentences name parameters instead of flags."""
-    said = {name: in_python(getattr(finding, name)) for name in ("seen", "cause", "action")}
-    if all(text == getattr(finding, name) for name, text in said.items()):
-        return finding
-    return replace(finding, seen=said["seen"], cause=said["cause"], action=said["action"])
+    seen, cause, action = map(in_python, (finding.seen, finding.cause, finding.action))
+    is_same = (seen, cause, action) == (finding.seen, finding.cause, finding.action)
+    return finding if is_same else replace(finding, seen=seen, cause=cause, action=action)
 
 
 def result_in_python(result: Value) -> Value:

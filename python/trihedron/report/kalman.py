@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
@@ -27,7 +27,7 @@ from trihedron.report.kalman_charts import (
     norm_convergence_chart,
     residual_chart,
 )
-from trihedron.report.numbers import how_many, plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
 CLOSE = 0.01
@@ -36,14 +36,16 @@ CLOSE = 0.01
 
 def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
     """Lay out the filter's results."""
-    if isinstance(outcome, KalmanCalibration):
-        sections = _with_references(outcome, calibration)
-    else:
-        sections = _without_references(outcome, calibration)
     # The chart of innovations, which shows whether the uncertainties are valid, is next to the verdict.
-    pictures = [b for section in sections for b in section.blocks if isinstance(b, Picture)]
-    lead = next(picture for picture in pictures if picture.name == "innovations")
-    sections = [Section(s.heading, tuple(b for b in s.blocks if b is not lead)) for s in sections]
+    results: tuple[AxisKalmanResult | NormKalmanCalibration, ...]
+    if isinstance(outcome, KalmanCalibration):
+        results, sections = outcome.axes, _with_references(outcome, calibration)
+    else:
+        results, sections = (outcome,), _without_references(outcome, calibration)
+    sections[1:1] = [
+        Section("Findings", (findings_block(calibration.findings),)),
+        Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
+    ]
     return Document(
         title="Calibration by Kalman filter",
         subtitle=calibration.recording_source or "no recording named",
@@ -56,7 +58,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(_headlines(outcome)),
-        lead=lead,
+        lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
         next_step="Test the calibration on another recording: trihedron verify." if calibration.is_trustworthy else "",
     )
 
@@ -116,7 +118,6 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         for axis in outcome.axes
     ]
     pictures += [
-        Picture("innovations", _INNOVATIONS, partial(innovations_chart, outcome.axes)),
         Picture(
             "drift",
             "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands.",
@@ -130,8 +131,6 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
     ]
     return [
         Section("Result", (Facts(facts), *(_constants_table(a, outcome.accelerometer.raw_unit) for a in outcome.axes))),
-        Section("Findings", (findings_block(calibration.findings),)),
-        Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
         Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
         Section("Convergence", (_arrival_table(outcome),)),
         Section("Poses", (_pose_table(outcome),)),
@@ -152,7 +151,6 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
             "S and b after every pose, with the 3 σ band around their last values.",
             partial(norm_convergence_chart, outcome),
         ),
-        Picture("innovations", _INNOVATIONS, partial(innovations_chart, (outcome,))),
         Picture(
             "residual",
             "Gravity error in every static pose: length of the corrected reading minus |g|.",
@@ -161,8 +159,6 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
     )
     return [
         Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
-        Section("Findings", (findings_block(calibration.findings),)),
-        Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
         Section("Figures", pictures),
     ]
 
@@ -175,28 +171,18 @@ def _residual_words(residual: FloatArray) -> str:
 def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:
     unit = unit_in_print(raw_unit)
     per = "" if raw_unit == "m/s^2" else f" [{unit}/(m/s²)]"
-    rows = [("Kalman filter", *_row(axis.constants, axis.sigma))]
-    rows += [(method.capitalize(), *_row(*solution)) for method, solution in axis.batch.items()]
+    rows = [("Kalman filter", *each_with_sigma(axis.constants, axis.sigma))]
+    rows += [(method.capitalize(), *each_with_sigma(*solution)) for method, solution in axis.batch.items()]
     last = [track for track in axis.tracks if track.method == "recursive least squares"]
-    rows += [("Recursive least squares, as it says", *_row(t.constants[-1], t.sigma[-1])) for t in last]
+    rows += [("Recursive least squares, as it says", *each_with_sigma(t.constants[-1], t.sigma[-1])) for t in last]
     name = AXES[axis.axis]
     head = ("", *(f"k{name}{other}{per}" for other in AXES), f"bias [{unit}]")
     return Table(head, tuple(rows), f"{name.upper()}: reading = k · f + bias + noise")
 
 
-def _row(constants: FloatArray, sigma: FloatArray) -> tuple[str, ...]:
-    return tuple(with_sigma(float(c), float(s)) for c, s in zip(constants, sigma, strict=True))
-
-
 def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
     rows = tuple(
-        (
-            name,
-            f"{c.n} of {n}",
-            plain_number(c.nis_mean),
-            _limits(c),
-            plain_number(c.whiteness_p, 2),
-        )
+        (name, f"{c.n} of {n}", plain_number(c.nis_mean), _limits(c), plain_number(c.whiteness_p, 2))
         for name, c, n in seen
     )
     head = ("axis", "poses judged", "mean NIS", "99 % when right", "whiteness, p")
@@ -219,11 +205,7 @@ def _arrival_table(outcome: KalmanCalibration) -> Table | Paragraph:
         (method.capitalize(), *(str(arrival(axis.track(method).constants)) for axis in outcome.axes))
         for method in methods
     )
-    return Table(
-        ("", *(name.upper() for name in AXES)),
-        rows,
-        "Poses until all sensitivities stay within 1 % of their last values",
-    )
+    return Table(("", *XYZ), rows, "Poses until all sensitivities stay within 1 % of their last values")
 
 
 def _pose_table(outcome: KalmanCalibration) -> Table:
@@ -249,13 +231,14 @@ def kalman_record(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         out["axes"] = [_axis_record(axis) for axis in outcome.axes]
         out["residual_m_s2"] = outcome.residual_m_s2.tolist()
         return out
-    out["parameters"] = outcome.parameters.tolist()
-    out["parameters_sigma"] = outcome.sigma.tolist()
-    out["innovation_m_s2"] = outcome.innovation.tolist()
-    out["innovation_sigma_m_s2"] = outcome.innovation_sigma.tolist()
-    out["consistency"] = _consistency_record(outcome.consistency)
-    out["residual_m_s2"] = outcome.residual_m_s2.tolist()
-    return out
+    return out | {
+        "parameters": outcome.parameters.tolist(),
+        "parameters_sigma": outcome.sigma.tolist(),
+        "innovation_m_s2": outcome.innovation.tolist(),
+        "innovation_sigma_m_s2": outcome.innovation_sigma.tolist(),
+        "consistency": _consistency_record(outcome.consistency),
+        "residual_m_s2": outcome.residual_m_s2.tolist(),
+    }
 
 
 def _consistency_record(seen: Consistency) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from typing import Any
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
+from trihedron.records.sessions import Session, SessionsModel
+from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import channels_record
 from trihedron.sanitise import printable_json
 
@@ -40,19 +42,20 @@ def curve_record(curve: AllanCurve) -> dict[str, Any]:
 
 def segments_record(segments: Segments, recording: Recording | None = None) -> dict[str, Any]:
     """Poses with their means, moves, noise; start and end times where the recording is given."""
+    columns = {
+        name: getattr(segments, name)
+        for name in (
+            "time_mid_s", "duration_s", "n_averaged", "accelerometer_mean", "accelerometer_sigma_mean",
+            "gyroscope_mean", "gyroscope_sigma_mean",
+        )
+    }  # fmt: skip
     poses: list[dict[str, Any]] = [
         {
             "start": pose.start,
             "stop": pose.stop,
             "disturbed": [list(part) for part in pose.disturbed],
             "is_unsteady": pose.is_unsteady,
-            "time_mid_s": float(segments.time_mid_s[k]),
-            "duration_s": float(segments.duration_s[k]),
-            "n_averaged": int(segments.n_averaged[k]),
-            "accelerometer_mean": _row(segments.accelerometer_mean, k),
-            "accelerometer_sigma_mean": _row(segments.accelerometer_sigma_mean, k),
-            "gyroscope_mean": _row(segments.gyroscope_mean, k),
-            "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
+            **{name: None if values is None else values[k] for name, values in columns.items()},
         }
         for k, pose in enumerate(segments.poses)
     ]
@@ -72,9 +75,11 @@ def segments_record(segments: Segments, recording: Recording | None = None) -> d
 
 def calibration_record(calibration: Calibration, segments: Segments, recording: Recording) -> dict[str, Any]:
     """The calibration file's content, the published figures, and the segments that it was made from."""
-    document = calibration_document(calibration)
-    figures = published_figures(calibration)
-    return {**document, "figures": figures, "segments": segments_record(segments, recording)}
+    return {
+        **calibration_document(calibration),
+        "figures": published_figures(calibration),
+        "segments": segments_record(segments, recording),
+    }
 
 
 def verification_record(verification: Verification) -> dict[str, Any]:
@@ -105,11 +110,10 @@ def check_record(
     recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
 ) -> dict[str, Any]:
     """The audit, and the uncertainties to expect."""
-    expected: dict[str, Any] = {}
-    if calibration is not None:
-        for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
-            if sensor is not None:
-                expected[name] = {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
+    expected = {
+        name: {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
+        for name, sensor in (() if calibration is None else calibrated_sensors(calibration))
+    }
     return {
         **segments_record(segments, recording),
         "is_fit": not any(finding.severity.value == "serious" for finding in findings),
@@ -119,5 +123,32 @@ def check_record(
     }
 
 
-def _row(array: Any, k: int) -> Any:
-    return None if array is None else array[k]
+def session_record(session: Session) -> dict[str, object]:
+    """One recording's parameters for JSON: ``values`` with their ``covariance``, the variance of the bias drift."""
+    named = {"numbers": "values", "drift": "bias_drift_variance"}
+    record = {named.get(name, name): value for name, value in vars(session).items()}
+    return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
+
+
+def sessions_record(model: SessionsModel) -> dict[str, object]:
+    """The content of the report as plain types (SI)."""
+    return {
+        "by": model.by,
+        "is_trustworthy": model.is_trustworthy,
+        "sessions": [session_record(session) for session in model.sessions],
+        "parameters": [
+            {
+                **vars(one.parameter),
+                "value": one.value,
+                "std": one.std,
+                "interval": [one.value - one.half_width, one.value + one.half_width],
+                "within": None if one.within is None else vars(one.within),
+                "between": None if one.between is None else vars(one.between),
+                "own_std": one.own_std,
+            }
+            for one in model.repeated
+        ],
+        "changes": [vars(change) for change in model.changes],
+        "excluded": [{"source": source, "reason": why} for source, why in model.left_out],
+        "findings": [finding.to_dict() for finding in model.findings],
+    }

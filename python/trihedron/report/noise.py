@@ -1,18 +1,18 @@
-"""Report of noise: terms in SI and customary units with uncertainties, best averaging time, the Allan plot."""
+"""Reports of noise and of an Allan curve: terms in SI and customary units, best averaging time, the Allan plot."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
-from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.noise_charts import allan_chart, every_axis_chart, sensors_chart
+from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
@@ -24,6 +24,8 @@ _NO_UNIT = (
 NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
 SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb "X deg/s" and --accel-lsb "Y mg", X and Y from \
 the data sheet of this part at its range, or --calibration FILE."""
+MOST_ROWS = 12
+"""Rows of a curve's table, about; averaging times between them are omitted."""
 
 
 def noise_report(
@@ -33,13 +35,14 @@ def noise_report(
     findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
-        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
+        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz")
     ]
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
         facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))
     facts += _coloured(noise)
     groups = _groups(noise)
+    has_units = all(customary(TermName.WHITE, axis.unit) for axis in noise.axes)
     tables: list[Block] = [Facts(tuple(facts))]
     for unit, axes in groups:
         tables += [_terms_table(axes, unit), _answers_table(axes, unit)]
@@ -47,15 +50,12 @@ def noise_report(
         title="Noise of a static log",
         subtitle=noise.source,
         verdict=verdict_of(
-            findings,
-            "OK: a sum of noise terms fits the whole spectrum.",
-            "Usable",
-            "NOT TO BE TRUSTED",
+            findings, "OK: a sum of noise terms fits the whole spectrum.", "Usable", "NOT TO BE TRUSTED"
         ),
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
-        next_step=_next_step(noise),
+        next_step=(NEXT if has_units else SAY_COUNTS) if noise.is_trustworthy else "",
         sections=(
             Section("Result", tuple(tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
@@ -66,12 +66,6 @@ def noise_report(
             Section("Kalibr", _kalibr(noise)),
         ),
     )
-
-
-def _next_step(noise: Noise) -> str:
-    if not noise.is_trustworthy:
-        return ""
-    return NEXT if all(customary(TermName.WHITE, axis.unit) for axis in noise.axes) else SAY_COUNTS
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
@@ -105,7 +99,7 @@ def _kalibr(noise: Noise) -> tuple[Block, ...]:
     rows = kalibr_rows(noise)
     if len(rows) < 2:
         return (Paragraph(_NO_UNIT),)
-    lines = ["#Kalibr's imu.yaml: one number for the axes of a sensor, their root mean square".replace("#", "# ")]
+    lines = ["# Kalibr's imu.yaml: one number for the axes of a sensor, their root mean square"]
     for key, words in rows.items():
         value, _, rest = words.partition("  ")
         lines.append(f"{key}: {value}  {rest if rest.startswith('#') else '# ' + rest.replace('  # ', ', ')}")
@@ -130,9 +124,7 @@ def _coloured(noise: Noise) -> list[tuple[str, str]]:
         for finding in axis.findings
         if finding.code is FindingCode.SPECTRUM_COLOURED
     ]
-    if not limits:
-        return []
-    return [("low-pass filtered", f"above {', '.join(limits)}; terms fitted below")]
+    return [("low-pass filtered", f"above {', '.join(limits)}; terms fitted below")] if limits else []
 
 
 def _groups(noise: Noise) -> list[tuple[str, list[NoiseAxis]]]:
@@ -154,14 +146,18 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
     for term in TermName:
         label = f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]"
         rows.append((label, *(_value(axis.terms[term]) for axis in axes)))
-    if any(axis.gauss_markov for axis in axes):
-        rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
-        rows.append(("   … correlation time [s]", *(_correlation(axis) for axis in axes)))
-    return Table(
-        ("", *(axis_in_print(axis.name) for axis in axes)),
-        tuple(rows),
-        "Noise terms ± standard uncertainty (1 σ); < is the upper end of the 95 % interval",
-    )
+    processes = [axis.gauss_markov for axis in axes]
+    if any(processes):
+        sigmas = ("–" if p is None else with_sigma_and_power(p.sigma_process, p.sigma) for p in processes)
+        times = ("–" if p is None else plain_number(p.correlation_time_s, 2) for p in processes)
+        rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *sigmas))
+        rows.append(("   … correlation time [s]", *times))
+    return _by_axis(axes, rows, "Noise terms ± standard uncertainty (1 σ); < is the upper end of the 95 % interval")
+
+
+def _by_axis(axes: Sequence[NoiseAxis], rows: Sequence[tuple[str, ...]], caption: str) -> Table:
+    """A column per axis."""
+    return Table(("", *(axis_in_print(axis.name) for axis in axes)), tuple(rows), caption)
 
 
 def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
@@ -183,35 +179,15 @@ def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
         words = ("not both zero" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))
     caption = "95 % intervals with every other term free; they are valid whether a term is named or not"
-    return Table(("", *(axis_in_print(axis.name) for axis in axes)), tuple(rows), caption)
-
-
-def _gauss_markov(axis: NoiseAxis) -> str:
-    process = axis.gauss_markov
-    if process is None:
-        return "–"
-    return with_sigma_and_power(process.sigma_process, process.sigma)
-
-
-def _correlation(axis: NoiseAxis) -> str:
-    return "–" if axis.gauss_markov is None else plain_number(axis.gauss_markov.correlation_time_s, 2)
+    return _by_axis(axes, rows, caption)
 
 
 def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
-    def best(axis: NoiseAxis, which: int) -> str:
-        found = axis.optimal_averaging()
-        return (
-            "beyond the log"
-            if found is None and which == 0
-            else "–"
-            if found is None
-            else plain_number(found[which], 3)
-        )
-
     printed = unit_in_print(unit)
+    found = [axis.optimal_averaging() for axis in axes]
     rows = (
-        ("best averaging time [s]", *(best(axis, 0) for axis in axes)),
-        (f"bias uncertainty then [{printed}]", *(best(axis, 1) for axis in axes)),
+        ("best averaging time [s]", *("beyond the log" if one is None else plain_number(one[0]) for one in found)),
+        (f"bias uncertainty then [{printed}]", *("–" if one is None else plain_number(one[1]) for one in found)),
         *(
             (
                 f"σ of a mean of {window:g} s [{printed}]",
@@ -223,12 +199,9 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
             for window in (1.0, 10.0)
         ),
         ("longest averaging time with 25 % uncertainty [s]", *(plain_number(axis.longest_tau_s, 3) for axis in axes)),
-        (
-            "fit band [Hz]",
-            *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes),
-        ),
+        ("fit band [Hz]", *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes)),
     )
-    return Table(("", *(axis_in_print(axis.name) for axis in axes)), rows, "How long to average")
+    return _by_axis(axes, rows, "How long to average")
 
 
 def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]], accuracy: float) -> Table:
@@ -244,7 +217,7 @@ def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float |
         if any(axis.terms[term].is_present for axis in noise.axes)
     )
     caption = f"Recording length for an uncertainty of {100 * accuracy:g} % (1 σ)"
-    return Table(("", *(axis_in_print(axis.name) for axis in noise.axes)), rows, caption)
+    return _by_axis(noise.axes, rows, caption)
 
 
 def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
@@ -256,27 +229,15 @@ def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
         name, printed, factor = found
         rows.append((f"{term.value}  {name} [{printed}]", *(_value(axis.terms[term], factor) for axis in axes)))
         if term is TermName.WHITE and unit == "m/s^2":
-            rows.append(
-                (
-                    f"{term.value}  noise density [µg/√Hz]",
-                    *(_value(a.terms[term], micro_g_from_m_s2(1.0)) for a in axes),
-                )
-            )
+            density = (_value(axis.terms[term], micro_g_from_m_s2(1.0)) for axis in axes)
+            rows.append((f"{term.value}  noise density [µg/√Hz]", *density))
         if term is TermName.BIAS_INSTABILITY:
-            lowest = [_lowest(axis, factor) for axis in axes]
-            rows.append((f"   lowest deviation / 0.664 [{printed}]", *lowest))
-    return [
-        Table(
-            ("", *(axis_in_print(axis.name) for axis in axes)),
-            tuple(rows),
-            f"{axes[0].name.rsplit(' ', 1)[0]}: IEEE 952 names, units of data sheets",
-        )
-    ]
-
-
-def _lowest(axis: NoiseAxis, factor: float) -> str:
-    found = axis.optimal_averaging()
-    return "–" if found is None else plain_number(factor * found[1] / math.sqrt(2 * math.log(2) / math.pi), 3)
+            # σ(τ) of flicker noise is sqrt(2 ln 2 / π) B at its minimum.
+            scale = factor / math.sqrt(2 * math.log(2) / math.pi)
+            lowest = (axis.optimal_averaging() for axis in axes)
+            cells = ("–" if one is None else plain_number(scale * one[1]) for one in lowest)
+            rows.append((f"   lowest deviation / 0.664 [{printed}]", *cells))
+    return [_by_axis(axes, rows, f"{axes[0].name.rsplit(' ', 1)[0]}: IEEE 952 names, units of data sheets")]
 
 
 def kalibr_rows(noise: Noise) -> dict[str, str]:
@@ -303,26 +264,49 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
-    caption = (
-        "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum (dashed); "
-        'N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
-        "the orange mark is the least deviation."
-    )
-    return Picture(
-        f"allan-{axes[0].name.split()[0]}",
-        caption,
-        partial(allan_chart, noise.curve, unit, axes),
-    )
+    caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
+    caption += '(dashed); N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
+    caption += "the orange mark is the least deviation."
+    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, unit, axes))
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
     caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted terms, "
     caption += "beyond which the curve only scatters. The terms, each with its part of the curve, stand below."
-    chart = partial(sensors_chart, noise.curve, groups)
-    return Picture("sensors", caption, chart)
+    return Picture("sensors", caption, partial(sensors_chart, noise.curve, groups))
 
 
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
-    chart = partial(every_axis_chart, noise.curve, _groups(noise))
-    return Picture("allan", "Allan deviation of every axis.", chart)
+    return Picture("allan", "Allan deviation of every axis.", partial(every_axis_chart, noise.curve, _groups(noise)))
+
+
+def curve_summary(curve: AllanCurve) -> Document:
+    """Allan deviations with their intervals, at about a dozen averaging times."""
+    k = len(curve.clusters)
+    chosen = np.unique(np.linspace(0, k - 1, min(k, MOST_ROWS)).round().astype(int))
+    deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))
+    units = [f" [{unit_in_print(unit)}]" if unit else "" for unit in curve.units]
+    names = [f"{name}{unit}" for name, unit in zip(curve.names, units, strict=True)]
+    rows = tuple(
+        (
+            plain_number(float(curve.tau_s[i]), 3),
+            *(
+                f"{plain_number(float(deviation[i, c]), 4)} "
+                f"({plain_number(float(lower[i, c]), 3)} to {plain_number(float(upper[i, c]), 3)})"
+                for c in range(deviation.shape[1])
+            ),
+        )
+        for i in chosen
+    )
+    return Document(
+        title="Allan deviation",
+        subtitle=f"{curve.kind}, {curve.n_samples} readings at {plain_number(curve.rate_hz, 5)} Hz",
+        verdict=f"{how_many(curve.n_channels, 'channel')}, {how_many(k, 'averaging time')}; "
+        f"intervals of {100.0 * curve.confidence:g} %.",
+        is_trustworthy=True,
+        sections=(
+            Section("Deviation", (Table(("τ [s]", *names), rows, "Allan deviation"),)),
+            Section("Figures", (Picture("allan", "Allan deviation.", partial(curve_chart, curve)),)),
+        ),
+    )

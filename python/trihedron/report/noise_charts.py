@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,8 @@ MARGIN = 1.6
 """Distance of a name from the ends of the panel, as a factor in time."""
 
 Limits = tuple[float, float]
+TIME = Scale("averaging time τ [s]", "s", is_log=True)
+BEST = "best averaging time"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,23 +100,16 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
     return f"{symbol} < {limit}", f"{symbol} is in the sum, and does not show by itself: below {limit} {unit}"
 
 
-BEST = "best averaging time"
-
-
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
     """Curves of one sensor, a panel per axis with equal scales."""
     chosen = [curve.names.index(axis.name) for axis in axes]
     y_limits = room_for(curve, list(zip(axes, chosen, strict=True)), _times(curve))
-    x_limits = (float(curve.tau_s[0]) / 1.4, float(curve.tau_s[-1]) * 1.4)
+    last_s = float(curve.tau_s[-1]) * 1.4
+    x = replace(TIME, limits=(float(curve.tau_s[0]) / 1.4, last_s))
     printed = unit_in_print(unit)
+    y = Scale(f"Allan deviation [{printed}]", printed, is_log=True, limits=y_limits)
     panels = tuple(
-        Panel(
-            Scale("averaging time τ [s]", "s", is_log=True, limits=x_limits),
-            Scale(f"Allan deviation [{printed}]", printed, is_log=True, limits=y_limits),
-            _marks(curve, c, axis, k, x_limits[1]),
-            title=axis_in_print(axis.name),
-            height_px=270,
-        )
+        Panel(x, y, _marks(curve, c, axis, k, last_s), title=axis_in_print(axis.name), height_px=270)
         for k, (axis, c) in enumerate(zip(axes, chosen, strict=True))
     )
     return Chart(panels, columns=3)
@@ -131,7 +126,7 @@ def curve_chart(curve: AllanCurve) -> Chart:
     units = {unit_in_print(unit) for unit in curve.units if unit}
     unit = units.pop() if len(units) == 1 else ""
     y = Scale(f"Allan deviation [{unit}]" if unit else "Allan deviation", unit, is_log=True)
-    return Chart((Panel(Scale("averaging time τ [s]", "s", is_log=True), y, tuple(marks), height_px=270),))
+    return Chart((Panel(TIME, y, tuple(marks), height_px=270),))
 
 
 def every_axis_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
@@ -159,11 +154,10 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
                 # Placed on the measured curve: the minimum of the fitted sum may be off it.
                 found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
                 marks.append(Points(np.array([best[0]]), np.array([found]), [told], None, BEST, "accent"))
-        x = Scale("averaging time τ [s]", "s", is_log=True)
         y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
         # Curves before points, so that the axes are together in the legend.
         marks.sort(key=lambda mark: isinstance(mark, Points))
-        panels.append(Panel(x, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
+        panels.append(Panel(TIME, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
     return Chart(tuple(panels), columns=len(panels))
 
 

@@ -11,6 +11,8 @@ from trihedron.records import Noise, NoiseAxis, TermName
 from trihedron.report.noise import kalibr_rows
 from trihedron.report.noise_units import PER_UNIT, customary
 
+_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate", "fitted")
+_CURVE = ("deviation", "lower", "upper", "edf", "n_terms")
 Lengths = Mapping[str, Mapping[TermName, float | None]]
 
 
@@ -35,16 +37,8 @@ def noise_record(noise: Noise, lengths: Lengths | None = None, accuracy: float =
             "tau_s": noise.curve.tau_s.tolist(),
             "cluster": noise.curve.clusters.tolist(),
             "axes": [
-                {
-                    "name": name,
-                    "unit": noise.curve.units[c],
-                    "deviation": noise.curve.deviation[:, c].tolist(),
-                    "lower": noise.curve.lower[:, c].tolist(),
-                    "upper": noise.curve.upper[:, c].tolist(),
-                    "edf": noise.curve.edf[:, c].tolist(),
-                    "n_terms": noise.curve.n_terms[:, c].tolist(),
-                }
-                for c, name in enumerate(noise.curve.names)
+                {"name": name, "unit": unit} | {of: getattr(noise.curve, of)[:, c].tolist() for of in _CURVE}
+                for c, (name, unit) in enumerate(zip(noise.curve.names, noise.curve.units, strict=True))
             ],
         },
         "findings": [finding.to_dict() for finding in noise.findings],
@@ -55,18 +49,8 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
     terms = {}
     for term in TermName:
         found = axis.terms[term]
-        entry: dict[str, Any] = {
-            "present": found.is_present,
-            "value": found.value,
-            "sigma": found.sigma,
-            "lower": found.lower,
-            "upper": found.upper,
-            "limit": found.limit,
-            "evidence": found.evidence,
-            "estimate": found.estimate,
-            "fitted": found.fitted,
-            "unit": f"{axis.unit}{PER_UNIT[term]}",
-        }
+        entry: dict[str, Any] = {"present": found.is_present} | {name: getattr(found, name) for name in _TERM}
+        entry["unit"] = f"{axis.unit}{PER_UNIT[term]}"
         usual = customary(term, axis.unit)
         if usual is not None:
             entry["customary"] = {"name": usual[0], "unit": usual[1], "value": usual[2] * found.value}
@@ -101,14 +85,8 @@ def curve_csv(noise: Noise) -> str:
     writer = csv.writer(out, lineterminator="\n")
     head = ["tau_s", "cluster"]
     for name, unit in zip(curve.names, curve.units, strict=True):
-        key = name.replace(" ", "_")
-        head += [
-            f"{key}_deviation[{unit}]",
-            f"{key}_lower[{unit}]",
-            f"{key}_upper[{unit}]",
-            f"{key}_edf",
-            f"{key}_terms",
-        ]
+        columns = (f"deviation[{unit}]", f"lower[{unit}]", f"upper[{unit}]", "edf", "terms")
+        head += [f"{name.replace(' ', '_')}_{column}" for column in columns]
     writer.writerow(head)
     for i, tau in enumerate(curve.tau_s):
         row = [f"{tau:.9g}", str(int(curve.clusters[i]))]

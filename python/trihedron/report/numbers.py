@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
-from trihedron.units import mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MINUS = "−"
 
@@ -119,3 +120,31 @@ def one_of(unit: str) -> str:
 def in_mm_s2(acceleration_m_s2: float) -> str:
     """An acceleration in mm/s², the unit of errors in every report."""
     return f"{plain_number(mm_s2_from_m_s2(acceleration_m_s2))} mm/s²"
+
+
+SHOWN: dict[str, tuple[float, str]] = {
+    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "rad": (degrees_from_radians(1.0), "°"),
+    "deg": (1.0, "°"),
+    "m/s": (1.0, "m/s"),
+    "s": (ms_from_s(1.0), "ms"),
+    "dB": (1.0, "dB"),
+    "1": (100.0, "%"),
+}
+"""Factor and printed unit of errors, residuals and differences, by the unit of a record."""
+
+
+def shown(unit: str) -> tuple[float, str]:
+    """Factor and printed unit for errors in ``unit``; itself where there is no other."""
+    return SHOWN.get(unit, (1.0, unit_in_print(unit)))
+
+
+def each_with_sigma(values: Iterable[float], sigmas: Iterable[float], factor: float = 1.0) -> list[str]:
+    """``value ± σ`` of several values, all multiplied by ``factor``."""
+    return [with_sigma(factor * float(v), factor * float(s)) for v, s in zip(values, sigmas, strict=True)]
+
+
+def capital(text: str) -> str:
+    """The text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]

@@ -1,4 +1,4 @@
-"""A report as one self-contained HTML file, with embedded figures."""
+"""A report as one self-contained HTML file with embedded figures, and its first screen as a fragment for a notebook."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
 from trihedron.report.findings.wording import opening
+from trihedron.report.numbers import how_many
 from trihedron.sanitise import one_line, printable
 
 KINDS: dict[type, str] = {
@@ -40,6 +41,7 @@ _ASIDE = re.compile(r" \([^)]*\)")
 MOST_OTHERS = 2
 """Findings listed on the first screen after the foremost; the others are counted."""
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
+_NOT_SHOWN = (Picture, FindingList, Code)
 
 
 def to_html(document: Document) -> str:
@@ -50,6 +52,7 @@ def to_html(document: Document) -> str:
     ]
     lead = None if document.lead is None else _shown(document.lead)
     script = _file("body.js") + _file("page.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     told, others, place = _noticed(document)
     page = template("page.html.j2").render(
         told=told,
@@ -61,7 +64,7 @@ def to_html(document: Document) -> str:
         version=_version(),
         style=Markup(_file("page.css")),
         script=Markup(script),
-        policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{_digest(script)}'",
+        policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
     )
     return printable(page)
 
@@ -97,11 +100,6 @@ def stacked(text: str) -> Markup:
 def path(text: str) -> Markup:
     """A file name in which a line break is allowed after each folder."""
     return escape(text).replace("/", Markup("/<wbr>"))
-
-
-def _digest(script: str) -> str:
-    """Hash of the page's script, the only one that its policy allows."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
 @cache
@@ -142,3 +140,16 @@ def _shown(block: Block) -> dict[str, Any]:
         shown["is_wordy"] = any(len(row[0]) > SHORT for row in block.rows)
         shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
     return shown
+
+
+def to_fragment(document: Document) -> str:
+    """Title, verdict and first section; findings are collapsed, unless one is serious."""
+    first = document.sections[0].blocks if document.sections else ()
+    blocks = [{"kind": KINDS[type(block)], "it": block} for block in first if not isinstance(block, _NOT_SHOWN)]
+    lists = [block for section in document.sections for block in section.blocks if isinstance(block, FindingList)]
+    findings = [finding for one in lists for finding in one.findings]
+    counts = [(s, sum(f.severity is s for f in findings)) for s in (Severity.SERIOUS, Severity.WARNING, Severity.NOTE)]
+    words = {Severity.SERIOUS: "serious finding", Severity.WARNING: "warning", Severity.NOTE: "note"}
+    counted = ", ".join(how_many(n, words[s]) for s, n in counts if n)
+    made = template("fragment.html.j2").render(it=document, blocks=blocks, findings=findings, counted=counted)
+    return "\n".join(line for line in made.splitlines() if line.strip())

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.files.calibration import plain
 from trihedron.records.plan import ExperimentPlan, PosePlan
 from trihedron.report.chart import Chart, Line, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -22,7 +23,10 @@ FEWEST_SETS = 2
 
 def plan_report(plan: ExperimentPlan) -> Document:
     """Lay out the plan: turns by both routes, sets of poses, moves."""
-    turns, best = plan.turns, _enough(plan.poses)
+    turns = plan.turns
+    # The smallest set that determines all parameters without any one of its poses.
+    enough = [one for one in plan.poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
+    best = min(enough, key=lambda one: one.n_poses, default=None)
     angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg).replace("-", MINUS)
     return Document(
         title="Plan of an experiment",
@@ -42,10 +46,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         sections=(
             Section(
                 "Poses",
-                (
-                    _poses(plan.poses),
-                    Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth)),
-                ),
+                (_poses(plan.poses), Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth))),
             ),
             Section(
                 "Moves between poses",
@@ -68,33 +69,24 @@ def plan_report(plan: ExperimentPlan) -> Document:
     )
 
 
-def _enough(poses: tuple[PosePlan, ...]) -> PosePlan | None:
-    """The smallest set that determines all parameters without any one of its poses."""
-    enough = [one for one in poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
-    return min(enough, key=lambda one: one.n_poses, default=None)
-
-
 def _headlines(plan: ExperimentPlan, best: PosePlan | None) -> list[Headline]:
     """What that set of poses and the turns would lead to."""
-    out = [Headline("gyro scale by turns", plain_number(100.0 * plan.turns.scale, 2), "%", "1 σ, worst axis")]
-    if best is not None:
-        beside = f"1 σ, worst axis, {best.n_poses} poses"
-        out.insert(0, Headline("accelerometer scale", plain_number(100.0 * best.scale, 2), "%", beside))
-    return out
+    found = [] if best is None else [("accelerometer scale", best.scale, f", {best.n_poses} poses")]
+    found.append(("gyro scale by turns", plan.turns.scale, ""))
+    return [Headline(what, plain_number(100.0 * scale, 2), "%", f"1 σ, worst axis{n}") for what, scale, n in found]
 
 
 def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
-    if sum(pose.rank == ALL_NUMBERS for pose in poses) < FEWEST_SETS:
+    known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
+    if len(known) < FEWEST_SETS:
         return None
-    chart = partial(poses_chart, poses)
     caption = "Largest standard uncertainty (1 σ) of the accelerometer against the number of poses; sets that leave a "
     caption += "parameter undetermined are not drawn. → Where the curve is flat, more poses are not worth their time."
-    return Picture("poses", caption, chart)
+    return Picture("poses", caption, partial(_poses_chart, known))
 
 
-def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
+def _poses_chart(known: list[PosePlan]) -> Chart:
     """Uncertainty of scale, angle and bias over the number of poses."""
-    known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
     n = np.array([pose.n_poses for pose in known], dtype=np.float64)
     panels = []
     for name, unit, values in (
@@ -112,16 +104,8 @@ def poses_chart(poses: tuple[PosePlan, ...]) -> Chart:
 
 def plan_record(plan: ExperimentPlan) -> dict[str, Any]:
     """As plain JSON types; undetermined values are null."""
-    record: dict[str, Any] = _plain(asdict(plan))
+    record: dict[str, Any] = plain(asdict(plan))
     return record
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return None if isinstance(value, float) and math.isinf(value) else value
 
 
 def _turns(plan: ExperimentPlan) -> Table:
@@ -130,30 +114,21 @@ def _turns(plan: ExperimentPlan) -> Table:
         ("turns and bias together", turns.scale, turns.bias),
         ("bias first, then the turns", turns.scale_bias_first, turns.bias_bias_first),
     )
-    return Table(
-        ("standard uncertainty (1 σ)", "gyro scale", "gyro bias"),
-        tuple(
-            (name, _percent(scale), f"{plain_number(degrees_from_radians(bias), 2)} °/s") for name, scale, bias in rows
-        ),
-        "What turns by known angles determine of the gyro",
+    cells = tuple(
+        (name, _percent(scale), f"{plain_number(degrees_from_radians(bias), 2)} °/s") for name, scale, bias in rows
     )
+    head = ("standard uncertainty (1 σ)", "gyro scale", "gyro bias")
+    return Table(head, cells, "What turns by known angles determine of the gyro")
 
 
 def _poses(poses: tuple[PosePlan, ...]) -> Table:
     rows = []
     for pose in poses:
-        if pose.rank < ALL_NUMBERS:
-            rows.append((pose.name, f"{pose.rank}", "–", "–", "–"))
-            continue
-        rows.append(
-            (
-                pose.name,
-                f"{pose.rank}",
-                _percent(pose.scale),
-                f"{plain_number(mrad_from_radians(pose.angle), 2)} mrad",
-                f"{plain_number(mm_s2_from_m_s2(pose.bias), 2)} mm/s²",
-            )
-        )
+        cells = ("–", "–", "–")
+        if pose.rank == ALL_NUMBERS:
+            angle = f"{plain_number(mrad_from_radians(pose.angle), 2)} mrad"
+            cells = (_percent(pose.scale), angle, f"{plain_number(mm_s2_from_m_s2(pose.bias), 2)} mm/s²")
+        rows.append((pose.name, f"{pose.rank}", *cells))
     return Table(
         ("set of poses", "of 9", "scale", "axis angle", "bias"),
         tuple(rows),

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import calibration_document, plain
@@ -25,22 +24,22 @@ from trihedron.records.results import (
     VerificationResult,
 )
 from trihedron.records.shared_effects import SharedDiagnosis
-from trihedron.report import document, frames, machine, summaries
+from trihedron.report import document, frames, machine
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.diagnosis import diagnosis_report, first_screen
 from trihedron.report.drawing import figures
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
-from trihedron.report.fragment import to_fragment
 from trihedron.report.kalman import kalman_record, kalman_report
-from trihedron.report.noise import noise_picture, noise_report
+from trihedron.report.noise import curve_summary, noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
+from trihedron.report.page import to_fragment
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.reference import calibration_result_report
 from trihedron.report.saved import written
-from trihedron.report.segments import segments_report
-from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
+from trihedron.report.segments import recording_summary, segments_report
+from trihedron.report.sessions import sessions_report
 from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 from trihedron.report.text import WIDTH, to_text
 from trihedron.report.verification import verification_report
@@ -50,8 +49,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class _Shown:
+class _Shown(NamedTuple):
     """Functions that make the report, the JSON and the columns of one kind of record."""
 
     document: Any
@@ -59,14 +57,10 @@ class _Shown:
     columns: Any = None
 
 
-def _calibrated(result: Any) -> Any:
-    return machine.calibration_record(result.calibration, result.segments, result.recording)
-
-
 _KINDS: dict[type, _Shown] = {
     CalibrationResult: _Shown(
         calibration_result_report,
-        _calibrated,
+        lambda r: machine.calibration_record(r.calibration, r.segments, r.recording),
         lambda r: frames.calibration_columns(r.calibration),
     ),
     VerificationResult: _Shown(
@@ -86,7 +80,9 @@ _KINDS: dict[type, _Shown] = {
         lambda r: frames.calibration_columns(r.calibration),
     ),
     SessionsResult: _Shown(
-        lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
+        lambda r: sessions_report(r.model),
+        lambda r: machine.sessions_record(r.model),
+        lambda r: frames.sessions_columns(r.model),
     ),
     SharedDiagnosis: _Shown(shared_diagnosis_report, shared_diagnosis_record),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
@@ -94,8 +90,8 @@ _KINDS: dict[type, _Shown] = {
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
     FilterNoise: _Shown(filter_noise_report, filter_noise_record, filter_noise_columns),
-    AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
-    Recording: _Shown(summaries.recording_summary, machine.recording_record, frames.recording_columns),
+    AllanCurve: _Shown(curve_summary, machine.curve_record, frames.curve_columns),
+    Recording: _Shown(recording_summary, machine.recording_record, frames.recording_columns),
     Segments: _Shown(segments_report, machine.segments_record, frames.segments_columns),
     ExperimentPlan: _Shown(plan_report, plan_record),
 }

@@ -15,6 +15,9 @@ from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.verification import headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
+AGAIN = "Calibrate again: none of these fits this log."
+ROW_PX = 34
+INTERVAL = "95 % interval"
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
@@ -27,9 +30,6 @@ MISTAKES = {
 }
 
 
-AGAIN = "Calibrate again: none of these fits this log."
-
-
 def ranking_report(ranking: Ranking) -> Document:
     """Lay out a ranking: the order, likely mistakes of each, and the parameters of the best."""
     best = ranking.best
@@ -38,12 +38,10 @@ def ranking_report(ranking: Ranking) -> Document:
     verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected." if rejected else "."
     if best.is_rejected:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
-    chart = partial(ranking_chart, ranking)
     caption = "Errors of each calibration on this log, the best first."
-    facts = (
-        ("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"),
-        ("judged on", _judged_on(best)),
-    )
+    v = best.verification
+    judged_on = f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
+    facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", judged_on))
     sections = [
         Section("Ranking", (Facts(facts), _order(ranking))),
         Section("What is wrong with each", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
@@ -56,7 +54,7 @@ def ranking_report(ranking: Ranking) -> Document:
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
         headlines=headlines_of(best.verification),
-        lead=Picture("order", caption, chart),
+        lead=Picture("order", caption, partial(_ranking_chart, ranking)),
         next_step=AGAIN if best.is_rejected else f"Use {best.name}: trihedron apply, trihedron export.",
     )
 
@@ -88,11 +86,6 @@ def _factor(factor: float) -> str:
         if math.isclose(factor, value) or math.isclose(factor, 1.0 / value):
             return words
     return f"{factor:.4g}"
-
-
-def _judged_on(one: Ranked) -> str:
-    v = one.verification
-    return f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
 
 
 def _order(ranking: Ranking) -> Table:
@@ -152,18 +145,14 @@ def ranking_record(ranking: Ranking) -> dict[str, object]:
     }
 
 
-ROW_PX = 34
-INTERVAL = "95 % interval"
-
-
-def ranking_chart(ranking: Ranking) -> Chart:
+def _ranking_chart(ranking: Ranking) -> Chart:
     """A row per calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
     found = ranking.candidates
-    gravity = [(one.verification.norm_rms, *one.norm_interval) for one in found]
-    tilt = [(one.verification.angle_rms_deg, *one.angle_interval) for one in found]
-    panels = [_panel(ranking, "gravity error", "mm/s²", mm_s2_from_m_s2(1.0) * np.array(gravity))]
+    gravity = np.array([(one.verification.norm_rms, *one.norm_interval) for one in found])
+    tilt = np.array([(one.verification.angle_rms_deg, *one.angle_interval) for one in found])
+    panels = [_panel(ranking, "gravity error", "mm/s²", mm_s2_from_m_s2(1.0) * gravity)]
     if np.isfinite(tilt).any():
-        panels.append(_panel(ranking, "tilt error", "°", np.array(tilt)))
+        panels.append(_panel(ranking, "tilt error", "°", tilt))
     return Chart(tuple(panels), columns=len(panels))
 
 

@@ -1,23 +1,27 @@
-"""Report sections of the fit to a reference."""
+"""Report sections of the fit to a reference, and charts of its error and of the residual rate."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
-from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
-from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
-from trihedron.report.reference_charts import error_picture, residual_picture
+from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
+from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawn import envelope
+from trihedron.report.numbers import each_with_sigma, engineering_exponent, plain_number, power_of_ten, with_sigma
 from trihedron.sanitise import printable
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
+DEGREES = degrees_from_radians(1.0)
+TWO_SIGMA = 2.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
 _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1, "% of ±250 °/s")}
 """Data-sheet sizes in printed units."""
@@ -30,46 +34,37 @@ _SIGNS = {
 
 def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     """Clocks, mounting, lever arm, both sensors, effects and the replay."""
+    signs = "; ".join(_SIGNS[sign.kind] for sign in found.error.signs)
     facts = [
         ("reference", f"{found.kind}: {found.source}"),
         ("shared motion", f"{found.overlap_s:.1f} s, correlation of the turning rates {found.correlation:.3f}"),
         ("its error", _error(found)),
-        *(
-            [("independent", f"no: {'; '.join(_SIGNS[sign.kind] for sign in found.error.signs)}")]
-            * bool(found.error.signs)
-        ),
+        *([("independent", f"no: {signs}")] if signs else []),
         ("clock", _clock(found)),
-        (
-            "mounting",
-            f"rotation vector {_vector(found.mounting, degrees_from_radians(1.0))}° (log's gyro → reference)",
-        ),
+        ("mounting", f"rotation vector {_vector(found.mounting, DEGREES)}° (log's gyro → reference)"),
     ]
     if found.lever_arm is not None:
         length = 1000.0 * float(np.linalg.norm(found.lever_arm.value))
-        facts.append(
-            ("lever arm", f"{_vector(found.lever_arm, 1000.0)} mm, {length:.1f} mm long (reference → accelerometer)")
-        )
+        arm = f"{_vector(found.lever_arm, 1000.0)} mm, {length:.1f} mm long (reference → accelerometer)"
+        facts.append(("lever arm", arm))
     if found.vertical is not None:
         facts.append(("up", f"{_vector(found.vertical, 1.0)} in the reference's world"))
     if found.earth_rate is not None:
-        facts.append(
-            (
-                "Earth's rate",
-                f"{_vector(found.earth_rate, degrees_from_radians(SECONDS_PER_HOUR))} °/h along"
-                f" the axes of the reference's world{_latitude(found)}",
-            )
-        )
+        rate = _vector(found.earth_rate, degrees_from_radians(SECONDS_PER_HOUR))
+        facts.append(("Earth's rate", f"{rate} °/h along the axes of the reference's world{_latitude(found)}"))
     facts.append(("gyro bias", _bias(found)))
     if found.accelerometer is not None:
         facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
-    facts += [(f"attitude, {r.stage}", _replayed(r.error_rad, r.horizon_s, r.n)) for r in found.replay]
+    for r in found.replay:
+        error, many = plain_number(degrees_from_radians(r.error_rad)), "once" if r.n == 1 else f"{r.n} times"
+        words = f"{error}° after {r.horizon_s:g} s by the gyro alone, cross-validated ({many})"
+        facts.append((f"attitude, {r.stage}", words))
     blocks: list[Block] = [Facts(tuple(facts)), _matrix("Gyro", "ω", "rad/s", found.gyroscope)]
     if found.accelerometer is not None:
         blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
-    for ident, one in found.effects.items():
-        blocks.append(_effect(ident, one))
-    blocks.append(residual_picture(found))
-    return tuple(blocks)
+    blocks += [_effect(ident, one) for ident, one in found.effects.items()]
+    caption = "What is left of the rate, window by window."
+    return (*blocks, Picture("reference", caption, partial(residual_chart, found)))
 
 
 def reference_headlines(found: AgainstReference) -> list[Headline]:
@@ -106,10 +101,7 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
             (
                 printable(one.source),
                 _slow(one.error) + (", not independent" if one.error.signs else ""),
-                ", ".join(
-                    with_sigma(degrees_from_radians(v), degrees_from_radians(s))
-                    for v, s in zip(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), strict=True)
-                ),
+                ", ".join(each_with_sigma(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), DEGREES)),
                 "–" if one.clock_rate_ppm is None else with_sigma(*one.clock_rate_ppm),
             )
             for one in references
@@ -164,10 +156,7 @@ def _bias(found: AgainstReference) -> str:
     """The bias in this recording: at its middle, and its change."""
     bias = found.bias
     k = len(bias.value) // 2
-    middle = ", ".join(
-        with_sigma(degrees_from_radians(v), degrees_from_radians(s))
-        for v, s in zip(bias.value[k], bias.sigma[k], strict=True)
-    )
+    middle = ", ".join(each_with_sigma(bias.value[k], bias.sigma[k], DEGREES))
     moved = plain_number(degrees_from_radians(float(np.ptp(bias.value, axis=0).max())), 2)
     return (
         f"[{middle}] °/s at {bias.time_s[k]:.0f} s, moves by up to {moved} °/s (g-sensitivity at the mean force in it)"
@@ -180,9 +169,8 @@ def _clock(found: AgainstReference) -> str:
     way = "ahead of" if offset >= 0.0 else "behind"
     size = abs(offset)
     if not np.isfinite(sigma):
-        return (
-            f"the reference's is {size:.2f} s {way} the log's, to about a sample: commands do not determine it better"
-        )
+        text = f"the reference's is {size:.2f} s {way} the log's, to about a sample"
+        return f"{text}: commands do not determine it better"
     far = size > 100.0
     digits = f"{size:.4f} s" if far else f"{with_sigma(ms_from_s(size), ms_from_s(sigma))} ms"
     text = f"the reference's is {digits} {way} the log's {where}"
@@ -194,7 +182,7 @@ def _clock(found: AgainstReference) -> str:
 
 
 def _vector(one: Estimate, scale: float) -> str:
-    return "[" + ", ".join(with_sigma(scale * v, scale * s) for v, s in zip(one.value, one.std, strict=True)) + "]"
+    return f"[{', '.join(each_with_sigma(one.value, one.std, scale))}]"
 
 
 def _left(fit: FitToReference, scale: float, unit: str) -> str:
@@ -203,12 +191,6 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
     if fit.n_left_out:
         text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"
     return text
-
-
-def _replayed(error_rad: float, horizon_s: float, n: int) -> str:
-    many = "once" if n == 1 else f"{n} times"
-    error = plain_number(degrees_from_radians(error_rad))
-    return f"{error}° after {horizon_s:g} s by the gyro alone, cross-validated ({many})"
 
 
 def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
@@ -220,15 +202,13 @@ def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
     rows = tuple(
         (
             f"{symbol}_{AXES[i]} =",
-            *(with_sigma(scale * fit.S[i, j], scale * sigma[3 * i + j]) for j in range(3)),
+            *each_with_sigma(fit.S[i], sigma[3 * i : 3 * i + 3], scale),
             with_sigma(fit.b[i], sigma[9 + i]),
         )
         for i in range(3)
     )
-    return Table(
-        ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]"), rows,
-        f"{name} in the reference's body   {symbol} = S {raw}′ + b",
-    )  # fmt: skip
+    head = ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]")
+    return Table(head, rows, f"{name} in the reference's body   {symbol} = S {raw}′ + b")
 
 
 def _effect(ident: str, one: Estimate) -> Table:
@@ -239,12 +219,9 @@ def _effect(ident: str, one: Estimate) -> Table:
         scale = 10.0**-exponent
         units = one.unit.split(", ")
         unit = units[min(k // per, len(units) - 1)]
-        cells = [
-            with_sigma(scale * v, scale * s) for v, s in zip(one.value[k : k + per], one.std[k : k + per], strict=True)
-        ]
-        rows.append(
-            (", ".join(one.names[k : k + per]), *cells, f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip())
-        )
+        cells = each_with_sigma(one.value[k : k + per], one.std[k : k + per], scale)
+        printed = f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip()
+        rows.append((", ".join(one.names[k : k + per]), *cells, printed))
     title = _EFFECTS.get(ident, ident).capitalize()
     if one.score is not None:
         title += f"   score {plain_number(one.score, 3)} (named from {NAMED_FROM:g}{_shown_from(ident, one)})"
@@ -265,3 +242,43 @@ def calibration_result_report(result: CalibrationResult) -> Document:
     """The report of a calibration, with the section on its reference where it has one."""
     document = calibration_report(result.calibration, result.segments, result.recording)
     return beside_reference(document, result.reference, 1)
+
+
+def error_picture(found: AgainstReference, name: str = "reference-error") -> Picture | None:
+    """The reference's error over time; ``None`` where no attitude was integrated for comparison."""
+    if not np.isfinite(found.apart.angle).any():
+        return None
+    walk = plain_number(degrees_from_radians(found.apart.walk), 2)
+    caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
+    caption += "reference's world: the reference's error, and the gyro's random walk of "
+    caption += f"{walk}°/√s. Band: ± 2 σ of the slow error."
+    caption += " Orange: where it stands apart from the rest." if found.error.apart_s else ""
+    caption += " Grey: gaps." if found.error.gaps_s else ""
+    return Picture(name, caption, partial(error_chart, found))
+
+
+def error_chart(found: AgainstReference) -> Chart:
+    """Three angles over the log's time, with the size of the slow error, gaps, and outlying intervals."""
+    apart, error = found.apart, found.error
+    ends = np.array([apart.time_s[0], apart.time_s[-1]])
+    reach = np.full(2, TWO_SIGMA * DEGREES * error.slow_rad[0])
+    marks: list[Mark] = [Band(ends, -reach, reach, "2 σ of its slow error"), Level(y=0.0)]
+    marks += [Span(first, last, "gap", "grey") for first, last in error.gaps_s]
+    marks += [Span(first, last, "apart from the rest", "warn") for first, last in error.apart_s]
+    for k, colour in enumerate(AXIS_COLOURS):
+        marks.append(Line(apart.time_s, DEGREES * apart.angle[:, k], XYZ[k], colour))
+    x = Scale("time [s]", "s", limits=(float(ends[0]), float(ends[1])))
+    return Chart((Panel(x, Scale("reference − gyro [°]", "°"), tuple(marks), height_px=240),))
+
+
+def residual_chart(found: AgainstReference) -> Chart:
+    """Residual rate over time, one panel per axis."""
+    left = DEGREES * found.residual_rate
+    reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
+    panels = []
+    x = Scale("time [s]", "s", limits=(float(found.residual_time_s[0]), float(found.residual_time_s[-1])))
+    for k in range(3):
+        marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
+        y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
+        panels.append(Panel(x, y, marks, height_px=110))
+    return Chart(tuple(panels), is_linked=True, legend=False)

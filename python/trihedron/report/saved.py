@@ -87,7 +87,7 @@ def _converter() -> Converter:
     from cattrs.strategies import configure_tagged_union
 
     made = Converter(unstruct_collection_overrides={tuple: list, Sequence: list}, detailed_validation=False)
-    made.register_unstructure_hook(float, _rounded)
+    made.register_unstructure_hook(float, lambda value: float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None)
     made.register_structure_hook(float, lambda value, _: math.nan if value is None else float(_checked(value, float)))
     for kind in (str, bool, int):
         made.register_structure_hook(kind, lambda value, wanted: _checked(value, wanted))
@@ -117,10 +117,6 @@ _SAID = ("code", "severity", "seen", "cause", "action")
 def _finding(value: dict[str, Any]) -> Finding:
     code, severity, *said = (_checked(value[name], str) for name in _SAID)
     return Finding(FindingCode(code), Severity(severity), *said)
-
-
-def _rounded(value: float) -> float | None:
-    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
 
 
 def _line(values: FloatArray) -> str:

@@ -1,4 +1,4 @@
-"""Report of a segmentation: poses, moves, noise."""
+"""Reports of a recording and of its poses and moves, with the charts of its signals."""
 
 from __future__ import annotations
 
@@ -6,18 +6,21 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES
-from trihedron.records import Recording, Segments, Severity
+from trihedron.arrays import AXES, XYZ
+from trihedron.records import Recording, Segments, Severity, Truth
+from trihedron.report.channels import logged_sensors
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
-from trihedron.report.session_charts import means_chart, signals_chart
+from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
     """Lay out poses and moves, with properties, times and units of the recording where that is given."""
     findings = segments.findings if recording is None else (*recording.findings, *segments.findings)
-    found, still = _counted(segments), f"{duration(_still_s(segments))} in all"
+    found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
+    still = f"{duration(_still_s(segments))} in all"
     facts = (("found", f"{found}, {still} still"),) if recording is None else recording_facts(recording, segments)
     return Document(
         title="Poses and moves",
@@ -60,33 +63,24 @@ def recording_facts(recording: Recording, segments: Segments | None = None) -> t
     return tuple(facts)
 
 
-def _counted(segments: Segments) -> str:
-    return f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
-
-
 def _still_s(segments: Segments) -> float:
     return float(np.sum(segments.duration_s)) if segments.n_poses else 0.0
 
 
 def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
     """Every pose with its means; with the recording also start, end and units."""
-    if recording is None:
-        columns = {
-            "middle [s]": [f"{t:.1f}" for t in segments.time_mid_s],
-            "length [s]": [f"{t:.1f}" for t in segments.duration_s],
-        }
-    else:
-        columns = {
-            "from [s]": [f"{recording.time_s[pose.start]:.2f}" for pose in segments.poses],
-            "to [s]": [f"{recording.time_s[pose.stop - 1]:.2f}" for pose in segments.poses],
-        }
+    times = {"middle [s]": segments.time_mid_s, "length [s]": segments.duration_s}
+    columns = {name: [f"{t:.1f}" for t in of] for name, of in times.items()}
+    if recording is not None:
+        ends = {"from [s]": [p.start for p in segments.poses], "to [s]": [p.stop - 1 for p in segments.poses]}
+        columns = {name: [f"{recording.time_s[at]:.2f}" for at in of] for name, of in ends.items()}
     for letter, sensor in (("a", "accelerometer"), ("w", "gyroscope")):
         mean, sigma = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
         unit = "" if recording is None else f" [{unit_in_print(getattr(recording, f'{sensor}_unit').value)}]"
         if mean is not None:
             sigma = np.full(mean.shape, np.nan) if sigma is None else sigma
             columns |= {
-                f"{letter}′_{axis}{unit}": [with_sigma(float(m), float(s)) for m, s in zip(of, error, strict=True)]
+                f"{letter}′_{axis}{unit}": each_with_sigma(of, error)
                 for axis, of, error in zip(AXES, mean.T, sigma.T, strict=True)
             }
     rows = tuple((str(k + 1), *(cells[k] for cells in columns.values())) for k in range(segments.n_poses))
@@ -99,3 +93,72 @@ def signals_picture(recording: Recording, segments: Segments) -> Picture:
     caption = "The recording; shaded where the sensor stood still"
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture("signals", caption, partial(signals_chart, recording, segments))
+
+
+def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
+    """Both sensors over time; with segments, poses are shaded and disturbances marked."""
+    poses = () if segments is None else segments.poses
+    spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses]
+    bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
+    return _signals(recording, (*spans, *bumps))
+
+
+def _span(recording: Recording, first: int, last: int, name: str = "pose", colour: Colour = "shade") -> Span:
+    end = recording.n_samples - 1
+    start_s, stop_s = (float(recording.time_s[min(at, end)]) for at in (first, last))
+    return Span(start_s, stop_s, name, colour)
+
+
+def truth_chart(recording: Recording, truth: Truth) -> Chart:
+    """Both sensors of a simulation over time, with the true static intervals shaded."""
+    return _signals(recording, tuple(_span(recording, pose.start, pose.stop - 1) for pose in truth.poses))
+
+
+def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
+    panels = []
+    limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
+    for name, readings, unit in logged_sensors(recording):
+        lines = [
+            Line(*envelope(recording.time_s, readings[:, k]), XYZ[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
+        ]
+        printed = unit_in_print(unit)
+        y = Scale(f"{name}  [{printed}]", printed)
+        panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *lines), height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def means_chart(segments: Segments) -> Chart:
+    """Mean readings of every pose over time, in the unit of the log."""
+    panels = []
+    for name, means in (("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)):
+        if means is None:
+            continue
+        marks = tuple(
+            Points(
+                segments.time_mid_s, means[:, k],
+                [said(f"pose {n}, {axis}", v, "") for n, v in enumerate(means[:, k], 1)],
+                None, axis, AXIS_COLOURS[k],
+            )
+            for k, axis in enumerate(XYZ)
+        )  # fmt: skip
+        panels.append(Panel(Scale("time [s]", "s"), Scale(name), marks, height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def recording_summary(recording: Recording) -> Document:
+    """Length, rate, sensors and rows of a log, with its audit."""
+    facts = recording_facts(recording)
+    if recording.rows_in_file:
+        rows = f"{recording.rows_in_file} in the file, {recording.rows_read} read, {recording.rows_reported} reported"
+        facts = (*facts, ("rows", rows))
+    return Document(
+        title="Recording",
+        subtitle=recording.source,
+        verdict=verdict_of(recording.findings, "OK: no problems found.", "Read", "DOUBTFUL"),
+        is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in recording.findings),
+        sections=(
+            Section("Recording", (Facts(facts),)),
+            Section("Findings", (findings_block(recording.findings),)),
+            Section("Figures", (Picture("signals", "The recording.", partial(signals_chart, recording)),)),
+        ),
+    )

@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from pathlib import PurePath
 
 import numpy as np
 
-from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.arrays import FloatArray
+from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, axis_in_print
+from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.frames import Columns
-from trihedron.report.many_charts import sessions_chart, shown
-from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, listed, plain_number, shown, with_sigma
 
-DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
-"""Groups of parameters in the first picture; the others follow below."""
-HEADLINES = {
+DRIFTING = {
     "accel-bias": "accelerometer bias",
     "accel-scale": "accelerometer scale",
     "gyro-bias": "gyroscope bias",
     "gyro-scale": "gyroscope scale",
 }
-
+"""Groups of parameters in the first picture and the headlines; the others follow below."""
+REPEATS = "session to session (1 σ)"
+MOST_NAMED = 6
 BARS = "bars: 1 σ, the bias drift within a recording included"
 NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording."
 
@@ -51,12 +53,14 @@ def sessions_report(model: SessionsModel) -> Document:
         # Names alone are in the title already.
         sections.append(Section("Recordings", (recordings,)))
     sections += [Section("Figures", (picture,)) for picture in _further(model)]
+    names = [session.name for session in model.sessions]
     usable = agree
     if changed:
-        usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
+        parameters = listed(list(dict.fromkeys(change.id for change in changed)))
+        usable = f"{how_many(n, 'recording')} of which {parameters} changed"
     return Document(
         title="Many recordings",
-        subtitle=_named([session.name for session in model.sessions]),
+        subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
         verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
@@ -69,7 +73,7 @@ def sessions_report(model: SessionsModel) -> Document:
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
     """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
     out = []
-    for name, words in HEADLINES.items():
+    for name, words in DRIFTING.items():
         axes = [one for one in model.repeated if one.parameter.id == name]
         if not axes:
             continue
@@ -85,20 +89,11 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
-    chart = partial(sessions_chart, model, DRIFTING, 2)
+    chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
     caption += "; band: session to session (1 σ)." if has_band else "."
     return Picture("drift", caption, chart)
-
-
-def _named(names: list[str]) -> str:
-    return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:3])} ... {names[-1]}"
-
-
-def _and(words: list[str]) -> str:
-    words = list(dict.fromkeys(words))
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def _range(thermal: ThermalModel) -> str:
@@ -132,7 +127,10 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     head = ["parameter", "common ± σ", "session to session", "95 %"]
     head += [between, "95 %"] if grouped else []
     head += ["median σ of one"]
-    rows = [tuple(_row(one, grouped)) for one in model.repeated]
+    rows = []
+    for one in model.repeated:
+        own = plain_number(one.own_std * shown(one.parameter.unit)[0], 2)
+        rows.append((*repeated_cells(one, (one.within, one.between) if grouped else (one.within,)), own))
     return [
         Table(
             tuple(head),
@@ -144,30 +142,21 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     ]
 
 
-def _row(one: Repeated, grouped: bool) -> list[str]:
+def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[str]:
+    """A parameter with its common value, and each of its ``spreads`` with its 95 % interval."""
     factor, unit = shown(one.parameter.unit)
-    value = one.value
+    value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
+    common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
-        value = 0.0
-    elif one.parameter.id.endswith("misalignment"):
-        value -= 0.5 * math.pi
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]"]
-    cells.append(
-        f"± {plain_number(one.std * factor, 2)}"
-        if one.parameter.id.endswith("scale")
-        else with_sigma(value * factor, one.std * factor)
-    )
-    cells += _spread_cells(one.within, factor)
-    if grouped:
-        cells += _spread_cells(one.between, factor)
-    return [*cells, plain_number(one.own_std * factor, 2)]
-
-
-def _spread_cells(spread: Spread | None, factor: float) -> list[str]:
-    if spread is None:
-        return ["–", "–"]
-    low, high = (plain_number(value * factor, 2) for value in (spread.low, spread.high))
-    return ["not detectable" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2), f"{low} to {high}"]
+        common = f"± {plain_number(one.std * factor, 2)}"
+    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]", common]
+    for spread in spreads:
+        if spread is None:
+            cells += ["–", "–"]
+            continue
+        sd, low, high = (plain_number(size * factor, 2) for size in (spread.sd, spread.low, spread.high))
+        cells += [sd if spread.sd else "not detectable", f"{low} to {high}"]
+    return cells
 
 
 def _changes(model: SessionsModel) -> list[Block]:
@@ -186,32 +175,38 @@ def _changes(model: SessionsModel) -> list[Block]:
     ]
 
 
-def _said(change: Change) -> str:
+def change_in_words(change: Change) -> tuple[str, list[str], str]:
+    """What changed from recording to recording, its size along each axis, and their unit."""
     factor, unit = shown(change.unit)
-    pairs = [(size * factor, std * factor) for size, std in zip(change.size, change.std, strict=True)]
-    cells = [plain_number(v, 2) if change.kind == "scatter" else with_sigma(v, s) for v, s in pairs]
-    sizes = ", ".join(f"{axis_in_print(name)} {cell}" for name, cell in zip(change.names, cells, strict=True))
+    sizes = each_with_sigma(change.size, change.std, factor)
+    if change.kind == "scatter":
+        sizes = [plain_number(size * factor, 2) for size in change.size]
     what = {
         "differs": "second less first",
         "apart": f"{change.where} apart",
         "step": f"from {change.where} on",
-        "trend": "each recording by",
-        "scatter": "in every recording, sd",
+        "trend": "per recording",
+        "scatter": "standard deviation",
     }[change.kind]
-    return f"{what}: {sizes} {unit}"
+    return what, sizes, unit
+
+
+def _said(change: Change) -> str:
+    what, sizes, unit = change_in_words(change)
+    along = ", ".join(f"{axis_in_print(name)} {size}" for name, size in zip(change.names, sizes, strict=True))
+    return f"{what}: {along} {unit}"
 
 
 def _thermal(thermal: ThermalModel) -> list[Block]:
     rows = []
     powers = ("", "per °C", "per °C²", "per °C³")
     for term in thermal.terms:
-        factor, unit = shown("1" if term.id.endswith("scale") else _unit(term.id))
+        factor, unit = shown(next(one.unit for one in PARAMETERS if one.id == term.id))
         for k in range(term.order + 1):
-            values = term.coefficients[k] * factor
-            sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) * factor for axis in range(3)]
             if k == 0 and term.id.endswith(("scale", "misalignment")):
                 continue
-            cells = [with_sigma(float(v), s) for v, s in zip(values, sigma, strict=True)]
+            sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) for axis in range(3)]
+            cells = each_with_sigma(term.coefficients[k], sigma, factor)
             rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
         spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
         rows.append((f"{term.id}, order {term.order}: what remains [{unit}]", *spread))
@@ -225,10 +220,6 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
         ),
         Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis"),
     ]
-
-
-def _unit(name: str) -> str:
-    return {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(name, "rad")
 
 
 def _sessions(model: SessionsModel) -> Table:
@@ -252,48 +243,73 @@ def _further(model: SessionsModel) -> list[Picture]:
     return [Picture("sessions", caption, chart)] if others else []
 
 
-def sessions_columns(model: SessionsModel) -> Columns:
-    """A row per parameter: common value, standard error, spreads with their intervals (SI)."""
-    columns: dict[str, list[Any]] = {
-        "id": [one.parameter.id for one in model.repeated],
-        "name": [one.parameter.name for one in model.repeated],
-        "unit": [one.parameter.unit for one in model.repeated],
-        "value": [one.value for one in model.repeated],
-        "std": [one.std for one in model.repeated],
+def _short_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Short names of files for an axis, without a file name or an ending that all share."""
+    paths = [PurePath(name) for name in names]
+    if len(paths) > 1 and len({path.name for path in paths}) == 1 and all(path.parent.name for path in paths):
+        return tuple(str(path.parent) for path in paths)
+    is_shared = len({path.suffix for path in paths}) == 1
+    return tuple(str(path.with_suffix("")) if is_shared else str(path) for path in paths)
+
+
+def _compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
+    """(n,) variance of parameter ``k`` for comparing recordings: that of each plus the mean drift of its group."""
+    drift = {
+        group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in {s.group for s in sessions}
     }
-    for kind in ("within", "between"):
-        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
-        for part in ("sd", "low", "high"):
-            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
-    return dict(columns)
+    return np.array([max(s.covariance[k, k] + drift[s.group], 0.0) for s in sessions])
 
 
-def session_record(session: Session) -> dict[str, object]:
-    """One recording's parameters for JSON: ``values`` with their ``covariance``, the variance of the bias drift."""
-    named = {"numbers": "values", "drift": "bias_drift_variance"}
-    record = {named.get(name, name): value for name, value in vars(session).items()}
-    return {**record, "temperature_range_degc": list(session.temperature_range_degc)}
+def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
+    """One panel per id: deviations from the common value, over temperature where modelled; ``only`` these ids."""
+    places = np.arange(1.0, len(model.sessions) + 1.0)
+    names = _short_names([session.name for session in model.sessions])
+    x = Scale("recording", whole=True, names=names, limits=(0.5, len(places) + 0.5))
+    if model.thermal is not None:
+        places = np.array([session.temperature_degc for session in model.sessions])
+        x = Scale("temperature [°C]", "°C")
+    panels = []
+    for name in dict.fromkeys(one.parameter.id for one in model.repeated):
+        if only and name not in only:
+            continue
+        picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
+        unit = shown(PARAMETERS[picked[0]].unit)[1]
+        # The bands of all axes lie behind their points.
+        bands = [band for k in picked[::-1] for band in _band(model, k, len(places))]
+        marks: list[Mark] = [*bands, Level(y=0.0)]
+        for axis, k in enumerate(picked):
+            marks += _deviations(model, k, axis, places)
+        panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
+    return Chart(tuple(panels), columns=columns, is_linked=True)
 
 
-def sessions_record(model: SessionsModel) -> dict[str, object]:
-    """The content of the report as plain types (SI)."""
-    return {
-        "by": model.by,
-        "is_trustworthy": model.is_trustworthy,
-        "sessions": [session_record(session) for session in model.sessions],
-        "parameters": [
-            {
-                **vars(one.parameter),
-                "value": one.value,
-                "std": one.std,
-                "interval": [one.value - one.half_width, one.value + one.half_width],
-                "within": None if one.within is None else vars(one.within),
-                "between": None if one.between is None else vars(one.between),
-                "own_std": one.own_std,
-            }
-            for one in model.repeated
-        ],
-        "changes": [vars(change) for change in model.changes],
-        "excluded": [{"source": source, "reason": why} for source, why in model.left_out],
-        "findings": [finding.to_dict() for finding in model.findings],
-    }
+def _band(model: SessionsModel, k: int, n: int) -> list[Mark]:
+    """The spread of parameter ``k`` between sessions, where it is not described by temperature."""
+    spread = model.repeated[k].within
+    if model.thermal is not None or spread is None:
+        return []
+    reach = np.full(2, spread.sd * shown(PARAMETERS[k].unit)[0])
+    return [Band(np.array([0.5, n + 0.5]), -reach, reach, REPEATS)]
+
+
+def _deviations(model: SessionsModel, k: int, axis: int, places: FloatArray) -> list[Mark]:
+    """Parameter ``k``, one ``axis`` of its group, in every recording, and its curve over temperature."""
+    parameter, colour = PARAMETERS[k], AXIS_COLOURS[axis]
+    factor, unit = shown(parameter.unit)
+    centre, marks = model.repeated[k].value, list[Mark]()
+    if model.thermal is not None:
+        term = next(term for term in model.thermal.terms if term.id == parameter.id)
+        column = term.coefficients[:, axis]
+        centre = float(column[0])
+        along = np.linspace(places.min(), places.max(), 80)
+        curve = (along - model.thermal.reference_degc)[:, None] ** np.arange(len(column)) @ column - centre
+        marks.append(Line(along, curve * factor, "", colour, is_thin=True))
+    values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
+    error = np.sqrt(_compared_variance(model.sessions, k)) * factor
+    name = axis_in_print(parameter.name)
+    told = [
+        said(f"{session.name}, {name}", v, f"± {e:.2g} {unit}")
+        for session, v, e in zip(model.sessions, values, error, strict=True)
+    ]
+    step = 0.12 * max(float(np.ptp(places)) / max(len(places) - 1, 1), 1e-9)
+    return [*marks, Points(places + (axis - 1) * step, values, told, error, name, colour)]

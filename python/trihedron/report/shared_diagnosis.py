@@ -8,13 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.numbers import listed, plain_number, with_sigma
+
+TWO_SIGMA = 2.0
+ROW_PX = 26
+COLUMNS = 3
+BAR = 0.7
+"""Height of a bar as a fraction of its row."""
+LONGEST = 16
+"""Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 
 
 def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
@@ -27,6 +34,8 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         verdict = f"{listed(own)} {verb} to the instrument: one size fits all recordings."
     elif found.effects:
         verdict = f"{listed([one.id for one in found.effects])} differs from recording to recording."
+    tried = tuple((one.id, plain_number(one.score)) for one in found.candidates)
+    n_alone = sum(map(bool, found.of_single_recordings))
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
@@ -35,23 +44,15 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
-            Section(
-                "Candidates",
-                (Table(("effect", "score together"), _candidates(found), "The catalogue"),),
-            ),
+            Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
         stated_level="usable" if found.effects else "good",
-        headlines=_headlines(found),
+        headlines=(
+            Headline("recordings", str(len(found.diagnoses)), "", f"{n_alone} with effects of their own"),
+            Headline("shared effects", str(len(own)), "", "of the instrument"),
+        ),
         lead=_lead(found, names),
         next_step=_next_step(found, own),
-    )
-
-
-def _headlines(found: SharedDiagnosis) -> tuple[Headline, ...]:
-    n_named = sum(bool(alone) for alone in found.of_single_recordings)
-    return (
-        Headline("recordings", str(len(found.diagnoses)), "", f"{n_named} with effects of their own"),
-        Headline("shared effects", str(sum(one.is_of_instrument for one in found.effects)), "", "of the instrument"),
     )
 
 
@@ -83,15 +84,9 @@ def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for k, effect in enumerate(found.effects):
         alone = ", ".join(plain_number(score) for score in effect.scores)
-        blocks.append(
-            Facts(
-                (
-                    (f"{k + 1}. {effect.id}", f"score {plain_number(effect.score)} together; {alone} in each"),
-                    ("", _agreement(effect)),
-                )
-            )
-        )
-        blocks.append(_parameters(effect, names))
+        scores = f"score {plain_number(effect.score)} together; {alone} in each"
+        facts = Facts(((f"{k + 1}. {effect.id}", scores), ("", _agreement(effect))))
+        blocks += [facts, _parameters(effect, names)]
     return tuple(blocks)
 
 
@@ -107,13 +102,10 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
     for i, common in enumerate(effect.parameters):
         largest = max(abs(one[i].value) for one in (effect.parameters, *effect.each))
         scale, unit = parameter_unit(common.unit, largest)
-        cells = [_cell(one[i], scale) for one in (effect.parameters, *effect.each)]
+        found = [one[i] for one in (effect.parameters, *effect.each)]
+        cells = [value_in_words(scale * one.value, scale * one.std) for one in found]
         rows.append((common.name, *cells, unit))
     return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
-
-
-def _cell(one: EffectParameter, scale: float) -> str:
-    return value_in_words(scale * one.value, scale * one.std)
 
 
 def _each(found: SharedDiagnosis, names: list[str]) -> Table:
@@ -124,10 +116,6 @@ def _each(found: SharedDiagnosis, names: list[str]) -> Table:
     return Table(("recording", "verdict", "named here alone"), rows, "Recordings by themselves")
 
 
-def _candidates(found: SharedDiagnosis) -> tuple[tuple[str, ...], ...]:
-    return tuple((one.id, plain_number(one.score)) for one in found.candidates)
-
-
 def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
     """The content of the report as plain types (SI)."""
     return {
@@ -136,15 +124,6 @@ def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
         "candidates": [one.to_dict() for one in found.candidates],
         "diagnoses": [one.to_dict() for one in found.diagnoses],
     }
-
-
-TWO_SIGMA = 2.0
-ROW_PX = 26
-COLUMNS = 3
-BAR = 0.7
-"""Height of a bar as a fraction of its row."""
-LONGEST = 16
-"""Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 
 
 def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:

@@ -14,25 +14,26 @@ from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
-from trihedron.report.session_charts import truth_chart
+from trihedron.report.segments import truth_chart
 
 
 def simulation_report(recording: Recording, truth: Truth) -> Document:
     """Lay out a simulation: its motion, the effects switched on, the true parameters."""
     n = len(truth.effects)
     effects = f"{how_many(n, 'effect')} beyond the linear model" if n else "no effect beyond the linear model"
+    poses, moves = how_many(len(truth.poses), "pose"), how_many(len(truth.moves), "move")
     facts = (
         ("scenario", f"{truth.scenario or 'its own'}, seed {truth.seed}"),
         ("length", f"{duration(recording.duration_s)}, {how_many(recording.n_samples, 'sample')}"),
         ("rate", f"{plain_number(recording.rate_hz, 5)} Hz"),
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
-        ("motion", f"{how_many(len(truth.poses), 'pose')}, {how_many(len(truth.moves), 'move')}"),
+        ("motion", f"{poses}, {moves}"),
     )
+    caption = "The simulated log; shaded where the body truly stood still."
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=f"{how_many(len(truth.poses), 'pose')} and {how_many(len(truth.moves), 'move')} of an instrument with "
-        f"{effects}. The truth below is not in the log.",
+        verdict=f"{poses} and {moves} of an instrument with {effects}. The truth below is not in the log.",
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
@@ -41,14 +42,10 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         ),
         next_step="Calibrate the log (trihedron calibrate LOG) and compare with the truth (--truth FILE keeps it).",
         headlines=(
-            Headline("poses", str(len(truth.poses)), "", how_many(len(truth.moves), "move")),
+            Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
         ),
-        lead=Picture(
-            "signals",
-            "The simulated log; shaded where the body truly stood still.",
-            partial(truth_chart, recording, truth),
-        ),
+        lead=Picture("signals", caption, partial(truth_chart, recording, truth)),
     )
 
 

@@ -24,6 +24,8 @@ _FEWEST, _FEWEST_OF_HEADS = 16, 9
 # The sixteen ANSI colours, which follow the terminal's theme.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
+Grid = list[list[list[str]]]
+"""Rows of cells, each of one line or more; the first row is the head."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,11 @@ def _block(block: Block, style: Style) -> list[str]:
     if isinstance(block, Table):
         return _table(block, style)
     if isinstance(block, FindingList):
-        return [line for finding in block.findings for line in finding_lines(finding, style)]
+        return [line for finding in block.findings for line in _finding_lines(finding, style)]
     return []
 
 
-def finding_lines(finding: Finding, style: Style) -> list[str]:
+def _finding_lines(finding: Finding, style: Style) -> list[str]:
     """Observation, cause and next action, indented below the severity."""
     name, width = finding.severity.value, style.width
     first, *rest = _wrap(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
@@ -144,10 +146,6 @@ def _table(table: Table, style: Style) -> list[str]:
     return out
 
 
-Grid = list[list[list[str]]]
-"""Rows of cells, each of one line or more; the first row is the head."""
-
-
 def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     return [[[cell] for cell in row] for row in rows], _GAP
 
@@ -155,19 +153,18 @@ def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     """Heads wrapped to the width of their columns."""
     grid, gap = _as_it_is(rows)
-    room = _widths(grid[1:]) if len(grid) > 1 else [0] * len(rows[0])
-    grid[0] = [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)]
-    return grid, gap
+    return [_heads(rows[0], grid[1:]), *grid[1:]], gap
+
+
+def _heads(heads: Sequence[str], below: Grid) -> list[list[str]]:
+    room = _widths(below) if below else [0] * len(heads)
+    return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, room, strict=True)]
 
 
 def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
     """Heads wrapped, uncertainties below their values, and narrower gaps."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
-    room = _widths(low) if low else [0] * len(rows[0])
-    return [
-        [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(rows[0], room, strict=True)],
-        *low,
-    ], _NARROW_GAP
+    return [_heads(rows[0], low), *low], _NARROW_GAP
 
 
 def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:

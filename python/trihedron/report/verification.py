@@ -7,24 +7,42 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
+from trihedron.arrays import BoolArray
+from trihedron.records import FindingCode, Recording, Segments, Verification
+from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
+from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import how_many, in_mm_s2, listed, plain_number, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
 from trihedron.report.segments import signals_picture
-from trihedron.report.session_charts import verification_chart
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 _ABOVE_NOISE = {
     FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
     FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
 }
+USE = "Use the calibration: trihedron apply, trihedron export."
+ALLOWED = "3 σ of noise and calibration uncertainty"
+LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
+"""Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
 
 def verification_report(
     verification: Verification, segments: Segments | None = None, recording: Recording | None = None
 ) -> Document:
     """Lay out a verification."""
+    v = verification
+    made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
+    above = [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
+    usable = "Verified"
+    if above:
+        errors = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above)
+        usable = f"Doubtful: {listed(list(errors))} above noise and uncertainty"
+    good = "Verified: errors are within noise and uncertainty."
+    caption = (
+        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow."
+    )
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
@@ -35,47 +53,20 @@ def verification_report(
         sections.append(Section("Figures", (signals_picture(recording, segments),)))
     return Document(
         title="Verification",
-        subtitle=_subtitle(verification),
-        verdict=verdict_of(
-            verification.findings,
-            "Verified: errors are within noise and uncertainty.",
-            _usable(verification),
-            "NOT VERIFIED",
-        ),
+        subtitle=f"{made_from}, tested on {v.source}",
+        verdict=verdict_of(v.findings, good, usable, "NOT VERIFIED"),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
         headlines=headlines_of(verification),
-        lead=_errors_picture(verification),
-        next_step=_next_step(verification),
+        lead=Picture("errors", caption, partial(verification_chart, v)),
+        # Advice about the errors; else to use the calibration, unless it is rejected.
+        next_step=above[0].action if above else USE if v.is_passed else "",
     )
-
-
-def _subtitle(v: Verification) -> str:
-    made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    return f"{made_from}, tested on {v.source}"
 
 
 def _expected(size: str, chi2_per_dof: float) -> str:
     """The expected size by noise and the calibration's uncertainty, and χ²/dof, which decides."""
     return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
-
-
-def _usable(v: Verification) -> str:
-    """``Verified``, or the errors that exceed noise and uncertainty."""
-    above = {finding.code: _ABOVE_NOISE[finding.code] for finding in _above_noise(v)}
-    return f"Doubtful: {listed(list(above.values()))} above noise and uncertainty" if above else "Verified"
-
-
-def _next_step(v: Verification) -> str:
-    """The action of the finding about the errors; else advice to use the calibration; empty where it is rejected."""
-    above = _above_noise(v)
-    if above or not v.is_passed:
-        return above[0].action if above else ""
-    return USE
-
-
-def _above_noise(v: Verification) -> list[Finding]:
-    return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
@@ -107,36 +98,30 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
+        without = ", ".join(str(k + 1) for k in v.moves_left_out)
+        without = f"; without move {without}, where the gyro was at its limit" if without else ""
         facts += [
             (
                 "tilt error after a rotation",
                 f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
-                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{_without(v)}",
+                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{without}",
             ),
             ("  expected", f"{plain_number(v.angle_expected_deg)}° {allowed} {plain_number(v.angle_chi2_per_dof, 2)}"),
         ]
     biases = [one for one in v.parameters if one.id == "gyro-bias"]
     if biases:
         sigmas = [math.hypot(one.sigma_file, one.sigma_log) for one in biases]
-        changes = ", ".join(
-            with_sigma(degrees_from_radians(-one.difference), degrees_from_radians(sigma))
-            for one, sigma in zip(biases, sigmas, strict=True)
-        )
+        changed = each_with_sigma([-one.difference for one in biases], sigmas, degrees_from_radians(1.0))
+        changes = ", ".join(changed)
         facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z) since the calibration"))
     return tuple(facts)
-
-
-def _without(v: Verification) -> str:
-    if not v.moves_left_out:
-        return ""
-    return f"; without move {', '.join(str(k + 1) for k in v.moves_left_out)}, where the gyro was at its limit"
 
 
 def parameters_table(v: Verification) -> Table:
     """Every parameter: file minus log, both uncertainties, and whether the log determines it."""
     rows = []
     for one in v.parameters:
-        scale, unit = _SHOWN.get(one.unit, (1.0, one.unit))
+        scale, unit = (mrad_from_radians(1.0), "mrad") if one.unit == "rad" else shown(one.unit)
         sigma = plain_number(scale * one.sigma_log, 2) if np.isfinite(one.sigma_log) else "unknown"
         stated = plain_number(scale * one.sigma_file, 2) if one.sigma_file > 0.0 else "not stated"
         differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
@@ -147,55 +132,74 @@ def parameters_table(v: Verification) -> Table:
     return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
 
 
-USE = "Use the calibration: trihedron apply, trihedron export."
-_SHOWN = {
-    "m/s^2": (1000.0, "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "rad": (1000.0, "mrad"),
-    "1": (100.0, "%"),
-}
-
-
-def _tables(verification: Verification, segments: Segments | None) -> list[Block]:
-    v = verification
-    rows = tuple(
+def _tables(v: Verification, segments: Segments | None) -> list[Block]:
+    errors = each_with_sigma(v.norm_error, v.norm_sigma, mm_s2_from_m_s2(1.0))
+    rows: tuple[tuple[str, ...], ...] = tuple(
         (
             str(k + 1),
             "" if segments is None else plain_number(float(segments.time_mid_s[k]), 4),
-            with_sigma(mm_s2_from_m_s2(float(v.norm_error[k])), mm_s2_from_m_s2(float(v.norm_sigma[k]))),
+            error,
             plain_number(float(v.norm_error[k] / v.norm_sigma[k]), 2),
         )
-        for k in range(len(v.norm_error))
+        for k, error in enumerate(errors)
     )
-    blocks: list[Block] = [
-        Table(
-            ("pose", "mid [s]", "|f| − |g| [mm/s²]", "in σ"),
-            rows,
-            "Gravity error of every pose ± noise and the calibration's uncertainty",
-        )
-    ]
+    head = ("pose", "mid [s]", "|f| − |g| [mm/s²]", "in σ")
+    blocks: list[Block] = [Table(head, rows, "Gravity error of every pose ± noise and the calibration's uncertainty")]
     if len(v.angle_deg):
-        rows = tuple(
-            (
-                str(v.moves[k] + 1),
-                plain_number(float(v.angle_deg[k]), 2),
-                plain_number(float(v.angle_noise_deg[k]), 2),
-                plain_number(float(v.angle_sigma_deg[k]), 2),
-            )
-            for k in range(len(v.angle_deg))
-        )
+        columns = zip(v.angle_deg, v.angle_noise_deg, v.angle_sigma_deg, strict=True)
+        moves = zip(v.moves, columns, strict=True)
+        rows = tuple((str(k + 1), *(plain_number(float(angle), 2) for angle in angles)) for k, angles in moves)
         head = ("move", "tilt error [°]", "noise alone [°]", "noise and uncertainty [°]")
-        blocks.append(
-            Table(
-                head, rows, "Tilt error after every rotation: gravity predicted with the gyro against gravity measured"
-            )
-        )
+        caption = "Tilt error after every rotation: gravity predicted with the gyro against gravity measured"
+        blocks.append(Table(head, rows, caption))
     return blocks
 
 
-def _errors_picture(verification: Verification) -> Picture:
-    return Picture(
-        "errors",
-        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow.",
-        partial(verification_chart, verification),
+def verification_chart(verification: Verification) -> Chart:
+    """Gravity error of every pose and tilt error after every move, with their expected size."""
+    v = verification
+    pose = np.arange(1, len(v.norm_error) + 1, dtype=np.float64)
+    error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
+    edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
+    limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
+    told = [
+        said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
+        for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
+    ]
+    norm = Panel(
+        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
+        Scale("|f| − |g|  [mm/s²]", "mm/s²"),
+        (
+            Band(edge, -limit, limit, ALLOWED),
+            Level(y=0.0),
+            *(
+                Points(pose[part], error[part], [told[i] for i in np.flatnonzero(part)], None, name, colour)
+                for part, name, colour in _parted(np.abs(error) > LIMIT_SIGMAS * sigma)
+            ),
+        ),
     )
+    if not len(v.angle_deg):
+        return Chart((norm,))
+    move = (v.moves + 1).astype(np.float64)
+    told = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
+    limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
+    moves = Panel(
+        Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
+        Scale("tilt error  [°]", "°", includes=(0.0,)),
+        (
+            Band(edge, 0.0 * limit, limit, ALLOWED),
+            *(
+                Bars(move[part], v.angle_deg[part], 0.7, [told[i] for i in np.flatnonzero(part)], name, colour)
+                for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
+            ),
+        ),
+        height_px=180,
+    )
+    return Chart((norm, moves))
+
+
+def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:
+    """Masks, names and colours of the points within and beyond the 3 σ band, without empty ones."""
+    parts: list[tuple[BoolArray, str, Colour]] = [(~is_beyond, "within 3 σ", "c1"), (is_beyond, "beyond 3 σ", "accent")]
+    return [part for part in parts if part[0].any()]

@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from trihedron.report.effects import accelerometer, gyroscope, session
-from trihedron.report.effects.entry import EffectWords
-from trihedron.report.effects.reasons import REASONS
+from trihedron.report.effects.words import ACCELEROMETER, GYROSCOPE, SESSION, EffectWords
 from trihedron.report.findings.wording import filled
 
-ENTRIES: tuple[EffectWords, ...] = (*accelerometer.ENTRIES, *gyroscope.ENTRIES, *session.ENTRIES)
-CATALOGUE: Mapping[str, EffectWords] = MappingProxyType({entry.id: entry for entry in ENTRIES})
+CATALOGUE: Mapping[str, EffectWords] = MappingProxyType(ACCELEROMETER | GYROSCOPE | SESSION)
 OF_ANY: Mapping[str, str] = MappingProxyType(
     {
         "strongest": "{mechanism} (strongest term {name}: {value:.3g} ± {std:.1g} {unit}).",
@@ -21,6 +18,22 @@ OF_ANY: Mapping[str, str] = MappingProxyType(
     }
 )
 """Sentences that any effect may use, by case."""
+REASONS: Mapping[str, str] = MappingProxyType(
+    {
+        "no-gyro": "the log has no gyro",
+        "no-moves": "the log has no moves with a gyro",
+        "six-moves": "fewer than six moves with a gyro",
+        "no-temperature": "the log has no temperature",
+        "steady-temperature": "the temperature changes by less than {least_k:g} °C",
+        "no-supply": "the log has no supply voltage",
+        "steady-supply": "the supply voltage does not change",
+        "even-vibration": "no pose vibrates more than the others",
+        "no-table-turns": "the session has no turns on a table against a wall",
+        "six-poses": "fewer than six poses",
+        "few-orientations": "the log has too few orientations",
+    }
+)
+"""Why a recording cannot show an effect: the words of a candidate that was not tried."""
 
 
 def effect_words(effect_id: str, case: str, values: Mapping[str, Any]) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from trihedron.report.effects.catalogue import ENTRIES
-from trihedron.report.effects.entry import EffectWords
+from trihedron.report.effects.catalogue import CATALOGUE
+from trihedron.report.effects.words import EffectWords
 from trihedron.report.findings.page import shown
 
 _HEAD = """# Effects
@@ -19,11 +19,11 @@ This page is made from the catalogue (`python/trihedron/report/effects/`).
 
 def page() -> str:
     """Markdown, by id in alphabetical order."""
-    return _HEAD + "".join(_told(entry) for entry in sorted(ENTRIES, key=lambda entry: entry.id))
+    return _HEAD + "".join(_told(*entry) for entry in sorted(CATALOGUE.items()))
 
 
-def _told(entry: EffectWords) -> str:
-    lines = [f"\n## {entry.id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
+def _told(effect_id: str, entry: EffectWords) -> str:
+    lines = [f"\n## {effect_id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
     lines += [f"*Said:* {shown(text)}" for text in entry.said.values()]
     lines.append(f"*Separating experiment:* {entry.experiment}.")
     if entry.experiment_at_rest:

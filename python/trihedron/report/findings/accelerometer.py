@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _UNQUIET = "Poses not quite still, bias drift between poses, nonlinearity, or noise of the means underestimated."
 _LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
 _ADD_POSES = "Add poses with {advice:numbered}."
 _FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
 _FACES_OR_POSES += "{advice:numbered}."
 
-ENTRIES = (
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "poses",
-        WARNING,
+ENTRIES = {
+    (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
         "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
         "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard "
         "uncertainties of the accelerometer are multiplied by {widening:.3g}.",
         _UNQUIET,
         _LOOK,
     ),
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "poses-joint",
-        WARNING,
+    (Code.RESIDUAL_ABOVE_NOISE, "poses-joint", WARNING): Words(
         "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
         "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit "
         "includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, level axes "
@@ -35,134 +26,92 @@ ENTRIES = (
         _UNQUIET,
         _LOOK,
     ),
-    Entry(
-        Code.NOT_OBSERVABLE,
-        "poses-rank",
-        SERIOUS,
+    (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
         "{unseen:&, }, constrained to {anchor:.0f %} of an ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _FACES_OR_POSES,
     ),
-    Entry(
-        Code.NOT_OBSERVABLE,
-        "poses-weak",
-        SERIOUS,
+    (Code.NOT_OBSERVABLE, "poses-weak", SERIOUS): Words(
         "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
         "gravity; least certain is the {weakest}. All parameters were constrained to {anchor:.0f %} of an ideal triad.",
         "The orientations are too much alike.",
         _FACES_OR_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
-    Entry(
-        Code.WEAKLY_OBSERVABLE,
-        "poses",
-        WARNING,
+    (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
         "In some orientations gravity is predicted {times_worse:.2g} times as uncertainly as one pose measures it; "
         "least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
-    Entry(
-        Code.OUTLIER_POSE,
-        "",
-        WARNING,
+    (Code.OUTLIER_POSE, "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
         "The sensor was touched or not still in this pose, or a reading clipped.",
         "Exclude the pose, or use a robust loss (--loss).",
     ),
-    Entry(
-        Code.HELD_OUT_WORSE,
-        "poses",
-        WARNING,
+    (Code.HELD_OUT_WORSE, "poses", WARNING): Words(
         "Cross-validated poses have {held_out_z_rms:.2g} times their predicted error.",
         "The fit follows its own poses too closely: too few of them, or an effect that a linear model does not have.",
         "Record more poses; see `trihedron diagnose`.",
     ),
-    Entry(
-        Code.NONLINEAR_RESIDUAL,
-        "poses",
-        SERIOUS,
+    (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_cubic:?a cubic nonlinearity|{is_quadratic:?a quadratic "
         "nonlinearity|a scale that differs between + and -}} (p = {p:.1g}): S and b are off by up to "
         "{shift_m_s2:.2g mm/s²} at 1 g, {shift_sigma:.2g} σ of what noise alone would leave.",
         "An accelerometer that is not linear, or one driven near its range limit.",
         "Run `trihedron diagnose`: it names the effect and calibrates with it.",
     ),
-    Entry(
-        Code.NONLINEAR_RESIDUAL,
-        "not-excluded",
-        WARNING,
+    (Code.NONLINEAR_RESIDUAL, "not-excluded", WARNING): Words(
         "The gravity error in static poses exceeds noise: bias repeatability or nonlinearity. Nonlinearity may put the "
         "scale off by {scale_part:.2g %} (1 σ); the uncertainties of S and b include it and are up to {widening:.2g} "
         "times as large.",
         "Too few poses to separate the two, or an accelerometer that is not linear.",
         "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
     ),
-    Entry(
-        Code.LEFT_HANDED,
-        "accelerometer",
-        WARNING,
+    (Code.LEFT_HANDED, "accelerometer", WARNING): Words(
         "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
         "The documented direction of one axis (or of all three) is wrong, or two axes are swapped.",
         "Check the axis directions printed on the board against a pose with one axis up.",
         numbers=("det_S_sign",),
     ),
-    Entry(
-        Code.LEFT_HANDED,
-        "accelerometer-signs-asked",
-        WARNING,
+    (Code.LEFT_HANDED, "accelerometer-signs-asked", WARNING): Words(
         "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
         "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Poses alone "
         "do not determine signs; these are the ones given.",
         "Check the axis directions printed on the board against a pose with one axis up.",
         numbers=("det_S_sign",),
     ),
-    Entry(
-        Code.SCALE_NOT_NOMINAL,
-        "accelerometer",
-        WARNING,
+    (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(
         "The scale of {axis:axis} is {scale_ratio:.4g} although the log is in {unit}.",
         "The log is in another unit than stated, or |g| is wrong.",
         "State the unit of the log and |g|.",
     ),
-    Entry(
-        Code.NOT_CONVERGED,
-        "accelerometer",
-        SERIOUS,
+    (Code.NOT_CONVERGED, "accelerometer", SERIOUS): Words(
         "The accelerometer fit did not converge ({stopped_because}).",
         "Poses contradict each other, or hardly differ.",
         "Check that every pose was still; add poses.",
     ),
-    Entry(
-        Code.POSE_NOT_A_FACE,
-        "",
-        NOTE,
+    (Code.POSE_NOT_A_FACE, "", NOTE): Words(
         "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
         "used by --method faces (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
         "--method joint uses them all.",
     ),
-    Entry(
-        Code.TABLE_TILT,
-        "",
-        WARNING,
+    (Code.TABLE_TILT, "", WARNING): Words(
         "The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if each pose were tilted by "
         "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard uncertainties include this tilt.",
         "The table is not level, the case is not square or did not lie flat; bias drift looks the same.",
         "Level the table, press the case flat, or use --method joint, which needs neither.",
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "verify-rest",
-        WARNING,
+    (Code.RESIDUAL_ABOVE_NOISE, "verify-rest", WARNING): Words(
         "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, most in pose "
         "{worst_pose} ({worst_m_s2:.3g mm/s²}); χ²/dof {chi2_per_dof:.2g}, each pose weighted by its uncertainty.",
         "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
         "Look at pose {worst_pose} first; if it was still, calibrate again near the conditions of use.",
         or_severity=SERIOUS,
     ),
-)
+}

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "
 _MANY += "after the change."
 
-_CALIBRATE = (
-    Entry(
-        Code.GRAVITY_DEFAULTED,
-        "",
-        WARNING,
+_CALIBRATE = {
+    (Code.GRAVITY_DEFAULTED, "", WARNING): Words(
         "Gravity was not given; {gravity_m_s2} m/s² was used. Where people live it lies between {low_m_s2:.3f} and "
         "{high_m_s2:.3f} m/s², and its error goes into every scale and bias of the accelerometer: up to "
         "{possible_error_percent:.1f} % that no residual shows and no ± contains.",
         "Neither --gravity nor --latitude was given.",
         "Give --latitude DEG (and --height M), or --gravity M_S2.",
     ),
-    Entry(
-        Code.JOINT_FIT_LEFT,
-        "",
-        NOTE,
+    (Code.JOINT_FIT_LEFT, "", NOTE): Words(
         "The moves contradict the poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
         "explains 28); the accelerometer was therefore fitted to the poses alone, and the gyro to the moves with "
         "that accelerometer.",
@@ -32,242 +23,164 @@ _CALIBRATE = (
         "accelerometer.",
         "Use --method separate to choose this from the start.",
     ),
-    Entry(
-        Code.TURN_ANGLE_UNKNOWN,
-        "",
-        SERIOUS,
+    (Code.TURN_ANGLE_UNKNOWN, "", SERIOUS): Words(
         "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
         "Give the angles with --turns.",
         "Nothing in the log determines the gyro's scale: no unit, no nominal scale, and no moves that turn gravity "
         "well enough to exclude half and twice.",
         "Give --turns 180,-180,... (one angle a turn, 0 excludes it), or --gyro-nominal.",
     ),
-    Entry(
-        Code.GYROSCOPE_LEFT_OUT,
-        "not-calibrated",
-        WARNING,
+    (Code.GYROSCOPE_LEFT_OUT, "not-calibrated", WARNING): Words(
         "The gyro was not calibrated: {why}.",
         "The recording does not hold what the gyro needs.",
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
     ),
-    Entry(
-        Code.NOT_FIT,
-        "no-calibration",
-        SERIOUS,
+    (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
         "No calibration can be made from this log: {why}",
         "The log does not hold what a calibration needs.",
         "Hold the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
     ),
-    Entry(
-        Code.NOT_FIT,
-        "few-orientations",
-        NOTE,
+    (Code.NOT_FIT, "few-orientations", NOTE): Words(
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
         "A static log, a chamber log or a table that stands still.",
         "To test those too, hold 18 or more poses of 3 to 5 s in different directions.",
         numbers=("n_poses",),
     ),
-)
+}
 
-_VERIFIED = (
-    Entry(
-        Code.CALIBRATION_SHIFT,
-        "",
-        WARNING,
+_VERIFIED = {
+    (Code.CALIBRATION_SHIFT, "", WARNING): Words(
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
         "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:first 8}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters; calibrate several sessions together to learn how far each repeats.",
     ),
-    Entry(
-        Code.WORSE_THAN_UNCALIBRATED,
-        "verify-rest",
-        SERIOUS,
+    (Code.WORSE_THAN_UNCALIBRATED, "verify-rest", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
         "{rms_without:.3g mm/s²} without.",
         "A wrong file, unit, axis or sign, or a calibration of too few poses.",
         "Do not use it: check that file, unit and device belong together.",
     ),
-    Entry(
-        Code.WORSE_THAN_UNCALIBRATED,
-        "verify-moves",
-        SERIOUS,
+    (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "A wrong file, unit, axis or sign, or a calibration of too few rotations.",
         "Do not use it: check that file, unit and device belong together.",
     ),
-    Entry(
-        Code.CALIBRATION_SHIFT,
-        "gyro-bias",
-        SERIOUS,
+    (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed.",
         "A bias with the wrong sign or unit, of another unit, or of another temperature.",
         "Do not subtract this bias; measure it in a static pose before use.",
     ),
-)
+}
 
-_USE = (
-    Entry(
-        Code.GYROSCOPE_LEFT_OUT,
-        "calibration-has-none",
-        WARNING,
+_USE = {
+    (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
         "The gyro was excluded: the calibration holds none.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
     ),
-    Entry(
-        Code.GYROSCOPE_LEFT_OUT,
-        "model-has-none",
-        WARNING,
+    (Code.GYROSCOPE_LEFT_OUT, "model-has-none", WARNING): Words(
         "The gyro was excluded: the model has none.",
         "It was made without gyro readings, or they did not suffice.",
         "Give a calibration of both sensors.",
     ),
-    Entry(
-        Code.GYROSCOPE_LEFT_OUT,
-        "simulation-has-none",
-        WARNING,
+    (Code.GYROSCOPE_LEFT_OUT, "simulation-has-none", WARNING): Words(
         "The gyro was not compared: the simulated log has none.",
         "Only the accelerometer was simulated, or only its columns were found.",
         "Simulate both sensors, or leave the gyro's columns out of the recording.",
     ),
-    Entry(
-        Code.GYROSCOPE_LEFT_OUT,
-        "recording-has-none",
-        WARNING,
+    (Code.GYROSCOPE_LEFT_OUT, "recording-has-none", WARNING): Words(
         "The simulated gyro was not compared: the recording has none.",
         "Only the accelerometer was logged, or only its columns were found.",
         "Log both sensors.",
     ),
-    Entry(
-        Code.CALIBRATION_DOUBTED,
-        "",
-        SERIOUS,
+    (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
         "This finding was made when it was calibrated; it concerns everything the calibration is applied to.",
         "Calibrate again as its findings say, or apply another calibration.",
     ),
-    Entry(
-        Code.EFFECT_NOT_APPLIED,
-        "of-session",
-        NOTE,
+    (Code.EFFECT_NOT_APPLIED, "of-session", NOTE): Words(
         "{effect} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
     ),
-    Entry(
-        Code.EFFECT_NOT_APPLIED,
-        "",
-        WARNING,
+    (Code.EFFECT_NOT_APPLIED, "", WARNING): Words(
         "{effect} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
         "Log that channel, or update the program that applies the calibration.",
     ),
-    Entry(
-        Code.LIMIT_EXCEEDED,
-        "rest",
-        SERIOUS,
+    (Code.LIMIT_EXCEEDED, "rest", SERIOUS): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "
         "{limit_mg:g} mg.",
         "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),
-    Entry(
-        Code.LIMIT_EXCEEDED,
-        "moves",
-        SERIOUS,
+    (Code.LIMIT_EXCEEDED, "moves", SERIOUS): Words(
         "The tilt error after a rotation is {rms_deg:.3g} deg rms; the limit is {limit_deg:g} deg.",
         "The calibration is less accurate here than required.",
         "Calibrate again, or accept a wider limit.",
     ),
-    Entry(
-        Code.SAME_RECORDING,
-        "",
-        SERIOUS,
+    (Code.SAME_RECORDING, "", SERIOUS): Words(
         "This is the recording that the calibration was made from: a verification with it proves nothing.",
         "The same file was named twice.",
         "Verify on another session; the calibration report already has cross-validated errors.",
     ),
-    Entry(
-        Code.OUTSIDE_VALID_RANGE,
-        "",
-        SERIOUS,
+    (Code.OUTSIDE_VALID_RANGE, "", SERIOUS): Words(
         "{n_outside} of {n_samples} samples were recorded outside {low_degc:.1f} to {high_degc:.1f} °C, for which the "
         "calibration was made (the log: {log_low_degc:.1f} to {log_high_degc:.1f} °C).{ends_are_held:? S and b of the "
         "nearer end were used there.|}",
         "The calibration has no data at such temperatures; a polynomial is not extrapolated.",
         "Calibrate at these temperatures too, or exclude those samples.",
     ),
-    Entry(
-        Code.TEMPERATURE_MISSING,
-        "",
-        SERIOUS,
+    (Code.TEMPERATURE_MISSING, "", SERIOUS): Words(
         "The calibration follows temperature ({low_degc:.1f} to {high_degc:.1f} °C) and the log has none: S and b of "
         "its reference temperature were used.",
         "No temperature column was logged, or it was not recognised.",
         "Log the sensor's temperature; name its column with --columns temperature=N.",
     ),
-)
+}
 
 _MODELLED = "The linear model alone does not reproduce this recording: {statements:&; }."
 _TAKES_OFF = (
     "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
 )
-_DIAGNOSE = (
-    Entry(
-        Code.EFFECTS_MODELLED,
-        "stays-linear",
-        WARNING,
+_DIAGNOSE = {
+    (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:&, } the cross-validated error grows ({domain} from "
         "{rms_before:.3g} to {rms_after:.3g} {unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
         numbers=("n_effects",),
     ),
-    Entry(
-        Code.EFFECTS_MODELLED,
-        "none",
-        NOTE,
+    (Code.EFFECTS_MODELLED, "none", NOTE): Words(
         "The diagnosis accepted no effect: the linear model is unchanged.",
         numbers=("left", "n_effects", "n_domains_left"),
     ),
-    Entry(
-        Code.EFFECTS_MODELLED,
-        "none-but-disagree",
-        WARNING,
+    (Code.EFFECTS_MODELLED, "none-but-disagree", WARNING): Words(
         "The diagnosis accepted no effect: the linear model is unchanged, and {left:&, } still disagree with it.",
         "Something in this recording that no effect of the catalogue describes.",
         "`trihedron diagnose` shows where it occurs.",
         numbers=("n_effects", "n_domains_left"),
     ),
-    Entry(
-        Code.EFFECTS_MODELLED,
-        "fitted",
-        NOTE,
+    (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
         "S and b were fitted together with {effects:&, }.",
         _MODELLED,
         _TAKES_OFF,
         numbers=("left", "n_effects", "n_domains_left"),
     ),
-    Entry(
-        Code.EFFECTS_MODELLED,
-        "fitted-but-disagree",
-        WARNING,
+    (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
         "S and b were fitted together with {effects:&, }; {left:&, } still disagree.",
         _MODELLED,
         _TAKES_OFF,
         numbers=("n_effects", "n_domains_left"),
     ),
-    Entry(
-        Code.PROTOCOL_DIFFERS,
-        "",
-        NOTE,
+    (Code.PROTOCOL_DIFFERS, "", NOTE): Words(
         "The simulated recording has {n_simulated} poses and the real one {n_real}.",
         "They do not follow the same protocol, or a pose was not still.",
         "Parameters, noise and physics are compared all the same, each from its own poses; their uncertainties differ.",
     ),
-)
+}
 
 _CHANGED_CAUSE = {
     "bias": "A calibration shift between sessions (turn-on, mounting, temperature, age).",
@@ -283,46 +196,31 @@ _CHANGED_SEEN = {
     "trend": "changes from recording to recording, by {amount} each",
     "scatter": "differs in every recording, by {amount} (standard deviation)",
 }
-_MANY_RECORDINGS = (
-    Entry(
-        Code.SESSION_LEFT_OUT,
-        "",
-        WARNING,
+_MANY_RECORDINGS = {
+    (Code.SESSION_LEFT_OUT, "", WARNING): Words(
         "Recording {name} was excluded: {why}.",
         "This recording alone does not determine a calibration; the others are used.",
         "Run `trihedron check {path}`.",
     ),
-    Entry(
-        Code.FEW_SESSIONS,
-        "",
-        NOTE,
+    (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",
         "A standard deviation of few values is uncertain whatever is done with them.",
         "Record {wanted} or more.",
     ),
-    Entry(
-        Code.TEMPERATURE_DRIVEN,
-        "",
-        WARNING,
+    (Code.TEMPERATURE_DRIVEN, "", WARNING): Words(
         "The recordings were made between {low_degc:.0f} and {high_degc:.0f} °C, and their spread includes the effect "
         "of temperature.",
         "Biases and scales of every part follow temperature.",
         "Use --by temperature.",
         numbers=("span_degc",),
     ),
-    *(
-        Entry(
-            Code.PARAMETERS_CHANGED,
-            f"{parameter}-{kind}",
-            WARNING,
-            f"{{what:& of }} {seen}.",
-            cause,
-            _MANY,
-            numbers=("p_adjusted", "where"),
+    **{
+        (Code.PARAMETERS_CHANGED, f"{parameter}-{kind}", WARNING): Words(
+            f"{{what:& of }} {seen}.", cause, _MANY, numbers=("p_adjusted", "where")
         )
         for parameter, cause in _CHANGED_CAUSE.items()
         for kind, seen in _CHANGED_SEEN.items()
-    ),
-)
+    },
+}
 
-ENTRIES = (*_CALIBRATE, *_VERIFIED, *_USE, *_DIAGNOSE, *_MANY_RECORDINGS)
+ENTRIES = {**_CALIBRATE, **_VERIFIED, **_USE, **_DIAGNOSE, **_MANY_RECORDINGS}

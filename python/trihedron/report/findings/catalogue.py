@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from trihedron.records.finding import FindingCode, Severity
+from trihedron.records.finding import Severity
 from trihedron.report.findings import (
     accelerometer,
     api,
@@ -20,29 +20,19 @@ from trihedron.report.findings import (
     reference,
     segment,
 )
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import Code, Entry
 from trihedron.report.findings.wording import filled
 
-ENTRIES: tuple[Entry, ...] = (
-    *read.ENTRIES,
-    *clock.ENTRIES,
-    *readings.ENTRIES,
-    *accelerometer.ENTRIES,
-    *gyroscope.ENTRIES,
-    *kalman.ENTRIES,
-    *noise.ENTRIES,
-    *api.ENTRIES,
-    *filter_noise.ENTRIES,
-    *reference.ENTRIES,
-    *segment.ENTRIES,
+ENTRIES: tuple[Entry, ...] = tuple(
+    Entry(code=code, case=case, severity=severity, **vars(words))
+    for room in (read, clock, readings, accelerometer, gyroscope, kalman, noise, api, filter_noise, reference, segment)
+    for (code, case, severity), words in room.ENTRIES.items()
 )
-CATALOGUE: Mapping[tuple[FindingCode, str], Entry] = MappingProxyType(
-    {(entry.code, entry.case): entry for entry in ENTRIES}
-)
+CATALOGUE: Mapping[tuple[Code, str], Entry] = MappingProxyType({(entry.code, entry.case): entry for entry in ENTRIES})
 
 
 def words_of(
-    code: FindingCode, case: str, severity: Severity | None, values: Mapping[str, Any]
+    code: Code, case: str, severity: Severity | None, values: Mapping[str, Any]
 ) -> tuple[Severity, str, str, str]:
     """Severity, observation, likely cause and next action.
 

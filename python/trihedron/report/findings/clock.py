@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
-
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 
-_TIMESTAMPS = (
-    Entry(
-        Code.TIME_JITTER,
-        "",
-        NOTE,
+_TIMESTAMPS = {
+    (Code.TIME_JITTER, "", NOTE): Words(
         "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms}, mean {mean_step_s:.5g "
         "ms}, {least_s:.3g !ms} to {largest_s:.3g ms}){is_irregular:?, and no even clock lies behind them|}; the rate "
         "used is {rate_hz:.5g} Hz.",
@@ -25,143 +17,95 @@ _TIMESTAMPS = (
         numbers=("median_rate_hz", "mean_rate_hz"),
         or_severity=WARNING,
     ),
-    Entry(
-        Code.TIME_DUPLICATE,
-        "",
-        WARNING,
+    (Code.TIME_DUPLICATE, "", WARNING): Words(
         "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         "With samples timestamped in batches, read with --columns time=none and --rate.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.TIME_DUPLICATE,
-        "mended",
-        NOTE,
+    (Code.TIME_DUPLICATE, "mended", NOTE): Words(
         "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.TIME_GAP,
-        "",
-        WARNING,
+    (Code.TIME_GAP, "", WARNING): Words(
         "{count} gaps, about {lost_samples} samples lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
         "Where: {worst:each; }{has_more:? ...|}.",
         "Lost packets or a full buffer.",
         _INTEGRATED,
         numbers=("sample",),
         or_severity=SERIOUS,
-        lines=MappingProxyType({"worst": "{v0:.4g} s before {v1}"}),
+        lines={"worst": "{v0:.4g} s before {v1}"},
     ),
-    Entry(
-        Code.TIME_WRAPPED,
-        "",
-        NOTE,
+    (Code.TIME_WRAPPED, "", NOTE): Words(
         "The clock counter of {bits} bits starts again from zero {count} times (first: {where}); the time was "
         "continued.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.TIME_BACKWARD,
-        "",
-        WARNING,
+    (Code.TIME_BACKWARD, "", WARNING): Words(
         "Time runs backward at {count} places (first: {where}); the rows were sorted by time, none moved further than "
         "{displaced_rows} rows.",
         "Packets that overtook each other.",
         "If the rows stand in the right order and the timestamps are wrong, read with --columns time=none and --rate.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.NON_FINITE,
-        "time",
-        WARNING,
+    (Code.NON_FINITE, "time", WARNING): Words(
         "{count} rows have no time (first: {where}) and were excluded.",
         "Damaged rows.",
         "Check the logger.",
         numbers=("row",),
     ),
-    Entry(
-        Code.TIME_UNIT_DETECTED,
-        "",
-        NOTE,
+    (Code.TIME_UNIT_DETECTED, "", NOTE): Words(
         "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         numbers=("rate_hz",),
     ),
-    Entry(
-        Code.TIME_UNIT_DETECTED,
-        "unsure",
-        WARNING,
+    (Code.TIME_UNIT_DETECTED, "unsure", WARNING): Words(
         "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         "The step alone does not determine the unit; every rate and every noise density depends on it.",
         "Give --time-unit s, ms, us or ns if this is wrong, or --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
-    Entry(
-        Code.TIME_UNIT_DETECTED,
-        "sample-time-us",
-        NOTE,
-        "SampleTimeFine steps by {step:.6g}, so it counts microseconds, as Movella DOT does.",
+    (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(
+        "SampleTimeFine steps by {step:.6g}, so it counts microseconds, as Movella DOT does."
     ),
-    Entry(
-        Code.TIME_UNIT_DETECTED,
-        "sum-of-steps",
-        NOTE,
+    (Code.TIME_UNIT_DETECTED, "sum-of-steps", NOTE): Words(
         "Column {column} holds the time since the row before; the time is their sum.",
         action="If it is something else, read with --columns time=none and --rate.",
     ),
-    Entry(
-        Code.TIME_UNIT_DETECTED,
-        "sample-time-100us",
-        NOTE,
+    (Code.TIME_UNIT_DETECTED, "sample-time-100us", NOTE): Words(
         "SampleTimeFine steps by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
         action="Give --time-unit us if this is wrong.",
     ),
-)
+}
 
-_RATES = (
-    Entry(
-        Code.CLOCK_JUMPED,
-        "",
-        SERIOUS,
+_RATES = {
+    (Code.CLOCK_JUMPED, "", SERIOUS): Words(
         "The clock's rate changes by {percent:.2g} % {where}, and gravity {decided:?turns as if it had "
         "not|does not show which part is right}.",
         "A clock that was set or switched in the middle of the log.",
         "Split the log there and calibrate the parts one by one: gyro scale is inversely proportional to the rate.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.RATE_CONTRADICTED,
-        "",
-        WARNING,
+    (Code.RATE_CONTRADICTED, "", WARNING): Words(
         "The rate was given as {given_hz:.6g} Hz but the time column runs at {clock_hz:.6g} Hz; the column was used.",
         "A nominal rate, or a clock that is wrong.",
         "To use the given rate, read with --columns time=none.",
     ),
-    Entry(
-        Code.RATE_STATED,
-        "",
-        NOTE,
+    (Code.RATE_STATED, "", NOTE): Words(
         "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as given|as the file states above its data or "
-        "beside them}.",
+        "beside them}."
     ),
-    Entry(
-        Code.RATE_ASSUMED,
-        "",
-        WARNING,
+    (Code.RATE_ASSUMED, "", WARNING): Words(
         "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
         "Only readings were logged.",
         "Give --rate HZ.",
     ),
-    Entry(
-        Code.RATE_ASSUMED,
-        "gyro",
-        SERIOUS,
+    (Code.RATE_ASSUMED, "gyro", SERIOUS): Words(
         "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
         "Only readings were logged.",
         "Give --rate HZ. Gyro scale is inversely proportional to it: 1 % of rate is 1 % of scale.",
     ),
-)
+}
 
 _EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
@@ -178,25 +122,15 @@ _WITH_THEM = (
 )  # fmt: skip
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
-_CLOCKS = (
-    Entry(
-        Code.EVEN_CLOCK,
-        "",
-        NOTE,
-        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}.",
-        numbers=_WITH_THEM,
+_CLOCKS = {
+    (Code.EVEN_CLOCK, "", NOTE): Words(
+        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}.", numbers=_WITH_THEM
     ),
-    Entry(
-        Code.TIMESTAMPS_KEPT,
-        "",
-        NOTE,
+    (Code.TIMESTAMPS_KEPT, "", NOTE): Words(
         f"The timestamps differ from an even clock {_EVEN} by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
         numbers=(*_WITH_THEM, "is_rounded", "is_late"),
     ),
-    Entry(
-        Code.CLOCK_UNDECIDED,
-        "",
-        WARNING,
+    (Code.CLOCK_UNDECIDED, "", WARNING): Words(
         f"The timestamps are {_HOW} about an even clock {_EVEN} and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
         "the timestamps were kept.",
         "{is_partly:?Samples taken unevenly and timestamped inexactly.|A sensor that is sampled evenly and timestamped "
@@ -204,16 +138,8 @@ _CLOCKS = (
         _LOG_COUNTER,
         numbers=_WITH_THEM,
     ),
-    Entry(
-        Code.CLOCKS_MERGED,
-        "same-timestamps",
-        NOTE,
-        "Both sensors carry the same timestamps.",
-    ),
-    Entry(
-        Code.CLOCKS_MERGED,
-        "",
-        NOTE,
+    (Code.CLOCKS_MERGED, "same-timestamps", NOTE): Words("Both sensors carry the same timestamps."),
+    (Code.CLOCKS_MERGED, "", NOTE): Words(
         "Two clocks merged: accelerometer {accelerometer_rate_hz:.5g} Hz, gyro {gyroscope_rate_hz:.5g} Hz, gyro starts "
         "{offset_s:+.3g ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
         "{same_tick_fraction:.3g %} of rows and interpolated between neighbours elsewhere, which leaves "
@@ -224,6 +150,6 @@ _CLOCKS = (
         numbers=("rate_ratio", "rows_left_out"),
         or_severity=WARNING,
     ),
-)
+}
 
-ENTRIES = (*_TIMESTAMPS, *_RATES, *_CLOCKS)
+ENTRIES = {**_TIMESTAMPS, **_RATES, **_CLOCKS}

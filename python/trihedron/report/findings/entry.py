@@ -1,35 +1,45 @@
-"""One entry of the catalogue."""
+"""Sentences of one finding."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
-from trihedron.records.finding import FindingCode, Severity
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
 from trihedron.report.findings.wording import places
+
+__all__ = ["NOTE", "SERIOUS", "WARNING", "Code", "Entry", "Words"]
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 
 
 @dataclass(frozen=True)
-class Entry:
-    """Sentences of the finding ``code`` (and of one ``case``, where a code has several).
+class Words:
+    """Sentences of a finding; ``or_severity`` is another severity that the stage may state instead of the default.
 
-    ``severity`` is the default, ``or_severity`` another that the stage may state instead. ``seen``, ``cause`` and
-    ``action`` have placeholders for values (``wording.py``); ``numbers`` names values for JSON only, ``lines`` the
-    sentence part for one group in a placeholder ``{name:each}`` (with placeholders ``v0``, ``v1`` ...).
+    ``seen``, ``cause`` and ``action`` have placeholders for values (``wording.py``); ``numbers`` names values for JSON
+    only, ``lines`` the sentence part for one group in a placeholder ``{name:each}`` (with placeholders ``v0``, ``v1``
+    ...).
     """
 
-    code: FindingCode
-    case: str
-    severity: Severity
     seen: str
     cause: str = ""
     action: str = ""
     numbers: tuple[str, ...] = ()
     or_severity: Severity | None = None
-    lines: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    lines: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def places(self) -> frozenset[str]:
         """Names of all values that a stage must pass."""
         return places(self.seen) | places(self.cause) | places(self.action) | frozenset(self.numbers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry(Words):
+    """Sentences of the finding ``code``, and of one ``case`` where a code has several, with their default severity."""
+
+    code: Code
+    case: str
+    severity: Severity

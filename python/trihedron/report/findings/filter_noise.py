@@ -2,61 +2,39 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
 
-NOTE, WARNING = Severity.NOTE, Severity.WARNING
-
-ENTRIES = (
-    Entry(
-        Code.FILTER_NOISE_AT_REST,
-        "",
-        WARNING,
+ENTRIES = {
+    (Code.FILTER_NOISE_AT_REST, "", WARNING): Words(
         "No reference: N and K are those of this log's static intervals, without what vibration and motion add.",
         "Static stretches and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
     ),
-    Entry(
-        Code.FILTER_NOISE_NO_STATIC,
-        "",
-        NOTE,
+    (Code.FILTER_NOISE_NO_STATIC, "", NOTE): Words(
         "The static noise of the {sensor} is not known, and separable from vibration only where vibration changes.",
         "No static log was given, and the sensor is not static for 20 s in this log.",
         "Give a static log of the unit with --static STATIC.",
     ),
-    Entry(
-        Code.FILTER_NOISE_NOT_SEPARATED,
-        "",
-        NOTE,
+    (Code.FILTER_NOISE_NOT_SEPARATED, "", NOTE): Words(
         "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
         "marked 'below' has an upper limit only.",
         "Both grow slowly, and one recording holds few of their time constants.",
         "Use the limit in a filter that must not be too sure, or record longer beside a better reference.",
     ),
-    Entry(
-        Code.FILTER_NOISE_FOLLOWED,
-        "",
-        WARNING,
+    (Code.FILTER_NOISE_FOLLOWED, "", WARNING): Words(
         "The reference follows the {sensor}'s own noise: the difference is less than static noise allows. N is the "
         "static one; what motion adds to it is hidden.",
         "An attitude or path computed with this unit's own readings (a filter or smoother over camera, tracker and "
         "IMU).",
         "Take the tracker's own poses as reference.",
     ),
-    Entry(
-        Code.FILTER_NOISE_INCONSISTENT,
-        "",
-        WARNING,
+    (Code.FILTER_NOISE_INCONSISTENT, "", WARNING): Words(
         "Cross-validated on the second half, the {sensor}'s errors over {horizon_s:.3g} s have a mean "
         "normalised square (NEES) of {nees:.2g} instead of 3; below 3 the filter is too cautious, above too sure.",
         "The two halves differ in noise, vibration or the reference's error.",
         "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",
     ),
-    Entry(
-        Code.FILTER_NOISE_UNCALIBRATED,
-        "",
-        WARNING,
+    (Code.FILTER_NOISE_UNCALIBRATED, "", WARNING): Words(
         "A calibration would remove {share:.0f %} or more of the {sensor}'s error over {horizon_s:.3g} s "
         "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
         "The log was not corrected, or by parameters that no longer hold. Such errors follow the motion: no noise of a "
@@ -64,12 +42,9 @@ ENTRIES = (
         "Calibrate first (trihedron calibrate LOG --reference MOTION -o FILE), correct the log with trihedron apply, "
         "and estimate N and K from that.",
     ),
-    Entry(
-        Code.FILTER_NOISE_UNSETTLED,
-        "",
-        WARNING,
+    (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals rest on a few draws.",
         "The log holds too little motion, or noise that none of the causes describes.",
         "Do not rely on these intervals; give a longer log, or one without shocks.",
     ),
-)
+}

@@ -9,7 +9,7 @@ from dataclasses import replace
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.document import FindingList, Paragraph
 from trihedron.report.findings.wording import opening
-from trihedron.report.numbers import MINUS, how_many, listed
+from trihedron.report.numbers import MINUS, capital, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 _CONSEQUENCE = (
@@ -34,8 +34,9 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
-    ordered = tuple(map(_sentence, sorted(combined(findings), key=_weight)))
-    return FindingList(ordered) if ordered else Paragraph("None.")
+    ordered = sorted(combined(findings), key=_weight)
+    sentences = tuple(replace(one, seen=capital(one.seen), cause=capital(one.cause)) for one in ordered)
+    return FindingList(sentences) if sentences else Paragraph("None.")
 
 
 def _weight(finding: Finding) -> tuple[int, int]:
@@ -49,7 +50,7 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
-        return f"{bad}: {_capital(opening(serious[0].seen))}."
+        return f"{bad}: {capital(opening(serious[0].seen))}."
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
 
 
@@ -76,7 +77,7 @@ def _together(sentences: Sequence[str]) -> str:
     whole = ranged(sentences)
     if whole is not None and not re.search(r"\b(hold|pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
         return whole
-    return " ".join(map(_capital, sentences))
+    return " ".join(map(capital, sentences))
 
 
 def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
@@ -86,7 +87,7 @@ def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
         sensor, _, axis = part[1].partition(" ")
         groups.setdefault(sensor, []).append(axis)
     words = [f"{sensor} {listed(axes)}".strip() for sensor, axes in groups.items()]
-    return f"{_capital(', '.join(words))}: {rest[:1].lower()}{rest[1:]}"
+    return f"{capital(', '.join(words))}: {rest[:1].lower()}{rest[1:]}"
 
 
 def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
@@ -110,12 +111,3 @@ def ranged(sentences: Sequence[str]) -> str | None:
 
 def _value(number: str) -> float:
     return float(number.replace(MINUS, "-"))
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _sentence(finding: Finding) -> Finding:
-    """The finding with observation and cause beginning with a capital letter."""
-    return replace(finding, seen=_capital(finding.seen), cause=_capital(finding.cause))

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _CONTRADICTING = "rotations that contradict each other, or a start far from the truth."
 _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
@@ -15,90 +12,58 @@ _OUTSIDE_THE_MODEL = (
 _BIAS_CHANGES = "warm-up, bias drift, or a bias that depends on attitude (g-sensitivity)."
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
 
-_MOVES = (
-    Entry(
-        Code.TURNTABLE,
-        "",
-        NOTE,
+_MOVES = {
+    (Code.TURNTABLE, "", NOTE): Words(
         "{turns:.0f} steady turns of a table at known speed were fitted: |S w′ + b| within {rms_percent:.2g} % rms of "
         "what was stated.",
         "",
         "",
     ),
-    Entry(
-        Code.TURNTABLE,
-        "contradicting",
-        WARNING,
+    (Code.TURNTABLE, "contradicting", WARNING): Words(
         "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
         "on average, from what moves and poses give: more than noise explains; each was given that "
         "uncertainty.",
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
         "Count the turns in a minute; state --turntable-error.",
     ),
-    Entry(
-        Code.NOT_CONVERGED,
-        "session",
-        SERIOUS,
-        "the fit of the session did not converge ({stopped_because}).",
-        _CONTRADICTING,
-        _LOOK_AT_MOVES,
+    (Code.NOT_CONVERGED, "session", SERIOUS): Words(
+        "the fit of the session did not converge ({stopped_because}).", _CONTRADICTING, _LOOK_AT_MOVES
     ),
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "moves",
-        WARNING,
+    (Code.RESIDUAL_ABOVE_NOISE, "moves", WARNING): Words(
         "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
         "degrees of freedom; the rotations are weighted by the noise that they show.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.SCALE_NOT_NOMINAL,
-        "gyro",
-        SERIOUS,
+    (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
         "The gyro scale is {scale_ratio:.4g} although the log is in {unit}.",
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
-    Entry(
-        Code.LEFT_HANDED,
-        "gyro",
-        WARNING,
+    (Code.LEFT_HANDED, "gyro", WARNING): Words(
         "the gyro's axes as logged form a left-handed triad (det S < 0).",
         "one documented gyro axis is reversed, or two are exchanged.",
         "Check the axis directions of the board; the calibration itself corrects them.",
         numbers=("determinant",),
     ),
-    Entry(
-        Code.LEFT_HANDED,
-        "gyro-against-accelerometer",
-        WARNING,
+    (Code.LEFT_HANDED, "gyro-against-accelerometer", WARNING): Words(
         "gyro {axes:axes and} point against the accelerometer's axes of the same name.",
         "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
         "Check the axis directions of the board against both data sheets.",
     ),
-    Entry(
-        Code.LEFT_HANDED,
-        "gyro-other-axes",
-        WARNING,
+    (Code.LEFT_HANDED, "gyro-other-axes", WARNING): Words(
         "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
         "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
         "Check the axis directions of the board against both data sheets.",
     ),
-    Entry(
-        Code.OUTLIER_MOVE,
-        "",
-        WARNING,
+    (Code.OUTLIER_MOVE, "", WARNING): Words(
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
         "times its noise, and is excluded.",
         "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit.",
         "Look at this move; repeat it.",
     ),
-    Entry(
-        Code.GYRO_G_SENSITIVITY,
-        "",
-        NOTE,
+    (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
@@ -107,43 +72,22 @@ _MOVES = (
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),
-    Entry(
-        Code.GYRO_BIAS_DRIFT,
-        "poses",
-        NOTE,
+    (Code.GYRO_BIAS_DRIFT, "poses", NOTE): Words(
         "the gyro's bias changes between poses by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times its "
         "noise; each move uses the biases of the two poses next to it.",
         _BIAS_CHANGES,
         "Let the sensor warm up; use the stated bias only near this temperature.",
     ),
-    Entry(
-        Code.NOT_OBSERVABLE,
-        "moves-rank",
-        SERIOUS,
+    (Code.NOT_OBSERVABLE, "moves-rank", SERIOUS): Words(
         "the moves determine {rank} of {n_parameters} gyro parameters; least certain: {weakest}.",
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
-    Entry(
-        Code.NOT_OBSERVABLE,
-        "moves-weak",
-        SERIOUS,
-        "the moves hardly determine the {weakest}: see its σ in S.",
-        _SAME_GRAVITY,
-        "{advice:sentences}",
+    **dict.fromkeys(
+        ((Code.NOT_OBSERVABLE, "moves-weak", SERIOUS), (Code.WEAKLY_OBSERVABLE, "moves", WARNING)),
+        Words("the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"),
     ),
-    Entry(
-        Code.WEAKLY_OBSERVABLE,
-        "moves",
-        WARNING,
-        "the moves hardly determine the {weakest}: see its σ in S.",
-        _SAME_GRAVITY,
-        "{advice:sentences}",
-    ),
-    Entry(
-        Code.SAMPLES_LOST,
-        "seen-in-motion",
-        WARNING,
+    (Code.SAMPLES_LOST, "seen-in-motion", WARNING): Words(
         "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} steps in motion are one "
         "sample too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
         "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
@@ -153,10 +97,7 @@ _MOVES = (
         "`trihedron diagnose` puts single losses back.",
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.LOSSES_POSSIBLE,
-        "",
-        SERIOUS,
+    (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
         "The tilt error after rotations exceeds noise, and the timestamps are so even that they may have been "
         "regenerated: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
@@ -164,107 +105,71 @@ _MOVES = (
         "the error.",
         "Log the sensor's own sample counter or time, and record again; `trihedron diagnose` looks for other causes.",
     ),
-    Entry(
-        Code.CLIPPING,
-        "moves",
-        WARNING,
+    (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
         "interpolated with less weight: {bridged}, excluded: {left_out}.",
         "the sensor was turned faster than its range limit.",
         "Turn more slowly, or set a wider range.",
     ),
-    Entry(
-        Code.TIME_GAP,
-        "moves",
-        WARNING,
+    (Code.TIME_GAP, "moves", WARNING): Words(
         "samples are missing inside {moves} of {n_moves} moves (move {which:first 8}); their rotation is uncertain and "
         "they weigh less.",
         "the logger lost samples while the sensor moved.",
         "Record again, or log at a rate that the link sustains.",
     ),
-    Entry(
-        Code.HELD_OUT_WORSE,
-        "verify-moves",
-        WARNING,
+    (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations, {angle_rms_deg:.3g}° rms, exceeds noise and uncertainty, most in move "
         "{worst_move} ({worst_deg:.3g}°); χ²/dof {chi2_per_dof:.2g}, each move weighted by its uncertainty.",
         "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
         "Look at move {worst_move} first; if the poses around it were still, calibrate again near conditions of use.",
         or_severity=SERIOUS,
     ),
-)
+}
 
-_TURNS = (
-    Entry(
-        Code.TURN_NOT_A_MULTIPLE,
-        "left-out",
-        WARNING,
+_TURNS = {
+    (Code.TURN_NOT_A_MULTIPLE, "left-out", WARNING): Words(
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; it is excluded.",
         "the case was not pushed home against the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
-    Entry(
-        Code.TURN_NOT_A_MULTIPLE,
-        "contradicted",
-        SERIOUS,
+    (Code.TURN_NOT_A_MULTIPLE, "contradicted", SERIOUS): Words(
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; no third turn shows which of them is wrong.",
         "the case was not pushed home against the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
-    Entry(
-        Code.TURN_NOT_A_MULTIPLE,
-        "scatter",
-        WARNING,
+    (Code.TURN_NOT_A_MULTIPLE, "scatter", WARNING): Words(
         "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
         "turned by eye, without a wall.",
         "Push the case against a wall before and after each turn.",
     ),
-    Entry(
-        Code.TURN_NOT_A_MULTIPLE,
-        "not-the-stated",
-        WARNING,
-        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is "
-        "excluded.",
-        "turned without a wall, or the nominal scale is far off.",
-        "Repeat it against a wall, or give its angle.",
-    ),
-    Entry(
-        Code.TURN_NOT_A_MULTIPLE,
-        "no-multiple",
-        WARNING,
-        "turn {turn} about {axis:axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
-        "excluded.",
-        "turned without a wall, or the nominal scale is far off.",
-        "Repeat it against a wall, or give its angle.",
-    ),
-    Entry(
-        Code.TURN_UNCHECKED,
-        "",
-        WARNING,
+    **{
+        (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(
+            f"turn {{turn}} about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} {{wanted_rad:.0f deg}}; it is "
+            "excluded.",
+            "turned without a wall, or the nominal scale is far off.",
+            "Repeat it against a wall, or give its angle.",
+        )
+        for case, what in (("not-the-stated", "the stated"), ("no-multiple", "any multiple of"))
+    },
+    (Code.TURN_UNCHECKED, "", WARNING): Words(
         "only one turn about {axes:axes and}: a wrong angle would not show.",
         "a wrong angle goes into the scale unnoticed.",
         "Turn there and back at least once about every axis.",
     ),
-    Entry(
-        Code.RESIDUAL_ABOVE_NOISE,
-        "turns",
-        WARNING,
+    (Code.RESIDUAL_ABOVE_NOISE, "turns", WARNING): Words(
         "the error of the turns exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
         "freedom; the standard uncertainties are multiplied by its root.",
         "turns that were not the stated angle, a table that is not level, or bias drift.",
         "Repeat the turns against a wall.",
     ),
-    Entry(
-        Code.GYRO_BIAS_DRIFT,
-        "turns",
-        NOTE,
+    (Code.GYRO_BIAS_DRIFT, "turns", NOTE): Words(
         "the gyro's bias changes between poses by {times:.1f} times its noise ({axis:axis}).",
         _BIAS_CHANGES,
         "Let the sensor warm up; keep still before and after every turn.",
         numbers=("chi2_per_dof",),
     ),
-)
+}
 
-ENTRIES = (*_MOVES, *_TURNS)
+ENTRIES = {**_MOVES, **_TURNS}

@@ -2,93 +2,65 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-
-_OF_AXES = tuple(
-    entry
+_OF_AXES = {
+    key: words
     for case, name, error in (
         ("axis", "Accelerometer {axis:axis}", "a reference attitude is wrong"),
         ("norm", "Norm of gravity", "the axes are not linear"),
     )
-    for entry in (
-        Entry(
-            Code.INNOVATIONS_TOO_LARGE,
-            case,
-            WARNING,
+    for key, words in {
+        (Code.INNOVATIONS_TOO_LARGE, case, WARNING): Words(
             f"{name}: squared innovations are {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_high:.2f}).",
             f"The noise is larger than the model says, or {error}.",
             "Multiply the uncertainties by {widening:.2f}, or identify the noise anew.",
             numbers=("axis", "nis_low"),
         ),
-        Entry(
-            Code.INNOVATIONS_TOO_SMALL,
-            case,
-            NOTE,
+        (Code.INNOVATIONS_TOO_SMALL, case, NOTE): Words(
             f"{name}: squared innovations are only {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_low:.2f}).",
             "The noise is smaller than the model says.",
             "The uncertainties are too wide; identify the noise anew if that matters.",
             numbers=("axis", "nis_high"),
         ),
-        Entry(
-            Code.INNOVATIONS_COLOURED,
-            case,
-            WARNING,
+        (Code.INNOVATIONS_COLOURED, case, WARNING): Words(
             f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {{whiteness_p:.1e}} over {{n_lags}} "
             "lags, first autocorrelation {autocorrelation_1:+.2f}).",
             f"Bias drift or temperature that the noise model lacks, or {error}.",
             "Look at the innovations against time and attitude; add the missing noise term.",
             numbers=("axis",),
         ),
-    )
-)
+    }.items()
+}
 
-ENTRIES = (
-    *_OF_AXES,
-    Entry(
-        Code.NOT_CONVERGED,
-        "kalman",
-        SERIOUS,
+ENTRIES = {
+    **_OF_AXES,
+    (Code.NOT_CONVERGED, "kalman", SERIOUS): Words(
         "The constants still moved after {most_runs} runs over all poses.",
         "The start is too far away, or the poses do not determine the constants.",
         "Give a start near the data sheet, and poses in more directions.",
     ),
-    Entry(
-        Code.WEAKLY_OBSERVABLE,
-        "kalman-norm",
-        WARNING,
+    (Code.WEAKLY_OBSERVABLE, "kalman-norm", WARNING): Words(
         "The poses determine {weakest} {condition:.0f} times worse than the best determined combination.",
         "Some directions of gravity in the body were not visited.",
         "Add poses: the six faces, and edges of the cube between them.",
     ),
-    Entry(
-        Code.WEAKLY_OBSERVABLE,
-        "kalman-sensitivity",
-        WARNING,
+    (Code.WEAKLY_OBSERVABLE, "kalman-sensitivity", WARNING): Words(
         "The attitudes determine the sensitivity to {axis:axis} {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
         "Add poses that tilt {axis:axis} towards the vertical.",
     ),
-    Entry(
-        Code.WEAKLY_OBSERVABLE,
-        "kalman-bias",
-        WARNING,
+    (Code.WEAKLY_OBSERVABLE, "kalman-bias", WARNING): Words(
         "The attitudes determine the bias {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
         "Add poses with the axis of this bias up and down.",
         numbers=("axis",),
     ),
-    Entry(
-        Code.NOISE_ASSUMED,
-        "",
-        NOTE,
+    (Code.NOISE_ASSUMED, "", NOTE): Words(
         "Noise was taken from the scatter inside the poses; bias drift from pose to pose is not known.",
         "No --noise was given.",
         "Give a static log of an hour (--noise static.csv), or check the innovations.",
     ),
-)
+}

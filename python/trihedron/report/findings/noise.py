@@ -2,170 +2,110 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
-
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _WIDENED = "Intervals were widened to allow for it."
 
-_LOG = (
-    Entry(
-        Code.REPEATED_ROWS,
-        "at-rest",
-        WARNING,
+_LOG = {
+    (Code.REPEATED_ROWS, "at-rest", WARNING): Words(
         "{share:.2g %} of the rows repeat the row before in every channel.",
         "the log was written faster than the sensor measures, or resampled by holding the last value.",
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
-    Entry(
-        Code.LOG_STEP,
-        "",
-        WARNING,
+    (Code.LOG_STEP, "", WARNING): Words(
         "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit} at {time_s:.1f} s.",
         "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
         "A step looks like K and R; each side is fitted with a level of its own, so that K holds what is left.",
     ),
-    Entry(
-        Code.LOG_KNOCK,
-        "",
-        NOTE,
+    (Code.LOG_KNOCK, "", NOTE): Words(
         "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
         "a knock at the table, a door, a lost or damaged reading.",
         "They raise N and Q; these stretches are excluded.",
     ),
-    Entry(
-        Code.LOG_MOTION,
-        "",
-        WARNING,
+    (Code.LOG_MOTION, "", WARNING): Words(
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
         "motion, vibration or handling during a log that should be still.",
         "They raise N; these stretches are excluded.",
     ),
-    Entry(
-        Code.LOG_MOTION,
-        "throughout",
-        SERIOUS,
+    (Code.LOG_MOTION, "throughout", SERIOUS): Words(
         "Events cover {share:.0f %} of the log, too much to exclude: it is disturbed throughout.",
         "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
-    Entry(
-        Code.STRETCHES_EXCLUDED,
-        "",
-        NOTE,
+    (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
         "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
         "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
     ),
-    Entry(
-        Code.CLIPPING,
-        "at-rest",
-        SERIOUS,
+    (Code.CLIPPING, "at-rest", SERIOUS): Words(
         "{share:.2g %} of the readings lie on the same extreme value.",
         "the sensor or the ADC is at its range limit.",
         "Every term comes out too small; use a wider range or another orientation.",
     ),
-    Entry(
-        Code.QUANTISATION_DEAD,
-        "",
-        SERIOUS,
+    (Code.QUANTISATION_DEAD, "", SERIOUS): Words(
         "One reading's noise ({sigma:.3g} {unit}) is below half the resolution (LSB {resolution:.3g} {unit}): "
         "{repeated:.0f %} of the readings repeat the one before.",
         "the resolution is coarser than the noise.",
         "N is that of the rounding, and slow terms may hide inside one step; use a narrower range or a finer output.",
     ),
-)
+}
 
-_SPECTRUM = (
-    Entry(
-        Code.SPECTRAL_LINE,
-        "",
-        NOTE,
+_SPECTRUM = {
+    (Code.SPECTRAL_LINE, "", NOTE): Words(
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
         "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
-        lines=MappingProxyType({"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"}),
+        lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"},
     ),
-    Entry(
-        Code.SPECTRUM_COLOURED,
-        "throughout",
-        SERIOUS,
+    (Code.SPECTRUM_COLOURED, "throughout", SERIOUS): Words(
         "No part of the upper spectrum is a sum of noise terms.",
         "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
-    Entry(
-        Code.SPECTRUM_COLOURED,
-        "falls",
-        WARNING,
-        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and falls to {ratio:.3g %} of them at "
-        "{nyquist_hz:.3g} Hz.",
-        "a low-pass filter in the sensor or the logger, or averaging by a resampler.",
-        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be separated from it.",
-    ),
-    Entry(
-        Code.SPECTRUM_COLOURED,
-        "rises",
-        WARNING,
-        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and rises to {ratio:.3g %} of them at "
-        "{nyquist_hz:.3g} Hz.",
-        "aliasing, resampling, a resonance or vibration.",
-        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
-        "cannot be separated from it.",
-    ),
-    Entry(
-        Code.SPECTRUM_COLOURED,
-        "curve",
-        WARNING,
+    **{
+        (Code.SPECTRUM_COLOURED, way, WARNING): Words(
+            f"Above {{highest_hz:.3g}} Hz the spectrum leaves the noise terms and {way} to {{ratio:.3g %}} of them at "
+            "{nyquist_hz:.3g} Hz.",
+            cause,
+            "All terms are quoted from below; averaging times under half a period of that frequency show the filter, "
+            "and Q cannot be separated from it.",
+        )
+        for way, cause in (
+            ("falls", "a low-pass filter in the sensor or the logger, or averaging by a resampler."),
+            ("rises", "aliasing, resampling, a resonance or vibration."),
+        )
+    },
+    (Code.SPECTRUM_COLOURED, "curve", WARNING): Words(
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
         "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
-    Entry(
-        Code.SPECTRUM_UNEXPLAINED,
-        "",
-        WARNING,
+    (Code.SPECTRUM_UNEXPLAINED, "", WARNING): Words(
         "Near {frequency_hz:.2g} Hz the spectrum lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
         "disturbance that is not noise (temperature, daily life of the building), or noise of another shape.",
         _WIDENED,
     ),
-    Entry(
-        Code.SPECTRUM_UNEXPLAINED,
-        "curve",
-        WARNING,
+    (Code.SPECTRUM_UNEXPLAINED, "curve", WARNING): Words(
         "Near {tau_s:.2g} s the curve lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
         "a periodic disturbance, temperature, or noise of another shape.",
         _WIDENED,
     ),
-)
+}
 
-_TERMS = (
-    Entry(
-        Code.CURVE_ALONE,
-        "",
-        NOTE,
+_TERMS = {
+    (Code.CURVE_ALONE, "", NOTE): Words(
         "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
         "",
         "Steps, knocks, lines and gaps cannot be separated from noise in a curve; use the log if there is one.",
     ),
-    Entry(
-        Code.RAMP_OR_WALK,
-        "",
-        WARNING,
+    (Code.RAMP_OR_WALK, "", WARNING): Words(
         "R and K are hard to separate in a curve: a random walk that happened to go one way has the curve of a ramp.",
         "the curve keeps the squares of differences and loses their order.",
         "Identify from the log where there is one.",
     ),
-    Entry(
-        Code.SLOW_NOISE_UNRESOLVED,
-        "",
-        NOTE,
+    (Code.SLOW_NOISE_UNRESOLVED, "", NOTE): Words(
         "Slow noise is there; B and K are not separable here: B at least "
         "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
         "{walk_upper:.2g} {unit:unit}/√s, not both zero.",
@@ -173,30 +113,21 @@ _TERMS = (
         "Variances of means use the most likely sum of both; record longer to separate them.",
         numbers=("evidence",),
     ),
-    Entry(
-        Code.LOG_DRIFT,
-        "",
-        WARNING,
+    (Code.LOG_DRIFT, "", WARNING): Words(
         "The level drifts by {drift:.3g} {unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit}/s).",
         "warming up, or a change of the room's temperature.",
         "R describes this log, not the sensor; let it warm up, or log the temperature.",
     ),
-    Entry(
-        Code.LOG_DRIFT,
-        "warm-up",
-        WARNING,
+    (Code.LOG_DRIFT, "warm-up", WARNING): Words(
         "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was taken out.",
         "warming up.",
         "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
     ),
-    Entry(
-        Code.LOG_TOO_SHORT,
-        "",
-        NOTE,
+    (Code.LOG_TOO_SHORT, "", NOTE): Words(
         "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",
         "the log is short compared with the sensor's stability.",
         "Record longer to find the best averaging time.",
     ),
-)
+}
 
-ENTRIES = (*_LOG, *_SPECTRUM, *_TERMS)
+ENTRIES = {**_LOG, **_SPECTRUM, **_TERMS}

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
-
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _SAY_ACCEL_UNIT = "Give --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
 _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
@@ -21,101 +16,67 @@ _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
 _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings are missing."
 
-_UNITS = (
-    Entry(
-        Code.UNIT_ASSUMED,
-        "counts-or-mg",
-        WARNING,
+_UNITS = {
+    (Code.UNIT_ASSUMED, "counts-or-mg", WARNING): Words(
         "The accelerometer reads whole numbers of length {rest_norm:.4g} at rest: counts of about 1/1000 g, or mg; "
         "taken as counts.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
-    Entry(
-        Code.UNIT_ASSUMED,
-        "mg-or-gal",
-        WARNING,
+    (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
         "The accelerometer reads {rest_norm:.4g} at rest: mg (1000) or cm/s^2 (981); taken as {unit}.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
-    Entry(
-        Code.UNIT_DETECTED,
-        "accelerometer-counts",
-        NOTE,
-        "The accelerometer's readings are whole numbers and were taken as counts.",
-        numbers=("rest_norm",),
+    (Code.UNIT_DETECTED, "accelerometer-counts", NOTE): Words(
+        "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("rest_norm",)
     ),
-    Entry(
-        Code.UNIT_DETECTED,
-        "accelerometer-at-rest",
-        NOTE,
-        "The accelerometer reads {rest_norm:.4g} at rest, so its unit is {unit}.",
+    (Code.UNIT_DETECTED, "accelerometer-at-rest", NOTE): Words(
+        "The accelerometer reads {rest_norm:.4g} at rest, so its unit is {unit}."
     ),
-    Entry(
-        Code.UNIT_ASSUMED,
-        "never-whole",
-        WARNING,
+    (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
         "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
         numbers=("rest_norm",),
     ),
-    Entry(
-        Code.UNIT_ASSUMED,
-        "no-gravity",
-        WARNING,
+    (Code.UNIT_ASSUMED, "no-gravity", WARNING): Words(
         "The accelerometer reads {rest_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
         "as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
-    Entry(
-        Code.GRAVITY_MISSING,
-        "",
-        SERIOUS,
+    (Code.GRAVITY_MISSING, "", SERIOUS): Words(
         "The accelerometer reads only {rest_norm:.3g} at rest: gravity is missing from it.",
         "'Linear' or 'user' acceleration of a phone, from which gravity was taken out, or wrong columns.",
         "Log the accelerometer itself; nothing here can be calibrated without gravity.",
     ),
-    Entry(
-        Code.UNIT_CONTRADICTED,
-        "accelerometer",
-        SERIOUS,
+    (Code.UNIT_CONTRADICTED, "accelerometer", SERIOUS): Words(
         f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
         "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
     ),
-    Entry(Code.UNIT_DETECTED, "stated", NOTE, f"The {{sensor}} is in {{unit}} {_SOURCE}."),
-    Entry(
-        Code.UNIT_CONTRADICTED,
-        "gyro-by-turning",
-        SERIOUS,
+    (Code.UNIT_DETECTED, "stated", NOTE): Words(f"The {{sensor}} is in {{unit}} {_SOURCE}."),
+    (Code.UNIT_CONTRADICTED, "gyro-by-turning", SERIOUS): Words(
         f"The gyro is in {{unit}} {_SOURCE}, but {_TURNING}.",
         "A wrong unit; or, if the unit is right, each step of time lasts {factor:.3g} times as long as it was read.",
         "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
     ),
-    Entry(
-        Code.UNIT_CONTRADICTED,
-        "gyro-no-unit",
-        SERIOUS,
+    (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
         f"No known gyro unit fits: {_TURNING}.",
         "A time base or rate that is wrong by that factor, or a gyro in counts or a unit of its own.",
         "State the gyro's unit (--gyro-unit, counts if it has none) and the clock (--time-unit, --rate).",
     ),
-    Entry(Code.UNIT_DETECTED, "gyro-counts", NOTE, "The gyro's readings are whole numbers and were taken as counts."),
-    Entry(Code.UNIT_DETECTED, "gyro-by-turning", NOTE, f"The gyro's unit is {{unit}}: {_TURNING}."),
-    Entry(
-        Code.UNIT_ASSUMED,
-        "gyro",
-        WARNING,
+    (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
+    (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit}}: {_TURNING}."),
+    (Code.UNIT_ASSUMED, "gyro", WARNING): Words(
         "Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, so it was taken as "
         "{unit}.",
         "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
     ),
-)
+}
 
 _WHY_FIRST = {
     "poses": "its quiet readings differ from pose to pose",
@@ -123,11 +84,8 @@ _WHY_FIRST = {
 }
 _WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
 _NAME_THEM = "If that is right, confirm it with --columns {mapping}; else give their order."
-_COLUMNS = (
-    Entry(
-        Code.CORRECTED_ON_BOARD,
-        "",
-        NOTE,
+_COLUMNS = {
+    (Code.CORRECTED_ON_BOARD, "", NOTE): Words(
         "{autopilot} had corrected these readings (accelerometer {accel:.0f}, gyro {gyro:.0f}) by its own offsets and "
         "scales{is_turned:? and turned them into the board's axes|} before it logged them: a calibration finds what "
         "remains.",
@@ -137,174 +95,110 @@ _COLUMNS = (
         "as a whole.",
         or_severity=WARNING,
     ),
-    Entry(
-        Code.COLUMNS_RECOGNISED,
-        "",
-        NOTE,
+    (Code.COLUMNS_RECOGNISED, "", NOTE): Words(
         "Columns{has_file:? of {file}|}: {roles:each}{has_rest:?; not used: {rest:& }|}.",
-        lines=MappingProxyType({"roles": "{v0} from {v1}"}),
+        lines={"roles": "{v0} from {v1}"},
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "accelerometer",
-        WARNING,
+    (Code.COLUMNS_ASSUMED, "accelerometer", WARNING): Words(
         "The {n_columns} columns have no names and were taken as an accelerometer.",
         "A log without a header.",
         "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "x-y-z",
-        WARNING,
+    (Code.COLUMNS_ASSUMED, "x-y-z", WARNING): Words(
         "Columns x y z do not say which sensor they are and were taken as an accelerometer.",
         "A log without a header.",
         "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "one-of-several",
-        WARNING,
+    (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log holds raw and corrected readings, or several devices.",
         "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "unnamed-gyro",
-        WARNING,
+    (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
         "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",
         "A gyro under a name that does not say so.",
         "If it is one, read with --columns {mapping}.",
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "header-ignored",
-        WARNING,
+    (Code.COLUMNS_ASSUMED, "header-ignored", WARNING): Words(
         "The line '{line}' above the numbers does not name their {n_columns} columns, so it was skipped.",
         "A header with another number of names than there are columns.",
         "Name the columns with --columns.",
     ),
-    Entry(
-        Code.COLUMNS_ASSUMED,
-        "commands",
-        NOTE,
+    (Code.COLUMNS_ASSUMED, "commands", NOTE): Words(
         "Its {n_rows} rows are seconds apart, so each rate was taken to hold until the next row.",
         "Commands of a rate table.",
     ),
-    *(
-        Entry(
-            Code.COLUMNS_ASSUMED,
-            f"six-{why}-accelerometer",
-            NOTE,
+    **{
+        (Code.COLUMNS_ASSUMED, f"six-{why}-accelerometer", NOTE): Words(
             f"Six columns without names: the first three are the accelerometer, because {words}.",
             "A log without a header.",
             _NAME_THEM,
         )
         for why, words in _WHY_FIRST.items()
-    ),
-    *(
-        Entry(
-            Code.COLUMNS_ASSUMED,
-            f"six-{why}-gyro",
-            WARNING,
+    },
+    **{
+        (Code.COLUMNS_ASSUMED, f"six-{why}-gyro", WARNING): Words(
             "Six columns without names: the first three are the gyro, the last three the accelerometer, because "
             f"{words}.",
             "A log without a header.",
             _NAME_THEM,
         )
         for why, words in _WHY_FIRST.items()
-    ),
-    *(
-        Entry(
-            Code.COLUMNS_ASSUMED,
-            f"six-{why}",
-            SERIOUS,
+    },
+    **{
+        (Code.COLUMNS_ASSUMED, f"six-{why}", SERIOUS): Words(
             f"Six columns without names were taken as ax ay az gx gy gz, but {words}.",
             "A log without a header.",
             _NAME_THEM,
         )
         for why, words in _WHY_UNKNOWN.items()
-    ),
-    Entry(
-        Code.COLUMN_LEFT_OUT,
-        "words",
-        NOTE,
-        "Column {column} holds words (such as {example!r}) and was excluded.",
-    ),
-    Entry(Code.COLUMN_LEFT_OUT, "type", NOTE, "Column '{column}' holds {kind}, not numbers, and was excluded."),
-)
+    },
+    (Code.COLUMN_LEFT_OUT, "words", NOTE): Words("Column {column} holds words (such as {example!r}) and was excluded."),
+    (Code.COLUMN_LEFT_OUT, "type", NOTE): Words("Column '{column}' holds {kind}, not numbers, and was excluded."),
+}
 
-_ROWS = (
-    Entry(
-        Code.ROWS_LEFT_OUT,
-        "above",
-        WARNING,
+_ROWS = {
+    (Code.ROWS_LEFT_OUT, "above", WARNING): Words(
         "{rows_left_out} lines above the first row of {n_columns} numbers were skipped (first: line {line}).",
         "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
         "Look at these lines; nothing else of the file was excluded.",
     ),
-    Entry(
-        Code.ROWS_LEFT_OUT,
-        "remarks",
-        NOTE,
+    (Code.ROWS_LEFT_OUT, "remarks", NOTE): Words(
         "{rows_left_out} lines between the rows begin like remarks and were skipped (first: line {line}).",
         "Remarks of the logger, or rows that somebody took out.",
     ),
-    Entry(
-        Code.LINE_INCOMPLETE,
-        "",
-        NOTE,
+    (Code.LINE_INCOMPLETE, "", NOTE): Words(
         "The last line ({line}) breaks off in the middle and was excluded.",
         "The logger was stopped while it wrote.",
         "Nothing is lost but one sample.",
         numbers=("rows_left_out",),
         or_severity=WARNING,
     ),
-    Entry(
-        Code.ROWS_UNACCOUNTED,
-        "",
-        SERIOUS,
+    (Code.ROWS_UNACCOUNTED, "", SERIOUS): Words(
         "The file holds {in_file} rows, {read} were read and {reported} reported as excluded: {count} are not "
         "accounted for.",
         "A fault of the reader.",
         "Report it with the file; until then convert the log to CSV with another program.",
     ),
-    Entry(
-        Code.REPEATED_ROWS,
-        "copies",
-        WARNING,
+    (Code.REPEATED_ROWS, "copies", WARNING): Words(
         "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
         numbers=("count", "row"),
     ),
-    Entry(
-        Code.SAMPLES_LOST,
-        "bytes-skipped",
-        WARNING,
+    (Code.SAMPLES_LOST, "bytes-skipped", WARNING): Words(
         "{bytes} bytes at {count} places of the log are damaged and were skipped, readings among them.",
         _CUT_OFF,
         _COPY_AGAIN,
     ),
-    Entry(
-        Code.SAMPLES_LOST,
-        "damaged",
-        WARNING,
-        "The log is damaged inside; what could not be read of it was skipped, readings among it.",
-        _CUT_OFF,
-        _COPY_AGAIN,
+    (Code.SAMPLES_LOST, "damaged", WARNING): Words(
+        "The log is damaged inside; what could not be read of it was skipped, readings among it.", _CUT_OFF, _COPY_AGAIN
     ),
-    Entry(
-        Code.SAMPLES_LOST,
-        "dropouts",
-        WARNING,
+    (Code.SAMPLES_LOST, "dropouts", WARNING): Words(
         "The logger itself reports {count} dropouts, {lost_s:.3g} s altogether.",
         "A memory card that was too slow.",
         _INTEGRATED,
     ),
-    Entry(
-        Code.SAMPLES_LOST,
-        "counter",
-        WARNING,
+    (Code.SAMPLES_LOST, "counter", WARNING): Words(
         "The counter {column} skips at {count} places, {wraps:?at least |}{lost_samples} samples are missing (first: "
         "{where}){wraps:?; it starts again from zero, and whole rounds leave no trace|}.",
         "Lost packets.",
@@ -312,32 +206,23 @@ _ROWS = (
         numbers=("sample",),
         or_severity=SERIOUS,
     ),
-)
+}
 
-_DEVICES = (
-    Entry(Code.DEVICE_CHOSEN, "", NOTE, "{where} offers {listed}; {chosen} was read."),
-    Entry(
-        Code.DEVICE_CHOSEN,
-        "archive",
-        NOTE,
-        "Of the archive {members:& and } {n_members:?was|were} read; not read: {others:first 12}.",
+_DEVICES = {
+    (Code.DEVICE_CHOSEN, "", NOTE): Words("{where} offers {listed}; {chosen} was read."),
+    (Code.DEVICE_CHOSEN, "archive", NOTE): Words(
+        "Of the archive {members:& and } {n_members:?was|were} read; not read: {others:first 12}."
     ),
-    Entry(
-        Code.DEVICE_CHOSEN,
-        "records",
-        NOTE,
+    (Code.DEVICE_CHOSEN, "records", NOTE): Words(
         "Each line names its record: {kinds:each}; those of the accelerometer and the gyro were read.",
         numbers=("rows_left_out",),
-        lines=MappingProxyType({"kinds": "{v0} ({v1})"}),
+        lines={"kinds": "{v0} ({v1})"},
     ),
-    Entry(
-        Code.DEVICE_CHOSEN,
-        "in-turn",
-        NOTE,
+    (Code.DEVICE_CHOSEN, "in-turn", NOTE): Words(
         "{accelerometer_rows} rows hold the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
         "they were read as two logs and joined on their timestamps.",
         numbers=("rows_left_out",),
     ),
-)
+}
 
-ENTRIES = (*_UNITS, *_COLUMNS, *_ROWS, *_DEVICES)
+ENTRIES = {**_UNITS, **_COLUMNS, **_ROWS, **_DEVICES}

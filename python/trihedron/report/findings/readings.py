@@ -2,57 +2,36 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
-
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-
-ENTRIES = (
-    Entry(
-        Code.DEVICES_INTERLEAVED,
-        "",
-        SERIOUS,
+ENTRIES = {
+    (Code.DEVICES_INTERLEAVED, "", SERIOUS): Words(
         "Rows alternate between the readings of {n} devices, and no column identifies them.",
         "Several sensors written into one log, row by row.",
         "Read with --instance 1 to {n}, in the order of the rows; or log whose row it is, and name the column with "
         "--columns device=COLUMN.",
     ),
-    Entry(
-        Code.AXES_CHANGED,
-        "",
-        SERIOUS,
+    (Code.AXES_CHANGED, "", SERIOUS): Words(
         "In part {part} of {parts} of the log the gyro's axes fit the accelerometer's in another order or sign "
         "than in the whole "
         "(correlation {correlation:.2f} instead of {correlation_of_all:.2f}).",
         "Axes of one sensor were swapped or turned in the middle of the log.",
         "Split the log there, and calibrate the parts one by one.",
     ),
-    Entry(
-        Code.AXES_CHANGED,
-        "leap",
-        SERIOUS,
+    (Code.AXES_CHANGED, "leap", SERIOUS): Words(
         "Gravity leaps from one sample to the next while the gyro is at rest (first: {where}; {count} in all).",
         "The axes of both sensors were turned there, or rows were cut out without a gap in time.",
         "Split the log there, and calibrate the parts one by one.",
         numbers=("sample",),
     ),
-    Entry(
-        Code.NON_FINITE,
-        "readings",
-        WARNING,
+    (Code.NON_FINITE, "readings", WARNING): Words(
         "The {sensor} has {count} rows without a finite reading (first: {where}).",
         "Lost samples, or a logger that writes NaN.",
         "These rows are excluded; nothing is made up in their place.",
         numbers=("sample",),
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.REPEATED_ROWS,
-        "",
-        WARNING,
+    (Code.REPEATED_ROWS, "", WARNING): Words(
         "The {sensor} repeats its last reading in {count} rows ({fraction:.3g %}; chance would give {chance:.2g %}); "
         "the longest run is {longest_run} rows from {where}.",
         "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
@@ -60,10 +39,7 @@ ENTRIES = (
         numbers=("sample",),
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.STUCK_VALUES,
-        "",
-        WARNING,
+    (Code.STUCK_VALUES, "", WARNING): Words(
         "The {sensor}'s {axis_name} axis stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
         "chance.",
         "A frozen channel, clipping, or a bus that answers with an old value.",
@@ -71,32 +47,23 @@ ENTRIES = (
         numbers=("axis", "sample"),
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.COARSE_RESOLUTION,
-        "",
-        WARNING,
+    (Code.COARSE_RESOLUTION, "", WARNING): Words(
         "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
         "Few bits, or values rounded when they were written.",
         "Averaging longer does not help where the noise does not move the last digit; choose a smaller range.",
-        lines=MappingProxyType({"axes": "{v0:axis}: step {v1:.4g}, noise {v2:.2g}"}),
+        lines={"axes": "{v0:axis}: step {v1:.4g}, noise {v2:.2g}"},
     ),
-    Entry(
-        Code.CLIPPING,
-        "",
-        WARNING,
+    (Code.CLIPPING, "", WARNING): Words(
         "The {sensor} is clipped: {limits:each}; first at {where}.",
         "The motion left the measuring range.",
         "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
         numbers=("count", "sample"),
-        lines=MappingProxyType({"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
+        lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"},
     ),
-    Entry(
-        Code.RAW_STEP,
-        "",
-        NOTE,
+    (Code.RAW_STEP, "", NOTE): Words(
         "The {sensor} is in {unit} but steps like counts ({steps:each} {unit}; {per_unit:.5g} per "
         "{is_accelerometer:?g|°/s}).",
         "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
-        lines=MappingProxyType({"steps": "{v0:axis} {v1:.5g}"}),
+        lines={"steps": "{v0:axis} {v1:.5g}"},
     ),
-)
+}

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
 
-NOTE, WARNING = Severity.NOTE, Severity.WARNING
-
-ENTRIES = (
-    Entry(
-        Code.REFERENCE_TURNED_ROUND,
-        "",
-        WARNING,
+ENTRIES = {
+    (Code.REFERENCE_TURNED_ROUND, "", WARNING): Words(
         "The reference's attitudes turn world into body: only so do they move as the log does.",
         "Two conventions of attitude.",
         "Nothing, unless another program will read this file.",
     ),
-    Entry(
-        Code.REFERENCE_NOT_INDEPENDENT,
-        "",
-        WARNING,
+    (Code.REFERENCE_NOT_INDEPENDENT, "", WARNING): Words(
         "The reference is not independent of this gyro"
         "{is_quiet:?: it follows the gyro's own noise|}"
         "{is_square:?: it lies within {angle_rad:.2g deg} of the gyro's axes|}"
@@ -28,81 +18,51 @@ ENTRIES = (
         "An attitude computed with this unit's own readings (a filter or smoother over camera, tracker and IMU).",
         "Take S and b as confirmed by it, not as measured; use the tracker's own poses to measure them.",
     ),
-    Entry(
-        Code.REFERENCE_APART,
-        "",
-        WARNING,
+    (Code.REFERENCE_APART, "", WARNING): Words(
         "From {start_s:.0f} to {end_s:.0f} s of the log the reference deviates from the remaining log.",
         "A tracker that lost its markers or was re-initialised, or a stretch that was computed otherwise.",
         "Look at the reference's own quality flags there, or leave the stretch out.",
     ),
-    Entry(
-        Code.REFERENCE_MISFIT,
-        "",
-        WARNING,
+    (Code.REFERENCE_MISFIT, "", WARNING): Words(
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "
         "uncertainties were widened by that.",
         "A reference that wobbles or was corrected on the way, a bias that drifts, an effect.",
         "Look at --report FILE.html for where; repeat the motion.",
     ),
-    Entry(
-        Code.REFERENCE_OUTLIERS,
-        "",
-        WARNING,
+    (Code.REFERENCE_OUTLIERS, "", WARNING): Words(
         "{left_out} of {rows} rows of the reference were excluded as outliers.",
         "Jumps of a tracker that lost its markers, or knocks.",
         "Look at the reference's own quality flags.",
     ),
-    Entry(
-        Code.REFERENCE_UPSIDE_DOWN,
-        "down",
-        WARNING,
+    (Code.REFERENCE_UPSIDE_DOWN, "down", WARNING): Words(
         "In static poses the specific force points along -Z of the reference's world.",
         "Its z points down (north, east, down), or the reference is mirrored, or the log's accelerometer shows gravity "
         "instead of specific force.",
         "If z is up there, turn the sign of one axis of the reference, or of the accelerometer.",
         numbers=("up_x", "up_y", "up_z"),
     ),
-    Entry(
-        Code.REFERENCE_UPSIDE_DOWN,
-        "leans",
-        WARNING,
+    (Code.REFERENCE_UPSIDE_DOWN, "leans", WARNING): Words(
         "The plumb line leans {lean_deg:.0f}° from the z of the reference's world.",
         "A world frame that is not level.",
         "Nothing, if this is intended: the plumb line was estimated.",
         numbers=("up_x", "up_y", "up_z"),
     ),
-    Entry(
-        Code.REFERENCE_OF_ITSELF,
-        "",
-        WARNING,
+    (Code.REFERENCE_OF_ITSELF, "", WARNING): Words(
         "The reference stands in the log's own file.",
         "An attitude that the unit computed from its own gyro agrees with that gyro by construction.",
         "Believe it only if another instrument measured it.",
     ),
-    Entry(
-        Code.REFERENCE_ONLY,
-        "",
-        NOTE,
-        "Only the reference was asked: {why}.",
-        "The log has too few poses.",
-    ),
-    Entry(
-        Code.ACCELEROMETER_NOMINAL,
-        "",
-        WARNING,
+    (Code.REFERENCE_ONLY, "", NOTE): Words("Only the reference was asked: {why}.", "The log has too few poses."),
+    (Code.ACCELEROMETER_NOMINAL, "", WARNING): Words(
         "The accelerometer was not calibrated: the reference has no force. Its parameters in the file are nominal.",
         "A rate alone says nothing of gravity.",
         "Calibrate it from poses (`trihedron calibrate LOG`); the frame is the reference's body.",
         numbers=("scale",),
     ),
-    Entry(
-        Code.SHARED_MOTION,
-        "",
-        NOTE,
+    (Code.SHARED_MOTION, "", NOTE): Words(
         "Both logs hold the same motion (correlation {correlation:.3f}, the other clock {offset_s:+.5g} s): compared "
         "sample by sample they differ by {rate_rms:.3g °/s}{has_force:? and {force_rms:.3g mm/s²}|} rms.",
         "A motion that was replayed, or two units on one body.",
         numbers=("offset_std_s",),
     ),
-)
+}

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from trihedron.records.finding import FindingCode as Code
-from trihedron.records.finding import Severity
-from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-
-ENTRIES = (
-    Entry(
-        Code.POSE_SETTLING,
-        "",
-        WARNING,
+ENTRIES = {
+    (Code.POSE_SETTLING, "", WARNING): Words(
         "The mean drifts in {poses:# pose} (pose {which:first 8}): the second half differs from the first by up to "
         "{worst_sigmas:.1f} σ (at {worst_s:.1f} s).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
@@ -20,65 +13,44 @@ ENTRIES = (
         numbers=("worst_pose",),
         or_severity=SERIOUS,
     ),
-    Entry(
-        Code.POSE_DISTURBED,
-        "",
-        NOTE,
+    (Code.POSE_DISTURBED, "", NOTE): Words(
         "{disturbances:# disturbance} inside {poses:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
         "first at {first_s:.1f} s, excluded from the means.",
         "The table or the cable was touched, or samples are missing there.",
         "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
-    Entry(
-        Code.POSE_UNSTEADY,
-        "",
-        WARNING,
+    (Code.POSE_UNSTEADY, "", WARNING): Words(
         "The sensor moved or vibrated in {poses:# pose}: {which:first 8} (first at {first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
         "Put the case on a firm support for a better result; the means of these poses count less.",
     ),
-    Entry(
-        Code.POSE_AT_RANGE_LIMIT,
-        "",
-        WARNING,
+    (Code.POSE_AT_RANGE_LIMIT, "", WARNING): Words(
         "{poses:# pose} {poses:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
         "reading of {reading:.6g}) and {poses:?is|are} excluded: clipped readings only bound gravity.",
         "The range limit is below 1 g plus the bias of that axis.",
         "Set a wider range; the remaining poses are used.",
     ),
-    Entry(
-        Code.NOT_STATIC,
-        "",
-        SERIOUS,
+    (Code.NOT_STATIC, "", SERIOUS): Words(
         "No pose of a second or more in {duration_s:.1f} s of log.",
         "The sensor was moving, or held in the hand, all the time; or the log is too short.",
         "Log again: put the case down for several seconds in each pose.",
         numbers=("poses",),
     ),
-    Entry(
-        Code.SLOW_TURN,
-        "",
-        NOTE,
+    (Code.SLOW_TURN, "", NOTE): Words(
         "{turning_s:.1f} s are still to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} s; "
         "taken as moving.",
         "A slow steady turn about the vertical.",
         "Nothing needs to be done.",
     ),
-    Entry(
-        Code.NO_INITIAL_POSE,
-        "",
-        NOTE,
+    (Code.NO_INITIAL_POSE, "", NOTE): Words(
         "The log does not begin at rest: the first pose starts at {first_pose_s:.1f} s.",
         "Logging was started with the case in hand.",
         "Nothing needs to be done: the noise was measured in the poses themselves.",
     ),
-    Entry(
-        Code.FEW_POSES,
-        "",
-        WARNING,
+    (Code.FEW_POSES, "", WARNING): Words(
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
         "The log has few poses, or they were held for less than a second.",
         "Log the six faces and twelve edges of a cube (18 poses), a few seconds each.",
     ),
-)
+}

@@ -93,10 +93,9 @@ def branches(how: str) -> tuple[str, str]:
 
 
 def _in_words(value: Any, how: str, line: str) -> str:
-    if how == "run":
-        return "".join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
-    if how.startswith("each"):
-        return (how[4:] or ", ").join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
+    if how == "run" or how.startswith("each"):
+        between = "" if how == "run" else how[4:] or ", "
+        return between.join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
     if how.startswith("all "):
         digits, _, unit = how[4:].partition(" ")
         alike = f"{digits} !{unit}" if unit else digits

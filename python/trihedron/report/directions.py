@@ -1,0 +1,93 @@
+"""Panels without axes: directions on a disc or a rotatable sphere, correlations as a triangle of cells."""
+
+from __future__ import annotations
+
+import json
+import math
+from html import escape
+
+import numpy as np
+
+from trihedron.report.chart import Disc, Matrix, Sphere
+
+CELL = 10
+NAMES = 62
+"""Width for the names; a cell has a width of ten."""
+SEEN = 0.05
+"""Correlation below which a cell is empty."""
+_RADIUS = 100.0
+
+
+def drawn_disc(disc: Disc, caption: str) -> str:
+    """Rim, circles of 30° and 60° above it, axes X and Y, poses taken and poses wanted."""
+    circles = "".join(
+        f'<circle class="rim" r="{_RADIUS * math.sqrt(1.0 - math.sin(math.radians(e))):.1f}"/>' for e in (0, 30, 60)
+    )
+    cross = f'<path class="rim" d="M-{_RADIUS} 0H{_RADIUS}M0-{_RADIUS}V{_RADIUS}"/>'
+    names = "".join(
+        f'<text x="{x}" y="{y}">{word}</text>'
+        for word, x, y in (("+X", 118, 3), ("−X", -118, 3), ("+Y", 0, -111), ("−Y", 0, 119))
+    )
+    marks = []
+    # Wanted poses are drawn on top.
+    for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
+        px, py, told = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
+        if kind == "taken":
+            shape, drop = f'<circle class="pose" {told} cx="{px}" cy="{py}" r="7.5"/>', 3.0
+        else:
+            shape, drop = f'<path class="pose" {told} d="M{px} {py}m0-10l9 16h-18z"/>', 4.0
+        name = f'<text class="{kind}" x="{px}" y="{drop - _RADIUS * y:.1f}">{escape(label)}</text>' if label else ""
+        marks.append(shape + name)
+    about = f"{disc.title}: {caption}"
+    return (
+        f'<div class="disc"><div class="ptitle">{escape(disc.title)}</div>'
+        f'<svg role="img" aria-label="{escape(about)}" viewBox="-128 -122 256 244">{circles}{cross}{names}'
+        f"{''.join(marks)}</svg></div>"
+    )
+
+
+def equal_area(up: tuple[float, float, float]) -> tuple[float, float]:
+    """Lambert's azimuthal projection of a unit vector about the nearest pole; the equator has radius one."""
+    factor = 1.0 / math.sqrt(1.0 + abs(up[2]))
+    return up[0] * factor, up[1] * factor
+
+
+def drawn_sphere(sphere: Sphere, caption: str) -> str:
+    """A canvas that the page's script draws and rotates, by dragging or by the arrow keys."""
+    share = np.clip(sphere.values / (sphere.limit or 1.0), -1.0, 1.0)
+    points = [
+        [*(round(float(c), 3) for c in direction), round(float(s), 3), told]
+        for direction, s, told in zip(sphere.directions, share, sphere.said, strict=True)
+        if np.isfinite(s)
+    ]
+    about = f"{sphere.title}: {caption} Arrow keys turn it."
+    data = escape(json.dumps(points, ensure_ascii=False, separators=(",", ":")))
+    return (
+        f'<div class="sphere"><div class="ptitle">{escape(sphere.title)}</div>'
+        f'<canvas role="img" tabindex="0" aria-label="{escape(about)}" data-points="{data}"></canvas></div>'
+    )
+
+
+def drawn_matrix(matrix: Matrix, caption: str) -> str:
+    """A cell per pair, with the same order of rows and columns; names beside the rows and at the end of columns."""
+    n = len(matrix.names)
+    cells, words = [], []
+    for i, name in enumerate(matrix.names):
+        words.append(f'<text class="row" x="-3" y="{CELL * i + 7.5}">{escape(name)}</text>')
+        words.append(
+            f'<text class="col" transform="translate({CELL * i + 3} {CELL * i - 2})rotate(-45)">{escape(name)}</text>'
+        )
+        for j in range(i):
+            r = float(matrix.values[i, j])
+            if abs(r) >= SEEN:
+                side = "pos" if r > 0.0 else "neg"
+                cells.append(
+                    f'<path class="cell {side}" fill-opacity="{abs(r):.2f}" d="M{CELL * j} {CELL * i}h9v9h-9z"/>'
+                )
+    frame = "".join(f"M0 {CELL * i + 9.5}H{CELL * i + 9}" for i in range(n))
+    box = f"{-NAMES} -34 {CELL * n + NAMES + 30} {CELL * n + 38}"
+    return (
+        f'<div class="matrix"><div class="ptitle">{escape(matrix.title)}</div>'
+        f'<svg role="img" aria-label="{escape(f"{matrix.title}: {caption}")}" viewBox="{box}">'
+        f'<path class="rim" d="{frame}"/>{"".join(cells)}{"".join(words)}</svg></div>'
+    )
