@@ -156,13 +156,9 @@ def _of_samples(answer: Answer) -> list[dict[str, Any]]:
     for one in answer.seen:
         evidence = one.evidence
         parameters = evidence.parameters if evidence.restate is None else evidence.restate(context)
-        extra = {"curve": evidence.series} if evidence.series else {}
         out.append(
-            _record(
-                one.effect, parameters, evidence.statement, evidence.p_value, one.gain, evidence.confounded_with,
-                evidence.held_out, **extra,
-            )
-        )  # fmt: skip
+            _record(one.effect, parameters, evidence.statement, evidence.p_value, one.gain, (), evidence.held_out)
+        )
     return out
 
 

@@ -93,7 +93,7 @@ def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: flo
 def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
     """Every shape of every effect that applies and is not included; and the reasons why others do not apply."""
     context = model.context
-    held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)
+    held = {t.effect.id for t in model.terms if not t.effect.is_local} | set(exclude)
     places = {(t.effect.id, t.variant.label) for t in model.terms}
     reasons = {effect.id: effect.unavailable(context) for effect in catalogue()}
     terms, missing = [], {key: reason for key, reason in reasons.items() if reason is not None and key not in held}
@@ -136,9 +136,9 @@ def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
 def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
     """Whether the size found in a look is plausible, or columns can be computed anew for that size."""
     effect = term.effect
-    is_plausible = effect.is_plausible_variant(term.variant, look.value, look.covariance)
+    is_plausible = effect.is_plausible(term.variant, look.value, look.covariance)
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
 
 
 def _is_possible(term: Term, asked: AddedTerms) -> bool:
-    return term.effect.is_plausible_variant(term.variant, asked.value, asked.covariance)
+    return term.effect.is_plausible(term.variant, asked.value, asked.covariance)

@@ -29,12 +29,11 @@ LEAST_SWING_V = 1e-4
 class Context:
     """Signals at the points of the session (one per pose, then every sample of every move), SI, body frame.
 
-    Everything is computed from the fitted session when first used. ``latitude_deg`` is the user's, if given.
+    Everything is computed from the fitted session when first used.
     """
 
     obs: Observations
     fitted: Fit
-    latitude_deg: float | None = None
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
@@ -62,8 +61,7 @@ class Context:
     @cached_property
     def elapsed(self) -> FloatArray:
         """(points,) time from 0 at the first to 1 at the last sample of the recording."""
-        out: FloatArray = (self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9)
-        return out
+        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9))
 
     # -- motion ---------------------------------------------------------------------------------------------------
     @property
@@ -79,6 +77,14 @@ class Context:
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in poses."""
         return _core.move_derivative(self.time_s, np.ascontiguousarray(values), self.move_edges)
+
+    def shifted(self, values: FloatArray, ahead_s: float) -> FloatArray:
+        """(points, 3) values at a time ``ahead_s`` later inside moves, constant beyond their ends; unchanged in poses.
+
+        By a cubic spline per move with zero slope at its ends: linear interpolation would be a low-pass of its own.
+        """
+        values = np.ascontiguousarray(np.asarray_chkfinite(values))
+        return _core.move_shifted(self.time_s, values, self.move_edges, ahead_s)
 
     @cached_property
     def force_rate(self) -> FloatArray:
@@ -104,15 +110,13 @@ class Context:
     def accel_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
         S = self.fitted.state.accel_S
-        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected rate when gyro j alone reads 1 rad/s more along its own axis."""
         S = self.fitted.state.gyro_S
-        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
 
     @cached_property
     def axis_force(self) -> FloatArray:
@@ -123,6 +127,10 @@ class Context:
     def axis_rate(self) -> FloatArray:
         """(points, 3) angular rate along each gyro's own axis."""
         return self.rate @ np.linalg.inv(self.gyro_axes).T
+
+    def axis_motion(self, sensor: int) -> FloatArray:
+        """(points, 3) :attr:`axis_force` of sensor 0, :attr:`axis_rate` of sensor 1."""
+        return self.axis_rate if sensor else self.axis_force
 
     def on_accelerometers(self, values: FloatArray) -> FloatArray:
         """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
@@ -147,8 +155,7 @@ class Context:
         for i, pose in enumerate(obs.segments.poses):
             force[pose.start : pose.stop] = state.gravity * state.up[i]
         finite = np.where(np.isfinite(force), force, 0.0)
-        out: FloatArray = finite @ np.linalg.inv(self.accel_axes).T
-        return out
+        return np.asarray(finite @ np.linalg.inv(self.accel_axes).T)
 
     @cached_property
     def temperature(self) -> FloatArray | None:
@@ -199,12 +206,10 @@ class Context:
             out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
         return out
 
-    def si_per_raw(self, sensor: str) -> FloatArray:
-        """(3,) SI size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``."""
+    def si_per_raw(self, sensor: int) -> FloatArray:
+        """(3,) SI size of one raw unit along each axis of sensor 0 (accelerometer) or 1 (gyro)."""
         state = self.fitted.state
-        S = state.accel_S if sensor == "accelerometer" else state.gyro_S
-        out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(state.gyro_S if sensor else state.accel_S), axis=1))
 
     @cached_property
     def vibration_power(self) -> FloatArray:

@@ -14,7 +14,6 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relation_records import records
@@ -240,7 +239,7 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
-    common = common_time_error(step_errors(context), 1.0 / context.obs.recording.rate_hz)
+    common = common_time_error(context)
     return (
         *judge_rows(context.fitted, alpha),
         judge_within_poses(context.obs, alpha),

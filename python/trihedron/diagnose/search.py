@@ -212,7 +212,7 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
     best: tuple[float, Hypothesis, Term] | None = None
     for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)
-        if not term.effect.is_plausible_variant(term.variant, value, covariance):
+        if not term.effect.is_plausible(term.variant, value, covariance):
             continue
         score = 2.0 * larger.log_evidence - term.cost
         if best is None or score > best[0]:
@@ -267,7 +267,7 @@ def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesi
         for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
             fitted = as_fits_best(without, other)
             swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
-            if fitted.effect.is_plausible_variant(fitted.variant, *swapped.value(k)):
+            if fitted.effect.is_plausible(fitted.variant, *swapped.value(k)):
                 scored.append((2.0 * swapped.log_evidence - fitted.cost, swapped, fitted))
         _, model, chosen = max(scored, key=lambda one: one[0])
         least = model.log_evidence - 0.5 * NEAR

@@ -151,7 +151,6 @@ class DisturbedPose(DirectEffect):
     size = 0.05
     """m/s²: a push too weak to be noticed by hand."""
     is_of_session = True
-    repeatable = True
     is_local = True
 
     def find(self, context: Context) -> Evidence | None:

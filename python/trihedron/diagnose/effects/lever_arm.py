@@ -11,7 +11,7 @@ from scipy.special import fdtrc
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import clipped_samples
+from trihedron.diagnose.effects.plateaus import clipped_samples
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not

@@ -214,8 +214,7 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     S = context.fitted.state.accel_S if is_accel else context.fitted.state.gyro_S
     place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
     sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
-    scale = context.si_per_raw("accelerometer" if is_accel else "gyroscope")[k]
-    return float(scale), sigma / abs(float(S[k, k]))
+    return float(context.si_per_raw(channel // 3)[k]), sigma / abs(float(S[k, k]))
 
 
 LEAST_LEFT = 0.01

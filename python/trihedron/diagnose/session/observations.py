@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -89,6 +89,18 @@ class Observations:
     def move_names(self, which: Iterable[int]) -> tuple[str, ...]:
         """Moves by their numbers in the recording, from 1."""
         return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
+
+    def without_moves(self, bad: Collection[int]) -> Observations:
+        """The same without the moves ``bad``."""
+        keep = [m for m in range(self.n_moves) if m not in bad]
+        return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
+
+    @property
+    def whitened(self) -> tuple[FloatArray, ...]:
+        """(n, 3) readings of each sensor in units of the white noise of a sample."""
+        pairs = ((self.raw_force, self.force_density), (self.raw_rate, self.rate_density))
+        root = np.sqrt(self.recording.rate_hz)
+        return tuple(raw / (density * root) for raw, density in pairs if raw is not None and density is not None)
 
     @property
     def pose_rate_noise(self) -> FloatArray | None:
