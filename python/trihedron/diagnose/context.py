@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,12 +40,12 @@ class Context:
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return len(self.fitted.line.path.force)
+        return len(self.fitted.path.force)
 
     @property
     def moves(self) -> tuple[slice, ...]:
         """Points of each move."""
-        return self.fitted.line.path.move_slices
+        return self.fitted.path.move_slices
 
     @cached_property
     def move_edges(self) -> npt.NDArray[np.int64]:
@@ -54,7 +55,7 @@ class Context:
     @cached_property
     def time_s(self) -> FloatArray:
         """(points,) middle of each pose, time of each sample."""
-        times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
+        times: FloatArray = self.obs.time_s[self.fitted.path.point_samples].copy()
         times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
 
@@ -67,12 +68,12 @@ class Context:
     @property
     def force(self) -> FloatArray:
         """(points, 3) specific force: exactly g along the fitted vertical in poses."""
-        return self.fitted.line.path.force
+        return self.fitted.path.force
 
     @property
     def rate(self) -> FloatArray:
         """(points, 3) angular rate: zero in poses."""
-        return self.fitted.line.path.rate
+        return self.fitted.path.rate
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in poses."""
@@ -99,7 +100,7 @@ class Context:
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, propagated by the gyro from each move's start; ``force`` in poses."""
-        path, state, h = self.fitted.line.path, self.fitted.state, self.obs.n_poses
+        path, state, h = self.fitted.path, self.fitted.state, self.obs.n_poses
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
             out[where] = state.gravity * path.attitude[where.start - h : where.stop - h] @ state.up[before]
@@ -109,14 +110,12 @@ class Context:
     @cached_property
     def accel_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
-        S = self.fitted.state.accel_S
-        return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
+        return sensor_axes(self.fitted.state.accel_S)
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected rate when gyro j alone reads 1 rad/s more along its own axis."""
-        S = self.fitted.state.gyro_S
-        return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
+        return sensor_axes(self.fitted.state.gyro_S)
 
     @cached_property
     def axis_force(self) -> FloatArray:
@@ -143,7 +142,7 @@ class Context:
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
         """Values of a whole-recording signal (n, ...) at the points: pose means, then move samples."""
-        out = np.array(samples[self.fitted.line.path.point_samples], dtype=np.float64)
+        out = np.array(samples[self.fitted.path.point_samples], dtype=np.float64)
         out[: self.obs.n_poses] = self.obs.pose_means(samples)
         return out
 
@@ -154,48 +153,40 @@ class Context:
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):
             force[pose.start : pose.stop] = state.gravity * state.up[i]
-        finite = np.where(np.isfinite(force), force, 0.0)
-        return np.asarray(finite @ np.linalg.inv(self.accel_axes).T)
+        return np.asarray(_finite(force) @ np.linalg.inv(self.accel_axes).T)
+
+    def _logged(self, name: str) -> FloatArray | None:
+        """A logged channel (n,) of the recording, if it has any value."""
+        logged: FloatArray | None = getattr(self.obs.recording, name)
+        return None if logged is None or not np.isfinite(logged).any() else logged
 
     @cached_property
     def temperature(self) -> FloatArray | None:
         """(points,) logged temperature minus its mean, °C."""
-        logged = self.obs.recording.temperature_degc
-        if logged is None or not np.isfinite(logged).any():
-            return None
-        values = self.at_points(logged)
-        centred: FloatArray = values - np.nanmean(values[: self.obs.n_poses])
-        return np.where(np.isfinite(centred), centred, 0.0)
+        logged = self._logged("temperature_degc")
+        return None if logged is None else _finite(self.at_points(logged) - self.references["temperature_degc"])
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
         """(points,) rate of change of the logged temperature, smoothed over ``TEMPERATURE_WINDOW_S``, K/s."""
-        recording = self.obs.recording
-        logged = recording.temperature_degc
-        if logged is None or not np.isfinite(logged).any():
+        recording, logged = self.obs.recording, self._logged("temperature_degc")
+        if logged is None:
             return None
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
-        slope = smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz)
-        return self.at_points(slope)
+        return self.at_points(smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz))
 
     @cached_property
     def supply(self) -> FloatArray | None:
         """(points,) relative deviation of the logged supply voltage from its mean."""
-        logged = self.obs.recording.supply_v
-        if logged is None or not np.isfinite(logged).any():
-            return None
-        values = self.at_points(logged)
-        relative: FloatArray = values / np.nanmean(values[: self.obs.n_poses]) - 1.0
-        return np.where(np.isfinite(relative), relative, 0.0)
+        logged = self._logged("supply_v")
+        return None if logged is None else _finite(self.at_points(logged) / self.references["supply_v"] - 1.0)
 
     @property
-    def references(self) -> dict[str, float]:
+    def references(self) -> Mapping[str, float]:
         """Means subtracted from (or dividing) the logged signals: needed to apply the model to another recording."""
-        recording, out = self.obs.recording, {}
-        for name, logged in (("temperature_degc", recording.temperature_degc), ("supply_v", recording.supply_v)):
-            if logged is not None and np.isfinite(logged).any():
-                out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_poses]))
-        return out
+        known = {name: self._logged(name) for name in ("temperature_degc", "supply_v")}
+        n = self.obs.n_poses
+        return {k: float(np.nanmean(self.at_points(v)[:n])) for k, v in known.items() if v is not None}
 
     @cached_property
     def pose_power(self) -> FloatArray:
@@ -261,7 +252,7 @@ class Context:
 
         Poses that no chain of moves reaches keep NaN.
         """
-        obs, state, path = self.obs, self.fitted.state, self.fitted.line.path
+        obs, state, path = self.obs, self.fitted.state, self.fitted.path
         out = np.full((obs.n_poses, 3, 3), np.nan)
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
@@ -287,6 +278,15 @@ class Context:
         if obs.rate_density is not None:
             out[1] = np.sqrt((state.gyro_S**2) @ obs.rate_density**2) * root_rate
         return out
+
+
+def sensor_axes(S: FloatArray) -> FloatArray:
+    """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
+    return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:

@@ -15,7 +15,6 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
 from trihedron.diagnose.session.state import (
     Distortion,
-    Linearisation,
     Prior,
     SessionState,
     contiguous,
@@ -89,12 +88,12 @@ class Hypothesis:
     @property
     def log_evidence(self) -> float:
         """Log-likelihood with everything but the noise strengths integrated out, up to a constant."""
-        return self.fitted.line.core.log_marginal
+        return self.fitted.core.log_marginal
 
     @property
     def strengths(self) -> Strengths:
         """Corner times [s], scatter and its departure during moves in their units, factors on the noise of moves."""
-        return self.fitted.line.core.strengths
+        return self.fitted.core.strengths
 
     @cached_property
     def context(self) -> Context:
@@ -109,7 +108,7 @@ class Hypothesis:
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds = self.within if within is None else within
-        found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
+        found = self.fitted.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
         return [AddedTerms(*one) for one in found]
 
     def gains(
@@ -119,14 +118,12 @@ class Hypothesis:
 
         With ``parts``, lists of column numbers, the gain of each of these subsets.
         """
-        found = self.fitted.line.core.candidate_gains(
-            _columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts
-        )
+        found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [AtStrengths(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""
-        ((found, *_),) = self.fitted.line.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
+        ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
         return max(self.log_evidence, float(found))
 
     def span(self, k: int) -> slice:
@@ -137,7 +134,7 @@ class Hypothesis:
     def value(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Parameters of term ``k`` and their covariance."""
         covariance = self.fitted.covariance()
-        n, at = self.fitted.n_effect, self.span(k)
+        n, at = self.fitted.distortion.n_parameters, self.span(k)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
 
@@ -163,8 +160,7 @@ def hypothesis(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
     )  # fmt: skip
-    state = state_of(core, start.gravity)
-    fitted = Fit(state, Linearisation(obs, state, distortion, prior, core), has_free_strengths=True)
+    fitted = Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths=True)
     return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 

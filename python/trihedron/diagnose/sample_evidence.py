@@ -47,7 +47,7 @@ class Observed:
     @property
     def obs(self) -> Observations:
         """The observations as corrected."""
-        return self.fitted.line.obs
+        return self.fitted.obs
 
 
 def look(

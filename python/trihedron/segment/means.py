@@ -61,15 +61,14 @@ def average_poses(
     rounding = rounding_bias_variance(channels, runs)
     variance = noise.variance(duration[:, None]) * shrunk + rounding
     out = PoseMeans(mean, np.sqrt(variance), n_averaged)
-    up = (
-        upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
-        if recording.accelerometer is not None and runs
-        else None
-    )
+    if recording.accelerometer is None or not runs:
+        return out
+    up = upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
     if up is None:
         return out
-    upward = along(channels, runs, up)
-    model = noise_along(upward, runs)
+    upward = _along(channels, runs, up)
+    steady_ranges = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
+    model = pool_mean_noise(upward, steady_ranges or [r for run in runs for r in run.quiet_ranges()])
     ratio, freedom = _excess(upward, runs, model)
     own = model.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
     return replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
@@ -248,11 +247,10 @@ def upright(mean: FloatArray, *, has_unit: bool) -> FloatArray | None:
 
 
 def _unit(rows: FloatArray) -> FloatArray:
-    out: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    return out
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
-def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
+def _along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
     """The accelerometer's blocks along each pose's own direction ``up`` (h, 3), as the first axis of a triad.
 
     A soft support, a tremor and settling rotate gravity across itself: readings across the vertical change by the
@@ -267,9 +265,3 @@ def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
             variance[a:b, 0] = channels.variance[a:b, force] @ direction**2
     quantum = np.array([float(channels.quantum[force].min()), 0.0, 0.0])
     return replace(channels, mean=mean, variance=variance, quantum=quantum, is_gyroscope=np.zeros(3, dtype=bool))
-
-
-def noise_along(channels: Channels, runs: list[Run]) -> MeanNoise:
-    """Noise of the mean along that axis, from steady poses where there are any."""
-    pooled = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
-    return pool_mean_noise(channels, pooled or [r for run in runs for r in run.quiet_ranges()])

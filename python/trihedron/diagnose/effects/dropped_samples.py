@@ -12,14 +12,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence
-from trihedron.diagnose.effects.lost_samples import (
-    Loss,
-    bridge,
-    find_losses,
-    hidden_losses,
-    most_lost,
-    residual_after,
-)
+from trihedron.diagnose.effects.lost_samples import Loss, bridge, find_losses, hidden_losses, most_lost, residual_after
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
@@ -61,7 +54,7 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
 
 def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[int, float]]:
     obs, touched = context.obs, {loss.move for loss in losses}
-    clean = _of_moves_that_agree(obs.without_moves(touched), context.fitted.state, context.fitted.line.prior)
+    clean = _of_moves_that_agree(obs.without_moves(touched), context.fitted.state, context.fitted.prior)
     misfit = (move_residuals(obs, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
     limit = CONTRADICTS * MEDIAN_OF_FIVE * usual

@@ -96,6 +96,11 @@ class Observations:
         return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
 
     @property
+    def readings(self) -> FloatArray:
+        """(n, 6) readings of both sensors; (n, 3) without a gyro."""
+        return self.raw_force if self.raw_rate is None else np.hstack([self.raw_force, self.raw_rate])
+
+    @property
     def whitened(self) -> tuple[FloatArray, ...]:
         """(n, 3) readings of each sensor in units of the white noise of a sample."""
         pairs = ((self.raw_force, self.force_density), (self.raw_rate, self.rate_density))
@@ -135,13 +140,9 @@ class Observations:
     @cached_property
     def half_means(self) -> tuple[FloatArray, FloatArray | None]:
         """(poses, 2, 3) raw means over the first and the second half of every pose, accelerometer and gyro."""
-        return self.part_means(2)
-
-    def part_means(self, parts: int) -> tuple[FloatArray, FloatArray | None]:
-        """(poses, parts, 3) raw means over that many equal parts of every pose, accelerometer and gyro."""
 
         def of(raw: FloatArray) -> FloatArray:
-            every = [np.array_split(raw[pose.start : pose.stop], parts) for pose in self.segments.poses]
+            every = [np.array_split(raw[pose.start : pose.stop], 2) for pose in self.segments.poses]
             return np.array([[np.nanmean(part, axis=0) for part in of_pose] for of_pose in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
@@ -156,26 +157,24 @@ class Observations:
             out[i] = away.T @ away / len(away)
         return out
 
-    def _sharpened(self, readings: FloatArray) -> FloatArray:
-        """Readings (n, 3) at the middle of the intervals over which they were averaged."""
-        return np.ascontiguousarray(sharpened(readings, self.time_s, self.averaging))
-
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
-        unresolved = np.zeros((self.n_moves, 2, 3))
-        for m, (before, after) in enumerate(self.move_poses):
-            found = self.unresolved.get((int(before), int(after)))
-            if found is not None:
-                unresolved[m] = found
+        nothing = np.zeros((2, 3))
+        unresolved = [self.unresolved.get((int(a), int(b)), nothing) for a, b in self.move_poses]
+        force, rate = (
+            None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
+            for raw in (self.raw_force, self.raw_rate)
+        )
+        assert force is not None
         return _core.SessionMoves(
             pose_time_s=np.ascontiguousarray(self.pose_time_s, dtype=np.float64),
             time_s=np.ascontiguousarray(self.time_s),
-            force=self._sharpened(self.raw_force),
-            rate=None if self.raw_rate is None else self._sharpened(self.raw_rate),
+            force=force,
+            rate=rate,
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=unresolved,
+            unresolved=np.array(unresolved).reshape(-1, 2, 3),
         )
 
 
