@@ -47,6 +47,11 @@ class BiasStrength:
     is_large: bool
     """Whether the bias changes exceed those that undetected 1/f noise causes (``LEAST_TIMES``)."""
 
+    @property
+    def p_value(self) -> float:
+        """An upper bound: at its boundary a strength gains half a chi-square with one degree of freedom."""
+        return float(np.exp(-0.5 * max(self.gain, 0.0)))
+
 
 def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
     """The processes that are named, largest gain first; and all that were tested, by id."""
@@ -118,18 +123,15 @@ def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
     if not effect.walks:
         return float(max(_scatter(model, sensor)))
     unit = _units(model)[sensor] * model.context.si_per_raw(sensor)
-    return float(np.sqrt(np.mean(_path(model, sensor).var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
+    return (
+        float(np.sqrt(np.mean(model.fitted.bias(sensor).var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
+    )
 
 
 def _scatter(model: Hypothesis, sensor: int) -> tuple[float, ...]:
     """Scatter from pose to pose in its unit: one of the accelerometer, of a gyro by axis."""
     scatter = model.strengths[1]
     return scatter[1:] if sensor else scatter[:1]
-
-
-def _path(model: Hypothesis, sensor: int) -> FloatArray:
-    """(poses, 3) biases of a sensor, SI."""
-    return (model.fitted.state.accel_bias, model.fitted.state.gyro_bias)[sensor]
 
 
 def _units(model: Hypothesis) -> FloatArray:
@@ -147,7 +149,7 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     sigma = (obs.pose_force_sigma, obs.pose_rate_sigma)[sensor]
     assert sigma is not None
     error = np.median(sigma, axis=0) * si_per_raw
-    return np.ptp(_path(model, sensor), axis=0), np.asarray(np.sqrt(2.0) * error)
+    return np.ptp(model.fitted.bias(sensor), axis=0), np.asarray(np.sqrt(2.0) * error)
 
 
 def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> list[Tried]:

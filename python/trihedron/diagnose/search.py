@@ -215,11 +215,9 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term = as_fits_best(model, tried)
-    state = model.fitted.state
+    term, state = as_fits_best(model, tried), model.fitted.state
     start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
-    strengths = tried.asked.strengths
-    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, strengths)
+    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:

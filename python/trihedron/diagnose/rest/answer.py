@@ -39,8 +39,7 @@ class _Samples:
 
     recording: Recording
     time_s: FloatArray
-    raw_force: FloatArray
-    raw_rate: FloatArray | None
+    readings: FloatArray
     segments: Any
 
     def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
@@ -281,14 +280,13 @@ def _lines(
     assert recording.accelerometer is not None
     t = recording.time_s
 
+    sides = [one for one in (recording.accelerometer, recording.gyroscope) if one is not None]
     quick = [
-        None if values is None else values - np.stack([np.interp(t, pieces.time_s, m) for m in means.T], axis=1)
-        for values, means in zip((recording.accelerometer, recording.gyroscope), pieces.means, strict=False)
+        values - np.stack([np.interp(t, pieces.time_s, m) for m in means.T], axis=1)
+        for values, means in zip(sides, pieces.means, strict=True)
     ]
     poses = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
-    force, rate = (*quick, None)[:2]
-    assert force is not None
-    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(poses=poses)))
+    samples = cast(Observations, _Samples(recording, t, np.hstack(quick), SimpleNamespace(poses=poses)))
     test = judge_within_poses(samples, alpha)
     state = SimpleNamespace(accel_S=_matrix(model, ACCELEROMETER), gyro_S=_matrix(model, GYRO))
     fitted = cast(Fit, SimpleNamespace(state=state))

@@ -12,6 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.thermal import BRANCH_K_S
 from trihedron.diagnose.rest.pieces import RestPieces
 from trihedron.diagnose.rest.process import DRIFT, INITIAL_SLOPE, SCATTER, WALK, BiasProcess, BiasReadings, unit_kernels
+from trihedron.diagnose.sample_evidence import VISIBLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +136,6 @@ MIN_BIC = 10.0
 FOLDS = 12
 TEMPERATURE_BINS, FEWEST_BINS = 12, 3
 """Bins of temperature, and the least number passed both while heating and cooling for a difference of branches."""
-VISIBLE = 0.98
-"""Held-out rms must fall below this factor: the same bound as for every effect."""
 ALL = (SCATTER, WALK, DRIFT)
 POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
 """Terms that are powers of the temperature."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.diagnose.context import TEMPERATURE_WINDOW_S
 from trihedron.diagnose.rest.process import BiasReadings
 from trihedron.diagnose.session.state import smoothed_slope
 from trihedron.records import Recording
@@ -29,8 +30,6 @@ MOSTLY_STILL = 0.6
 """Share of a log that must be static: in one that moves, slow motion would count as static."""
 LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
 """Share and number of pieces below which an orientation is handling."""
-TEMPERATURE_WINDOW_S = 10.0
-"""Window of the mean of a logged temperature: removes its resolution; no chip heats faster than in tens of seconds."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,6 +112,10 @@ class Fit:
         sigma = self.obs.pose_rate_sigma
         return None if sigma is None else np.linalg.inv(self.state.gyro_S) / sigma[:, :, None]
 
+    def bias(self, sensor: int) -> FloatArray:
+        """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
+        return (self.state.accel_bias, self.state.gyro_bias)[sensor]
+
     def covariance(self) -> FloatArray:
         """(18 + effects, same) covariance of the shared unknowns: S_a lower, b_a, S_w on centred readings, effects."""
         return self.core.border_covariance()
