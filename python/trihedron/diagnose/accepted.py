@@ -15,9 +15,9 @@ from trihedron.diagnose.candidates import Tried
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
-from trihedron.diagnose.hypothesis import Hypothesis
+from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
@@ -180,23 +180,6 @@ def _record(
         separating_experiment=" / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
         model=MappingProxyType(said),
     )  # fmt: skip
-
-
-def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
-    """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
-    was, now = before.prediction, after.prediction
-    rms_before, unit = physical_rms(before.fitted, was.innovation)
-    rms_after, _ = physical_rms(after.fitted, now.innovation)
-    out = []
-    for d, name in ROW_DOMAINS.items():
-        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
-            continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], LEAST_P)))
-        # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
-        left = float(now.chi2[d] / now.n_rows[d])
-        before_over_it = left * (rms_before[d] / max(rms_after[d], LEAST_P)) ** 2
-        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
-    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))
 
 
 def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:

@@ -11,13 +11,14 @@ from scipy.special import ndtr
 
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
 from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths, noise_bounds
+from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import STEP_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
-from trihedron.diagnose.relation_records import records
+from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
@@ -28,7 +29,6 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
-from trihedron.diagnose.shapes import with_shapes
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
@@ -71,9 +71,7 @@ def diagnose_recording(
     ValueError
             When there is nothing to compare a model with: no accelerometer, fewer than two poses.
     """
-    return diagnosed(
-        recording, segments, calibration, calibration_is_given=calibration_is_given, alpha=alpha, progress=progress
-    )[0]
+    return _diagnosed(recording, segments, calibration, calibration_is_given, alpha, progress or _silently)[0]
 
 
 def diagnose_recordings(
@@ -97,28 +95,30 @@ def diagnose_recordings(
     """
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
-    tell = progress or (lambda _fraction, _text: None)
+    tell = progress or _silently
     each = []
-    for k, one in enumerate(given):
-        tell(0.8 * k / len(given), f"diagnosing {one[0].source}")
-        each.append(diagnosed(*one, alpha=alpha))
+    for k, (recording, segments, calibration) in enumerate(given):
+        tell(0.8 * k / len(given), f"diagnosing {recording.source}")
+        each.append(_diagnosed(recording, segments, calibration, False, alpha, _silently))
     tell(0.8, "asking what all recordings share")
     effects, candidates_together = shared_effects([model for _, model in each], alpha)
     tell(1.0, "done")
     return SharedDiagnosis(tuple(one for one, _ in each), effects, candidates_together)
 
 
-def diagnosed(
+def _silently(_fraction: float, _text: str) -> None:
+    pass
+
+
+def _diagnosed(
     recording: Recording,
     segments: Segments,
     calibration: Calibration,
-    *,
-    calibration_is_given: bool = False,
-    alpha: float = 0.01,
-    progress: Progress | None = None,
+    calibration_is_given: bool,
+    alpha: float,
+    tell: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
-    tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
@@ -136,23 +136,13 @@ def diagnosed(
     final = base if verdict == "consistent" else answer.numbers.fitted
     residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
-        verdict=verdict,
-        domains=run.domains,
-        effects=accepted_effects(answer, residuals),
-        remaining=run.remaining,
-        candidates=candidates(answer, run.candidates, run.asked),
-        baseline=with_covariance(linear_model(base), base),
-        extended=with_covariance(linear_model(final), final),
-        noise=_noise(model),
-        gravity_m_s2=calibration.gravity_m_s2,
-        alpha=alpha,
-        recording_source=recording.source,
-        recording_sha256=recording.sha256,
-        references=MappingProxyType(model.context.references),
-        residuals=residuals,
-        relations=relations,
-        stages=held_out_stages(run.bare, answer),
-    )
+        verdict=verdict, domains=run.domains, effects=accepted_effects(answer, residuals), remaining=run.remaining,
+        candidates=candidates(answer, run.candidates, run.asked), baseline=with_covariance(linear_model(base), base),
+        extended=with_covariance(linear_model(final), final), noise=_noise(model),
+        gravity_m_s2=calibration.gravity_m_s2, alpha=alpha, recording_source=recording.source,
+        recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
+        residuals=residuals, relations=relations, stages=held_out_stages(run.bare, answer),
+    )  # fmt: skip
     tell(1.0, "done")
     return result, model
 

@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
 from trihedron.diagnose.session.state import (
@@ -23,6 +24,7 @@ from trihedron.diagnose.session.state import (
     stacked,
     state_of,
 )
+from trihedron.records.domains import HeldOut
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 from trihedron.threads import side_by_side
 
@@ -175,3 +177,20 @@ def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
     """The hypothesis without each of its terms."""
     terms = known.terms
     return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
+
+
+def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
+    """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
+    was, now = before.prediction, after.prediction
+    rms_before, unit = physical_rms(before.fitted, was.innovation)
+    rms_after, _ = physical_rms(after.fitted, now.innovation)
+    out = []
+    for d, name in ROW_DOMAINS.items():
+        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
+            continue
+        gain = float(np.log(rms_before[d] / max(rms_after[d], 1e-300)))
+        # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
+        left = float(now.chi2[d] / now.n_rows[d])
+        before_over_it = left * (rms_before[d] / max(rms_after[d], 1e-300)) ** 2
+        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
+    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

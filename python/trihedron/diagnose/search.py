@@ -12,14 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
-from trihedron.diagnose.candidates import NEAR, Tried, all_beside, candidates_beside
+from trihedron.diagnose.candidates import NEAR, Tried, all_beside, as_fits_best, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
-from trihedron.diagnose.shapes import as_fits_best
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5

@@ -220,30 +220,17 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
     unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, poses, strict=True)]
     return Observations(
-        recording=recording,
-        segments=segments,
-        whole=whole,
-        time_s=recording.time_s,
-        raw_force=recording.accelerometer - force_origin,
-        raw_rate=raw_rate,
-        force_origin=force_origin,
-        rate_origin=rate_origin,
-        pose_force=segments.accelerometer_mean - force_origin,
-        pose_rate=pose_rate,
-        pose_force_sigma=noise.force_sigma,
-        pose_rate_sigma=noise.rate_sigma,
+        recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
+        raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
+        rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
+        pose_force_sigma=noise.force_sigma, pose_rate_sigma=noise.rate_sigma,
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
-        force_density=noise.force_density,
-        rate_density=noise.rate_density,
-        disturbed_s=bumped,
-        force_up=noise.force_up,
-        force_scatter=noise.force_scatter,
-        rate_scatter=noise.rate_scatter,
-        unresolved=dict(zip(poses, unresolved, strict=True)),
-        averaging=averaging,
-    )
+        force_density=noise.force_density, rate_density=noise.rate_density, disturbed_s=bumped,
+        force_up=noise.force_up, force_scatter=noise.force_scatter, rate_scatter=noise.rate_scatter,
+        unresolved=dict(zip(poses, unresolved, strict=True)), averaging=averaging,
+    )  # fmt: skip
 
 
 def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:

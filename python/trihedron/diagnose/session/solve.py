@@ -147,12 +147,9 @@ def fit(
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = core_model(obs, start.gravity, prior).fit(
-        state=core_state(start),
-        strengths=(start.strengths[0], *START_STRENGTHS[1:]),
-        force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate),
-        within=within,
-    )
+        state=core_state(start), strengths=(start.strengths[0], *START_STRENGTHS[1:]),
+        force_effect=contiguous(distortion.force), rate_effect=contiguous(distortion.rate), within=within,
+    )  # fmt: skip
     return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
 
 

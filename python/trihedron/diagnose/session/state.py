@@ -122,15 +122,12 @@ def core_poses(obs: Observations) -> _core.SessionPoses:
     """The poses of some observations, as input of the core."""
     has_rate = obs.pose_rate is not None and obs.pose_rate_sigma is not None and obs.rate_density is not None
     return _core.SessionPoses(
-        time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64),
-        force=np.ascontiguousarray(obs.pose_force),
+        time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64), force=np.ascontiguousarray(obs.pose_force),
         force_sigma=np.ascontiguousarray(obs.pose_force_sigma),
-        force_density=np.ascontiguousarray(obs.force_density),
-        rate=contiguous(obs.pose_rate) if has_rate else None,
+        force_density=np.ascontiguousarray(obs.force_density), rate=contiguous(obs.pose_rate) if has_rate else None,
         rate_sigma=contiguous(obs.pose_rate_sigma) if has_rate else None,
-        rate_density=contiguous(obs.rate_density) if has_rate else None,
-        force_along=obs.force_up,
-    )
+        rate_density=contiguous(obs.rate_density) if has_rate else None, force_along=obs.force_up,
+    )  # fmt: skip
 
 
 def core_model(

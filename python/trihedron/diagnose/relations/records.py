@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.diagnose.accepted import held_out_records
+from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import NOT_TURNED, ROOM_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
