@@ -96,37 +96,22 @@ def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[Fl
     mean = np.empty((len(poses), 3 * len(triads)))
     n_averaged = np.zeros(len(poses), dtype=np.int64)
     for k, pose in enumerate(poses):
-        sums = [_Sum() for _ in triads]
+        # Relative to a first row, so that a large offset costs no digits.
+        about = np.full((len(triads), 3), np.nan)
+        total, count = np.zeros((len(triads), 3)), np.zeros((len(triads), 1))
         for first, last in pose.undisturbed():
             # In pieces, so that a pose of hours is not copied as a whole.
             for start in range(first, last, PIECE):
                 readings = [triad[start : min(start + PIECE, last)] for triad in triads]
                 finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
                 n_averaged[k] += int(np.logical_and.reduce(finite).sum())
-                for sum_, r, f in zip(sums, readings, finite, strict=True):
-                    sum_.add(r if f.all() else r[f])
-        mean[k] = np.concatenate([sum_.mean() for sum_ in sums])
+                for j, rows in enumerate(r[f] for r, f in zip(readings, finite, strict=True)):
+                    if len(rows) and not count[j]:
+                        about[j] = rows[0]
+                    total[j] += (rows - about[j]).sum(axis=0)
+                    count[j] += len(rows)
+        mean[k] = (about + total / np.maximum(count, 1.0)).ravel()
     return mean, n_averaged
-
-
-class _Sum:
-    """A mean relative to the first row, so that a large offset costs no digits."""
-
-    def __init__(self) -> None:
-        self.about: FloatArray | None = None
-        self.total: FloatArray = np.zeros(3)
-        self.n = 0
-
-    def add(self, rows: FloatArray) -> None:
-        if not len(rows):
-            return
-        if self.about is None:
-            self.about = np.array(rows[0])
-        self.total = self.total + (rows - self.about).sum(axis=0)
-        self.n += len(rows)
-
-    def mean(self) -> FloatArray:
-        return np.full(3, np.nan) if self.about is None else np.asarray(self.about + self.total / self.n)
 
 
 def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:
