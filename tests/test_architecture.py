@@ -369,8 +369,7 @@ def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
 # Arrows between the rooms of the diagnosis, each once: what stands in a row may import what stands before it.
 ROOMS_OF_THE_DIAGNOSIS = (
     "session", "context", "residuals", "effects", "hypothesis", "candidates", "relations", "bias_strengths",
-    "shapes", "search", "shared", "sample_evidence", "accepted", "relation_records", "application", "diagnosis",
-    "against", "rest",
+    "search", "shared", "sample_evidence", "accepted", "application", "diagnosis", "against", "rest",
 )  # fmt: skip
 
 

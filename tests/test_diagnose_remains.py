@@ -107,7 +107,5 @@ def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(
             distortion=SimpleNamespace(force=force, rate=rate), obs=SimpleNamespace(time_s=(), pose_names=tuple)
         )
         line.obs.segments = SimpleNamespace(poses=())
-        p_values = [
-            goodness_of_fit._inside_poses(SimpleNamespace(line=line), k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)
-        ]
+        p_values = [goodness_of_fit._inside_poses(line, k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)]
         assert p_values == [accel, gyro]

@@ -38,14 +38,14 @@ def test_a_vector_that_is_not_the_earths_is_not_called_so():
 
     here = np.radians(35.0)
     at_home = variant(normal_gravity(35.0))
-    assert effect.is_plausible_variant(at_home, turning(here, 1.0), sigma)
-    assert effect.is_plausible_variant(at_home, turning(-here, 1.0), sigma)
+    assert effect.is_plausible(at_home, turning(here, 1.0), sigma)
+    assert effect.is_plausible(at_home, turning(-here, 1.0), sigma)
     # Twice the rate, half of it, and the rate at a latitude where gravity is another.
-    assert not effect.is_plausible_variant(at_home, 2.0 * turning(here, 1.0), sigma)
-    assert not effect.is_plausible_variant(at_home, 0.5 * turning(here, 1.0), sigma)
-    assert not effect.is_plausible_variant(at_home, turning(np.radians(86.0), 1.0), sigma)
+    assert not effect.is_plausible(at_home, 2.0 * turning(here, 1.0), sigma)
+    assert not effect.is_plausible(at_home, 0.5 * turning(here, 1.0), sigma)
+    assert not effect.is_plausible(at_home, turning(np.radians(86.0), 1.0), sigma)
     # Gravity that was only written down tells nothing.
-    assert effect.is_plausible_variant(variant(9.81), turning(np.radians(86.0), 1.0), sigma)
+    assert effect.is_plausible(variant(9.81), turning(np.radians(86.0), 1.0), sigma)
 
 
 def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_one():

@@ -51,7 +51,7 @@ def term(model, effect_id, label=""):
 def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effect_id):
     model = fitted()
     one = term(model, effect_id)
-    core = model.fitted.line.core
+    core = model.fitted.core
     columns = (contiguous(one.distortion.force), contiguous(one.distortion.rate))
     asked = [(*columns, one.sizes.tolist())]
     ((seen, _, _),) = core.candidate_gains(asked, [1.0], [core.strengths])

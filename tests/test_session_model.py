@@ -71,7 +71,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
     fitted, _ = fitted_to(recording, 9.803)
     # imu_tk found 1.000 on the log's own unit; shrunk by its biases' scatter it was 0.816, moves 4.70 deg.
     assert fitted.state.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
-    missed = np.linalg.norm(fitted.line.move_errors[0][:, :2], axis=1)
+    missed = np.linalg.norm(fitted.core.moves()[0][:, :2], axis=1)
     assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
     # The calibration is the same estimator's, and publishes what its own moves miss.
     result = calibrate(recording, gravity_m_s2=9.803)
@@ -97,7 +97,7 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
 def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_and_prediction():
     recording, truth = session_of(3, 12)
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
-    J, r = fitted.line.core.jacobian(), fitted.system.residual
+    J, r = fitted.core.jacobian(), fitted.system.residual
     size = np.linalg.norm(J, axis=0)
     scaled = J / size
     eye = np.eye(len(size))
@@ -108,7 +108,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     np.testing.assert_allclose(fitted.leverage, np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
     columns = np.random.default_rng(1).standard_normal((len(r), 3))
     np.testing.assert_allclose(
-        fitted.line.core.project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
+        fitted.core.project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
     )
     folds = folds_of(fitted)
     found = predict_held_out(fitted, folds)
@@ -123,7 +123,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
         assert found.fold_chi2[k].sum() == pytest.approx(chi2, rel=1e-6)
         # In the readings' own units: whitened moves bring the determinant of their whitening.
         own = np.unique(fitted.system.segment[held & (fitted.system.domain == MOVES)]).astype(int)
-        whitening = np.log(np.einsum("mii->mi", fitted.line.move_white[own])).sum()
+        whitening = np.log(np.einsum("mii->mi", fitted.core.whitening()[own])).sum()
         assert found.fold_log_det[k] == pytest.approx(np.log(value[known]).sum() - 2.0 * whitening, abs=1e-6)
 
 
@@ -131,9 +131,9 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     """What moves miss is explained by an effect or by less belief in them: the likelihood has to pay for the latter."""
     recording, truth = session_of(3, 12)
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
-    core = fitted.line.core
+    core = fitted.core
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
-    session = core_model(fitted.line.obs, fitted.state.gravity, fitted.line.prior)
+    session = core_model(fitted.obs, fitted.state.gravity, fitted.prior)
     gain = [
         session.fit(
             state=core_state(fitted.state), strengths=(*core.strengths[:3], (w, w)), force_effect=None, rate_effect=None

@@ -18,7 +18,7 @@ ONE_DRAW, OWN_DRAWS = 0.75, 0.5
 """Smallest correlation of axes with one noise common to all (an LSB of twice the noise leaves as much), and the largest
 of axes with noise of their own. Independent noise reaches neither; with ``FEWEST`` differences it reaches 0.2."""
 FEWEST = 256
-_NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
+NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
 
 
 def uniform_for_normal(
@@ -32,7 +32,7 @@ def uniform_for_normal(
         return
     m, r = float(model.mean()), float(recording.mean())
     if m < middle < r:
-        remark = f"The noise of the model's {_NAMES[sensor]} is uniformly distributed; the recording's is normal."
+        remark = f"The noise of the model's {NAMES[sensor]} is uniformly distributed; the recording's is normal."
         yield NoiseDifference(sensor, "", "distribution", m, r, None, None, "excess kurtosis", None, True, remark)
 
 
@@ -44,7 +44,7 @@ def one_draw_for_all(sensor: Sensor, model: float, recording: float, n: int) -> 
     if n < FEWEST or not (model > ONE_DRAW and recording < OWN_DRAWS):
         return
     remark = (
-        f"The noise of the model's {_NAMES[sensor]} is one and the same on all three axes (they correlate by "
+        f"The noise of the model's {NAMES[sensor]} is one and the same on all three axes (they correlate by "
         f"{model:.2f}, the recording's by {recording:.2f}): it was drawn once instead of three times."
     )
     yield NoiseDifference(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from trihedron.arrays import FloatArray
 from trihedron.probability import fdtrc, stdtrit
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
@@ -93,12 +93,9 @@ def _row(what: What, squares: list[float | None], seen: float | None, alpha: flo
     differs = beyond > half
     interval = (math.exp(apart - half), math.exp(apart + half))
     model, recording = math.exp(float(np.mean(logs))), math.sqrt(seen)
-    unit: Literal["m/s^2", "rad"] = "m/s^2" if what == "poses" else "rad"
     remark = _remark(what, math.exp(apart), interval, k, alpha) if differs else ""
-    sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if what == "poses" else "gyroscope"
-    return NoiseDifference(
-        sensor, "", what, model, recording, model / recording, interval, unit, p, differs, remark
-    )  # fmt: skip
+    rest = (model, recording, model / recording, interval, "m/s^2" if what == "poses" else "rad", p, differs, remark)
+    return NoiseDifference("accelerometer" if what == "poses" else "gyroscope", "", what, *rest)
 
 
 _CAUSE = {
@@ -124,7 +121,7 @@ OPPOSITE = -0.9
 
 def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference | None:
     """The finding that a simulated log's rates are in the world frame, or ``None``."""
-    seen: CarriedGravity | None = carried_gravity(recording, segments)
+    seen = carried_gravity(recording, segments)
     if seen is None or not seen.is_of_world:
         return None
     body, world = degrees_from_radians(seen.body_rad), degrees_from_radians(seen.world_rad)
@@ -152,14 +149,13 @@ def sign_of_gravity(
     return NoiseDifference("accelerometer", "", "frame", -1.0, 1.0, -1.0, None, "1", None, True, remark)
 
 
-def _gravity(segments: Segments, calibration: Calibration) -> npt.NDArray[np.float64] | None:
+def _gravity(segments: Segments, calibration: Calibration) -> FloatArray | None:
     """(n, 3) direction of specific force in the poses."""
     mean = segments.accelerometer_mean
     if mean is None:
         return None
     force = correct(mean, calibration.accelerometer.S, calibration.accelerometer.b)
-    out: npt.NDArray[np.float64] | None = force / np.linalg.norm(force, axis=1, keepdims=True)
-    return out
+    return np.asarray(force / np.linalg.norm(force, axis=1, keepdims=True))
 
 
 # Rates in the world frame in place of the body frame: detected by gravity before and after the moves.

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.comparison.noise import Sampled, Sensor, sampled
+from trihedron.arrays import FloatArray
+from trihedron.comparison.noise import SENSORS, Sampled, sampled
 from trihedron.diagnose.against.fitted import FittedModel, as_read, model_of_calibration, model_of_diagnosis
 from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
@@ -23,8 +24,8 @@ from trihedron.records.diagnosis import (
     Stage,
     StageDomain,
     Verdict,
-)
-from trihedron.records.domains import DomainTest, Where
+)  # fmt: skip
+from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.records.pose_noise import PoseNoise
 
 DECIBEL = 20.0 / math.log(10.0)
@@ -72,10 +73,9 @@ def _with(stage: Stage, misfit: float | None) -> Stage:
 
 def _misfit(model: Sampled, seen: Sampled) -> float | None:
     """Rms of 20 log10 of the ratio of all densities that both sides have, in dB."""
-    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
     squares = [
         (DECIBEL * math.log(ratio)) ** 2
-        for sensor in sensors
+        for sensor in SENSORS
         for m, r in zip(model.noise.get(sensor, ()), seen.noise.get(sensor, ()), strict=False)
         for ratio in _ratios(m, r)
     ]
@@ -166,7 +166,7 @@ def _without_walk(
 ) -> tuple[AcceptedEffect, ...]:
     """Effects of a simulation, less a free curve through biases of a sensor whose larger slow noise explains it."""
     drawn = set()
-    for sensor, drift in (("gyroscope", "gyro-bias-drift"), ("accelerometer", "accel-bias-drift")):
+    for sensor, drift in zip(SENSORS, ("accel-bias-drift", "gyro-bias-drift"), strict=True):
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
             drawn.add(drift)
@@ -190,14 +190,8 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     n = len(members)
     significant = [p for p in parameters if p.significant]
     channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
-    return DomainTest(
-        "parameters",
-        f_upper(n, SPREAD_DOF, max(worst.p_value, 1e-300)),
-        float(n),
-        worst.p_value,
-        bool(significant),
-        Where(channels),
-    )
+    chi2 = f_upper(n, SPREAD_DOF, max(worst.p_value, 1e-300))
+    return DomainTest("parameters", chi2, float(n), worst.p_value, bool(significant), Where(channels))
 
 
 def _factor(one: CommonFactor) -> NoiseDifference:
@@ -217,23 +211,16 @@ def _factor(one: CommonFactor) -> NoiseDifference:
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
     """Errors of the given parameters with one bias for the session, nothing fitted."""
     checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
-    domains = [
-        StageDomain(
-            "static-accel",
-            float(np.sqrt(np.mean(checked.norm_error**2))),
-            float(np.mean((checked.norm_error / checked.norm_noise) ** 2)),
-            "m/s^2",
-        )
-    ]
-    if len(checked.static_rate):
-        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.static_rate**2))), None, "rad/s"))
-    if len(checked.angle_deg):
-        domains.append(
-            StageDomain(
-                "moves",
-                float(np.sqrt(np.mean(checked.angle_deg**2))),
-                float(np.mean((checked.angle_deg / checked.angle_noise_deg) ** 2)),
-                "deg",
-            )
-        )
-    return Stage("as-given", tuple(domains))
+
+    def of(domain: Domain, error: FloatArray, noise: FloatArray | None, unit: str) -> list[StageDomain]:
+        chi2 = None if noise is None else float(np.mean((error / noise) ** 2))
+        return [StageDomain(domain, float(np.sqrt(np.mean(error**2))), chi2, unit)] if len(error) else []
+
+    return Stage(
+        "as-given",
+        (
+            *of("static-accel", checked.norm_error, checked.norm_noise, "m/s^2"),
+            *of("static-gyro", checked.static_rate, None, "rad/s"),
+            *of("moves", checked.angle_deg, checked.angle_noise_deg, "deg"),
+        ),
+    )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.stats import chi2
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.draws import one_draw_for_all, uniform_for_normal
+from trihedron.comparison.draws import NAMES, one_draw_for_all, uniform_for_normal
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import REFUSALS
 from trihedron.estimate.noise.poses import noise_of_poses
@@ -22,6 +23,8 @@ from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import TimestampKind
 
 Sensor = Literal["accelerometer", "gyroscope"]
+SENSORS: tuple[Sensor, Sensor] = ("accelerometer", "gyroscope")
+UNIT: Mapping[Sensor, str] = MappingProxyType({"accelerometer": "m/s^2", "gyroscope": "rad/s"})
 
 SHARE = 0.125
 """Share of alpha for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is used for
@@ -83,11 +86,8 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
     likeness: dict[Sensor, float] = {}
-    both: tuple[tuple[Sensor, FloatArray | None, FloatArray | None], ...] = (
-        ("accelerometer", recording.accelerometer, model.accel_S),
-        ("gyroscope", recording.gyroscope, model.gyro_S),
-    )
-    for sensor, readings, S in both:
+    both = ((recording.accelerometer, model.accel_S), (recording.gyroscope, model.gyro_S))
+    for sensor, (readings, S) in zip(SENSORS, both, strict=True):
         if readings is None or S is None:
             continue
         si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
@@ -121,8 +121,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
     ``alpha``: chance that anything of two logs of one unit is called different; three eighths of it are spent here.
     """
     out: list[NoiseDifference] = []
-    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
-    for sensor in sensors:
+    for sensor in SENSORS:
         if sensor not in model.noise or sensor not in recording.noise:
             continue
         pairs = list(zip(AXES, model.noise[sensor], recording.noise[sensor], strict=True))
@@ -163,11 +162,9 @@ def _value(figure: Measured | None) -> float | None:
 
 
 def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> NoiseDifference | None:
-    unit = "m/s^2/sqrt(Hz)" if sensor == "accelerometer" else "rad/s/sqrt(Hz)"
+    unit = f"{UNIT[sensor]}/sqrt(Hz)"
     if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
-        if (m.white is None) == (r.white is None):
-            return None
-        return _hidden(sensor, axis, m, r, unit)
+        return None if (m.white is None) == (r.white is None) else _hidden(sensor, axis, m, r, unit)
     return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
 
 
@@ -177,49 +174,41 @@ def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) ->
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
     would_show = loud.reading_sigma > SHOWS * quiet.step
-    name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    remark = f"The resolution (LSB) of the {side} hides the noise of its {name}."
-    if would_show:
-        remark = f"The {side} has no noise on the {name}; the {other} has."
+    name = NAMES[sensor]
+    hides = f"The resolution (LSB) of the {side} hides the noise of its {name}."
+    remark = f"The {side} has no noise on the {name}; the {other} has." if would_show else hides
     values = _value(m.white), _value(r.white)
     return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, would_show, remark)
 
 
 def _resembling(
-    sensor: Sensor,
-    white: Sequence[NoiseDifference],
-    rate_hz: float,
-    only_model_is_even: bool,
+    sensor: Sensor, white: Sequence[NoiseDifference], rate_hz: float, only_model_is_even: bool
 ) -> list[NoiseDifference]:
     """White densities with the likely cause of their ratio: known mistakes of simulators."""
-    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    name = NAMES[sensor]
     known = [w for w in white if w.ratio is not None]
-    out = list(white)
     if len(known) < 3 or not any(w.significant for w in known):
-        return out
+        return list(white)
     ratios = np.array([w.ratio for w in known], dtype=np.float64)
     common = float(np.exp(np.mean(np.log(ratios))))
     root = math.sqrt(rate_hz)
-    for factor, words in (
-        (root, "the density was multiplied by the root of the rate once too often"),
-        (1.0 / root, "the density was not multiplied by the root of the rate when it was sampled"),
+    for factor, times, words in (
+        (root, f"√{rate_hz:.4g}", "the density was multiplied by the root of the rate once too often"),
+        (1.0 / root, f"1/√{rate_hz:.4g}", "the density was not multiplied by the root of the rate when it was sampled"),
     ):
         if max(common / factor, factor / common) < RESEMBLES:
-            times = f"√{rate_hz:.4g}" if factor > 1.0 else f"1/√{rate_hz:.4g}"
             said = f"White noise of the {name} is {common:.3g} = {times} times the recording's: {words}."
-            return [replace(w, remark=said) if w in known else w for w in out]
-    values = np.array([[w.model or 0.0, w.recording or 0.0] for w in known])
-    if only_model_is_even and values[:, 1].max() > UNLIKE_AXES * values[:, 1].min():
-        spread = float(values[:, 1].max() / values[:, 1].min())
+            return [replace(w, remark=said) if w in known else w for w in white]
+    seen = np.array([w.recording or 0.0 for w in known])
+    said = ""
+    if only_model_is_even and seen.max() > UNLIKE_AXES * seen.min():
         said = f"White noise of the {name} is the same on all axes of the model; "
-        said += f"the recording's axes differ {spread:.2g} times."
-        return [replace(w, remark=said) if w.significant else w for w in out]
-    if ratios.max() < LEAST_OCTAVE_RATIO * ratios.min():
+        said += f"the recording's axes differ {float(seen.max() / seen.min()):.2g} times."
+    elif ratios.max() < LEAST_OCTAVE_RATIO * ratios.min():
         low = min(w.interval[0] for w in known if w.interval)
         high = max(w.interval[1] for w in known if w.interval)
         said = f"White noise of the {name} is {common:.3g} ({low:.3g} to {high:.3g}) times the recording's."
-        return [replace(w, remark=said) if w.significant else w for w in out]
-    return out
+    return [replace(w, remark=said) if said and w.significant else w for w in white]
 
 
 def _are_even(white: Sequence[Measured | None]) -> bool:
@@ -244,8 +233,7 @@ def _step(
 ) -> Iterator[NoiseDifference]:
     """Difference of the LSB of one axis, each side given with all axes of its sensor."""
     m, r = model[0], recording[0]
-    unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
-    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    name = NAMES[sensor]
     m_shows, r_shows = _shows_steps(*model), _shows_steps(*recording)
     if not (m_shows or r_shows):
         return
@@ -255,7 +243,9 @@ def _step(
         matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
         remark = f"The {side} has no resolution (LSB) on the {name}." if matters else ""
-        yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
+        yield NoiseDifference(
+            sensor, axis, "resolution", m.step, r.step, None, None, UNIT[sensor], None, matters, remark
+        )
         return
     ratio = m.step / r.step
     levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
@@ -263,7 +253,7 @@ def _step(
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
-    yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
+    yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, UNIT[sensor], None, is_far, remark)
 
 
 def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
@@ -287,7 +277,7 @@ def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float)
     is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
     values = _value(m.corner_hz), _value(r.corner_hz)
     side = "recording" if seen is r else "model"
-    name = f"{'accelerometer' if sensor == 'accelerometer' else 'gyro'} {axis.upper()}"
+    name = f"{NAMES[sensor]} {axis.upper()}"
     remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
     yield NoiseDifference(
         sensor, axis, "bandwidth", *values, None, None, "Hz", None, is_clear, remark if is_clear else ""
@@ -313,12 +303,12 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
         # Above the corner the filter differs, which is reported by itself.
         is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
         band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
-        name = "accelerometer" if sensor == "accelerometer" else "gyro"
+        name = NAMES[sensor]
         remark = f"Noise of the {name} {axis.upper()} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
         yield NoiseDifference(
             sensor, axis, "octave", math.sqrt(other.density.value), math.sqrt(octave.density.value),
             math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
-            f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz)", ratio.p_value,
+            f"{UNIT[sensor]}/sqrt(Hz)", ratio.p_value,
             bool(is_far and is_off), remark if is_far and is_off else "", (octave.low_hz, octave.high_hz),
         )  # fmt: skip
 

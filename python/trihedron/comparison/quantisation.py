@@ -10,7 +10,8 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.noise import Sampled, Sensor
+from trihedron.comparison.draws import NAMES
+from trihedron.comparison.noise import SENSORS, Sampled, Sensor
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
@@ -84,10 +85,9 @@ def _mean_sin2(low_hz: float, high_hz: float, rate_hz: float) -> float:
 
 def quantisation_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
     """Rows of the term Q where either side shows it; ``alpha`` is the chance that any figure of one unit differs."""
-    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
     return tuple(
         row
-        for sensor in sensors
+        for sensor in SENSORS
         for axis, m, r in zip(AXES, model.noise.get(sensor, ()), recording.noise.get(sensor, ()), strict=False)
         for row in _axis(sensor, axis, m, r, alpha * SHARE / (2 * len(AXES)))
     )
@@ -98,22 +98,18 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
     if made is None or seen is None or not (made.is_shown or seen.is_shown):
         return
     unit = "m/s" if sensor == "accelerometer" else "rad"
-    name = "accelerometer" if sensor == "accelerometer" else "gyro"
     values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
     if made.is_shown and seen.is_shown:
         ratio = ratio_of(made.measured(), seen.measured())
         is_off = ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > LEAST_RATIO
-        remark = (
-            f"Quantisation noise of the {name} {axis} is {ratio.value:.2g} times the recording's." if is_off else ""
-        )
-        yield NoiseDifference(
-            sensor, axis, "Q", *values, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off, remark
-        )
+        remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {ratio.value:.2g} times the recording's."
+        said = (ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off, remark if is_off else "")
+        yield NoiseDifference(sensor, axis, "Q", *values, *said)
         return
     difference = abs(made.quantisation - seen.quantisation)
     p_value = math.erfc(difference / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
     less, more = sorted((made, seen), key=lambda one: one.quantisation)
     is_off = p_value < alpha and more.quantisation > LEAST_RATIO**2 * (less.quantisation + 2.0 * less.sigma)
     side = "model" if made.is_shown else "recording"
-    remark = f"Only the {side} has quantisation noise on the {name} {axis}: noise that rises with frequency."
+    remark = f"Only the {side} has quantisation noise on the {NAMES[sensor]} {axis}: noise that rises with frequency."
     yield NoiseDifference(sensor, axis, "Q", *values, None, None, unit, p_value, is_off, remark if is_off else "")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.noise import Sampled, Sensor
+from trihedron.comparison.draws import NAMES
+from trihedron.comparison.noise import SENSORS, UNIT, Sampled, Sensor
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow
@@ -28,7 +28,6 @@ LEAST_TIME_RATIO = 2.0
 """Correlation times of parts of one reel differ by half; makers state none."""
 ALIKE = 1.25
 """Two sensors of one part whose correlation times agree within a quarter have one common time."""
-SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
 
 
 def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
@@ -44,7 +43,7 @@ def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tu
     for sensor, (m, r) in both.items():
         ratio = ratio_of(m, r)
         differs = ratio.p_value < alpha / TESTS and max(ratio.value, 1.0 / ratio.value) > LEAST_TIME_RATIO
-        name = "gyro" if sensor == "gyroscope" else sensor
+        name = NAMES[sensor]
         remark = shared or f"The noise of the {name} forgets in {m.value:.2g} s, the recording's in {r.value:.2g} s."
         out.append(
             NoiseDifference(
@@ -92,17 +91,16 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
     as an effect, or disagrees without one: a walk would then describe the same drift twice.
     """
     out: list[NoiseDifference] = []
-    # A free curve through a simulation's biases is its walk and no mechanism. A recording's may be one.
-    biases = gyro_biases(*model, with_curve=True), gyro_biases(*recording, with_curve=_has_curve(model[0]))
-    rate_hz = model[1].rate_hz
-    if biases[0] and biases[1]:
-        is_open = _drifts(recording[0], "gyroscope", but_curve=_has_curve(model[0]))
-        out += _rows("gyroscope", compare_slow(*biases), rate_hz, alpha, is_open=is_open)
-    has_curve = _has_curve(model[0], "accelerometer")
-    norms = accel_norms(*model, with_curve=True), accel_norms(*recording, with_curve=has_curve)
-    if norms[0] and norms[1]:
-        is_open = _drifts(recording[0], "accelerometer", but_curve=has_curve)
-        out += _rows("accelerometer", compare_slow(*norms), rate_hz, alpha, is_open=is_open)
+    of_sensor: tuple[tuple[Sensor, Callable[..., tuple[PoseBiases, ...]]], ...] = (
+        ("gyroscope", gyro_biases), ("accelerometer", accel_norms)
+    )  # fmt: skip
+    for sensor, biases_of in of_sensor:
+        # A free curve through a simulation's biases is its walk and no mechanism. A recording's may be one.
+        has_curve = _has_curve(model[0], sensor)
+        both = biases_of(*model, with_curve=True), biases_of(*recording, with_curve=has_curve)
+        if both[0] and both[1]:
+            is_open = _drifts(recording[0], sensor, but_curve=has_curve)
+            out += _rows(sensor, compare_slow(*both), model[1].rate_hz, alpha, is_open=is_open)
     return tuple(out)
 
 
@@ -116,7 +114,7 @@ def _rows(
     out = []
     terms: tuple[NoiseTerm, NoiseTerm] = ("B", "K")
     for term in terms:
-        unit = ("rad/s" if sensor == "gyroscope" else "m/s^2") + ("" if term == "B" else "/sqrt(s)")
+        unit = UNIT[sensor] + ("" if term == "B" else "/sqrt(s)")
         is_it = differs and term == found.term
         remark = _remark(sensor, found, common, rate_hz) if is_it else ""
         for k, axis in enumerate(AXES):
@@ -140,13 +138,11 @@ def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> boo
     domain = DOMAINS[sensor]
     if any(test.disagrees for test in found.remaining if test.domain == domain):
         return True
-    named = [
-        e for e in found.effects if any(h.domain == domain for h in e.held_out[:1]) and e.id not in NO_SHAPE
-    ]  # fmt: skip
-    return bool(named) and not (but_curve and _has_curve(found, sensor))
+    named = any(h.domain == domain for e in found.effects if e.id not in NO_SHAPE for h in e.held_out[:1])
+    return named and not (but_curve and _has_curve(found, sensor))
 
 
-def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
+def _has_curve(found: Diagnosis, sensor: Sensor) -> bool:
     """Whether the only effect on a sensor's biases, beside their scatter, is a drift along a free curve."""
     domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
     of_biases = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
@@ -164,7 +160,7 @@ def gyro_biases(
     if shown is None:
         return ()
     values, time_s, white = shown
-    length = _poses(time_s, recording, segments).length_s
+    length, _ = _poses(time_s, recording, segments)
     return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length) for k in range(3))
 
 
@@ -176,14 +172,14 @@ def accel_norms(
     if shown is None:
         return ()
     values, time_s, density = shown
-    poses = _poses(time_s, recording, segments)
-    if poses.means is None:
+    length_s, means = _poses(time_s, recording, segments)
+    if means is None:
         return ()
     S, b = (np.array(found.extended.accelerometer[name]) for name in ("S", "b"))
-    force = correct(poses.means, S, b)
+    force = correct(means, S, b)
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    white = np.sqrt((up**2 @ density**2) / poses.length_s)
-    return (PoseBiases(values[:, 0], white, time_s, poses.length_s, up),)
+    white = np.sqrt((up**2 @ density**2) / length_s)
+    return (PoseBiases(values[:, 0], white, time_s, length_s, up),)
 
 
 def _shown(found: Diagnosis, sensor: Sensor, *, with_curve: bool) -> tuple[FloatArray, FloatArray, FloatArray] | None:
@@ -198,39 +194,29 @@ def _shown(found: Diagnosis, sensor: Sensor, *, with_curve: bool) -> tuple[Float
     return shown.after, shown.time_after_s, white
 
 
-@dataclass(frozen=True, eq=False)
-class _Poses:
-    """Durations (n,) [s] and mean readings (n, 3) of the poses in a diagnosis."""
-
-    length_s: FloatArray
-    means: FloatArray | None
-
-
-def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> _Poses:
-    """The poses in a diagnosis: cut where they were disturbed, or whole.
+def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray | None]:
+    """Durations (n,) [s] and mean readings (n, 3) of the poses in a diagnosis: cut where they were disturbed, or whole.
 
     Pieces with the duration of the whole pose would overlap: no covariance of their means, and too small an error.
     """
-    cut = resegment(recording, segments)
-    t = recording.time_s
-    best: tuple[float, _Poses] | None = None
-    for poses in (cut, segments if cut.whole is None else cut.whole):
+    cut, t = resegment(recording, segments), recording.time_s
+
+    def of(poses: Segments) -> tuple[float, FloatArray, FloatArray | None]:
         begin = np.array([t[pose.start] for pose in poses.poses])
         end = np.array([t[pose.stop - 1] for pose in poses.poses])
         away = np.abs(np.subtract.outer(shown_s, 0.5 * (begin + end)))
         nearest = np.argmin(away, axis=1)
-        missed = float(away[np.arange(len(nearest)), nearest].max())
-        if best is None or missed < best[0]:
-            mean = poses.accelerometer_mean
-            length = (end - begin)[nearest] + 1.0 / recording.rate_hz
-            best = missed, _Poses(length, None if mean is None else mean[nearest])
-    assert best is not None
-    return best[1]
+        length = (end - begin)[nearest] + 1.0 / recording.rate_hz
+        mean = poses.accelerometer_mean
+        return float(away.min(axis=1).max()), length, None if mean is None else mean[nearest]
+
+    _, length_s, means = min((of(cut), of(segments if cut.whole is None else cut.whole)), key=lambda one: one[0])
+    return length_s, means
 
 
 def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float) -> str:
     name = "Bias instability" if found.term == "B" else "The walk"
-    said = f"{name} of the {'gyro' if sensor == 'gyroscope' else sensor} is {common:.2g} times the recording's"
+    said = f"{name} of the {NAMES[sensor]} is {common:.2g} times the recording's"
     root = math.sqrt(rate_hz)
     if found.term == "K":
         for factor, words in (

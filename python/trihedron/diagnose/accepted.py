@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -15,9 +15,9 @@ from trihedron.diagnose.candidates import Tried
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
-from trihedron.diagnose.hypothesis import Hypothesis
+from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
@@ -103,71 +103,60 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
     for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
         is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
-        rows.append(((is_behind, -share, is_beside), record, share))
-    return tuple(AcceptedEffect(**record, share=share) for _, record, share in sorted(rows, key=lambda row: row[0]))
+        rows.append(((is_behind, -share, is_beside), replace(record, share=share)))
+    return tuple(record for _, record in sorted(rows, key=lambda row: row[0]))
 
 
-def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:
+def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[AcceptedEffect]:
     found, out = answer.found, []
     for k, term in enumerate(found.model.terms):
         effect, variant = term.effect, term.variant
         value, covariance = answer.numbers.value(k)
         parameters = effect.parameters(variant, value, covariance)
-        wald = _p_of(value, covariance)
         columns = variant.distortion.force, variant.distortion.rate
-        is_drawn = not effect.is_local
-        curves = effect_curves(found.model.context, columns, value, covariance, residuals) if is_drawn else ()
-        out.append(
-            _record(
-                effect, parameters, effect.statement(parameters), wald, found.scores[k], found.rivals[k],
-                held_out_records(found.without[k], found.model),
-                variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
-                values=[float(v) for v in value],
-            ) | {"curves": curves}
+        curves = () if effect.is_local else effect_curves(found.model.context, columns, value, covariance, residuals)
+        record = _record(
+            effect, parameters, effect.statement(parameters), _p_of(value, covariance), found.scores[k],
+            found.rivals[k], held_out_records(found.without[k], found.model),
+            variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
+            values=[float(v) for v in value],
         )  # fmt: skip
+        out.append(replace(record, curves=curves))
     return out
 
 
-def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[dict[str, Any]]:
+def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[AcceptedEffect]:
     model, out = answer.found.model, []
     for one in answer.biases:
         extra: dict[str, Any] = {}
         curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
-            state, obs = model.fitted.state, model.obs
-            path = state.accel_bias if one.effect.sensor == 0 else state.gyro_bias
+            path = model.fitted.bias(one.effect.sensor)
             extra["curve"] = {
-                "time_s": obs.pose_time_s.tolist(), "value": path.T.tolist(),
-                "sigma": [[float(s)] * obs.n_poses for s in one.std], "unit": one.effect.unit,
+                "time_s": model.obs.pose_time_s.tolist(), "value": path.T.tolist(),
+                "sigma": [[float(s)] * model.obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
-        # An upper bound: at its boundary a strength gains half a chi-square with one degree of freedom.
-        p = float(np.exp(-0.5 * max(one.gain, 0.0)))
         held = held_out_records(one.without, model)
         rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
-        record = _record(one.effect, one.parameters, one.statement, p, one.score, rivals, held, **extra)
-        out.append(record | {"curves": curves})
+        record = _record(one.effect, one.parameters, one.statement, one.p_value, one.score, rivals, held, **extra)
+        out.append(replace(record, curves=curves))
     return out
 
 
-def _of_samples(answer: Answer) -> list[dict[str, Any]]:
+def _of_samples(answer: Answer) -> list[AcceptedEffect]:
     context = Context(answer.numbers.obs, answer.numbers.fitted)
     out = []
     for one in answer.seen:
         evidence = one.evidence
         parameters = evidence.parameters if evidence.restate is None else evidence.restate(context)
-        extra = {"curve": evidence.series} if evidence.series else {}
         out.append(
-            _record(
-                one.effect, parameters, evidence.statement, evidence.p_value, one.gain, evidence.confounded_with,
-                evidence.held_out, **extra,
-            )
-        )  # fmt: skip
+            _record(one.effect, parameters, evidence.statement, evidence.p_value, one.gain, (), evidence.held_out)
+        )
     return out
 
 
 def _p_of(value: np.ndarray, covariance: np.ndarray) -> float:
-
     return float(chdtrc(len(value), float(value @ np.linalg.solve(covariance, value))))
 
 
@@ -180,39 +169,17 @@ def _record(
     rivals: tuple[str, ...],
     held_out: tuple[HeldOut, ...],
     **model: Any,
-) -> dict[str, Any]:
+) -> AcceptedEffect:
     by_id = {one.id: one for one in catalogue()}
     either = (effect, by_id[rivals[0]]) if rivals else ()
-    said: dict[str, Any] = {"variant": "", "shape": {}, "values": [], **model}
-    said["applies_to_other_recordings"] = effect.applies_elsewhere
-    return {
-        "id": effect.id,
-        "statement": statement,
-        "parameters": parameters,
-        "p_adjusted": min(1.0, max(p_value, LEAST_P) * len(catalogue())),
-        "delta_bic": float(score),
-        "held_out": held_out,
-        "confounded_with": rivals,
-        "separating_experiment": " / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
-        "model": MappingProxyType(said),
-    }
-
-
-def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
-    """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
-    was, now = before.prediction, after.prediction
-    rms_before, unit = physical_rms(before.fitted, was.innovation)
-    rms_after, _ = physical_rms(after.fitted, now.innovation)
-    out = []
-    for d, name in ROW_DOMAINS.items():
-        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
-            continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], LEAST_P)))
-        # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
-        left = float(now.chi2[d] / now.n_rows[d])
-        before_over_it = left * (rms_before[d] / max(rms_after[d], LEAST_P)) ** 2
-        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
-    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))
+    said = {"variant": "", "shape": {}, "values": [], **model, "applies_to_other_recordings": effect.applies_elsewhere}
+    return AcceptedEffect(
+        id=effect.id, statement=statement, parameters=parameters,
+        p_adjusted=min(1.0, max(p_value, LEAST_P) * len(catalogue())), delta_bic=float(score), held_out=held_out,
+        confounded_with=rivals,
+        separating_experiment=" / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
+        model=MappingProxyType(said),
+    )  # fmt: skip
 
 
 def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
@@ -240,9 +207,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
     for key, bias in asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
-            size = tuple(EffectParameter(p.name, p.value, p.std, p.unit) for p in bias.parameters)
-            p = min(1.0, float(np.exp(-0.5 * max(bias.gain, 0.0))))
-            out[key] = Candidate(key, p, True, "", bias.score, size, float(np.max(limit)))
+            out[key] = Candidate(key, bias.p_value, True, "", bias.score, bias.parameters, float(np.max(limit)))
     for k, term in enumerate(found.model.terms):
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)

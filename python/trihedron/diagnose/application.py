@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import Context, sensor_axes
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
@@ -26,6 +26,8 @@ from trihedron.records.words import words
 
 N_ITERATIONS = 2
 """Fixed-point iterations: effects are about 10⁻³ of the motion, so two leave an error of their square."""
+
+CHANNELS = {"temperature_degc": "temperature", "supply_v": "supply voltage"}
 
 
 class SignalMissing(RefusedError):
@@ -65,13 +67,11 @@ class SampleContext(Context):
 
     @cached_property
     def accel_axes(self) -> FloatArray:
-        out: FloatArray = self.accel_S * np.linalg.norm(np.linalg.inv(self.accel_S), axis=1)
-        return out
+        return sensor_axes(self.accel_S)
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
-        out: FloatArray = self.gyro_S * np.linalg.norm(np.linalg.inv(self.gyro_S), axis=1)
-        return out
+        return sensor_axes(self.gyro_S)
 
     @cached_property
     def angular_acceleration(self) -> FloatArray:
@@ -82,19 +82,13 @@ class SampleContext(Context):
     def at_points(self, samples: FloatArray) -> FloatArray:
         return samples
 
-    @cached_property
-    def temperature(self) -> FloatArray | None:
-        centred = self._logged("temperature_degc", "temperature") - self.reference["temperature_degc"]
-        return np.where(np.isfinite(centred), centred, 0.0)
+    @property
+    def references(self) -> Mapping[str, float]:
+        return self.reference
 
-    @cached_property
-    def supply(self) -> FloatArray | None:
-        relative = self._logged("supply_v", "supply voltage") / self.reference["supply_v"] - 1.0
-        return np.where(np.isfinite(relative), relative, 0.0)
-
-    def _logged(self, name: str, words: str) -> FloatArray:
-        logged: FloatArray | None = getattr(self.recording, name)
-        if logged is None or not np.isfinite(logged).any():
+    def _logged(self, name: str) -> FloatArray | None:
+        logged, words = super()._logged(name), CHANNELS[name]
+        if logged is None:
             raise SignalMissing(f"this recording has no {words}")
         if name not in self.reference:
             raise SignalMissing(f"the calibration does not say at which {words} it holds")

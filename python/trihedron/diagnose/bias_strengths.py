@@ -6,7 +6,7 @@ with that strength bounded to what the part's own noise explains.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,6 +47,11 @@ class BiasStrength:
     is_large: bool
     """Whether the bias changes exceed those that undetected 1/f noise causes (``LEAST_TIMES``)."""
 
+    @property
+    def p_value(self) -> float:
+        """An upper bound: at its boundary a strength gains half a chi-square with one degree of freedom."""
+        return float(np.exp(-0.5 * max(self.gain, 0.0)))
+
 
 def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
     """The processes that are named, largest gain first; and all that were tested, by id."""
@@ -61,13 +66,8 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
         both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
         if len(both) == 2 and not any(one in named for one in both):
             # Drift and scatter can absorb each other: bound both; where that is unlikely the likelier one is named.
-            corner, scatter, excess = model.within
-            bounds = noise_bounds(model)
-            of = [
-                [b[k] if k == sensor else w[k] for k in range(2)]
-                for b, w in ((bounds[0], corner), (bounds[1], scatter))
-            ]
-            without = again(model, model.terms, ((of[0][0], of[0][1]), (of[1][0], of[1][1]), excess))
+            bounds = _bounded(model, model.within, {(sensor, True), (sensor, False)})
+            without = again(model, model.terms, bounds)
             gain = 2.0 * (model.log_evidence - without.log_evidence)
             if gain > limit:
                 likelier = max(both, key=lambda one: one.gain)
@@ -75,24 +75,24 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     return sorted(named, key=lambda one: -one.gain), asked
 
 
-def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds:
+def noise_bounds(model: Hypothesis, but: Collection[BiasProcess] = ()) -> Bounds:
     """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
-    expected = _flicker(model)
-    corner = [ANYTHING[0][s] if (s, True) in free else NOISE_CORNER_S for s in range(2)]
-    scatter = [ANYTHING[1][s] if (s, False) in free else float(expected[s]) for s in range(2)]
-    return (corner[0], corner[1]), (scatter[0], scatter[1]), ANYTHING[2]
+    return _bounded(model, ANYTHING, {(s, walks) for s in range(2) for walks in (True, False)} - free)
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
     """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains."""
-    s = effect.sensor
-    corner, scatter = list(model.within[0]), list(model.within[1])
-    if effect.walks:
-        corner[s] = NOISE_CORNER_S
-    else:
-        scatter[s] = float(_flicker(model)[s])
-    return (corner[0], corner[1]), (scatter[0], scatter[1]), model.within[2]
+    return _bounded(model, model.within, {(effect.sensor, effect.walks)})
+
+
+def _bounded(model: Hypothesis, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:
+    """Bounds, those of some processes (sensor, whether it walks) replaced by what the part's own noise explains."""
+    corner, scatter, excess = within
+    expected = _flicker(model)
+    corners = [NOISE_CORNER_S if (s, True) in which else corner[s] for s in range(2)]
+    scatters = [float(expected[s]) if (s, False) in which else scatter[s] for s in range(2)]
+    return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
 
 
 def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
@@ -119,13 +119,19 @@ def _flicker(model: Hypothesis) -> FloatArray:
 
 def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
     """Rms of the bias about its mean over the poses, in standard errors of a pose mean."""
-    sensor, scatter = effect.sensor, model.strengths[1]
+    sensor = effect.sensor
     if not effect.walks:
-        return float(max(scatter[1:] if sensor else scatter[:1]))
-    state = model.fitted.state
-    path = (state.accel_bias, state.gyro_bias)[sensor]
-    unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
-    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
+        return float(max(_scatter(model, sensor)))
+    unit = _units(model)[sensor] * model.context.si_per_raw(sensor)
+    return (
+        float(np.sqrt(np.mean(model.fitted.bias(sensor).var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
+    )
+
+
+def _scatter(model: Hypothesis, sensor: int) -> tuple[float, ...]:
+    """Scatter from pose to pose in its unit: one of the accelerometer, of a gyro by axis."""
+    scatter = model.strengths[1]
+    return scatter[1:] if sensor else scatter[:1]
 
 
 def _units(model: Hypothesis) -> FloatArray:
@@ -135,20 +141,15 @@ def _units(model: Hypothesis) -> FloatArray:
 
 def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
     """(3,) SI by axis, and its standard uncertainty: one sigma of a scatter, the peak-to-peak range of a drift."""
-    sensor = ("accelerometer", "gyroscope")[effect.sensor]
-    n = model.obs.n_poses
+    sensor, obs = effect.sensor, model.obs
+    si_per_raw = model.context.si_per_raw(sensor)
     if not effect.walks:
-        scatter = np.array(model.strengths[1])
-        raw = (scatter[1:] if effect.sensor else scatter[0]) * _units(model)[effect.sensor]
-        size = raw * model.context.si_per_raw(sensor)
-        return size, size / np.sqrt(2.0 * max(n - 1, 1))
-    state = model.fitted.state
-    path = state.accel_bias if effect.sensor == 0 else state.gyro_bias
-    obs = model.obs
-    sigma = obs.pose_force_sigma if effect.sensor == 0 else obs.pose_rate_sigma
+        size = np.array(_scatter(model, sensor)) * _units(model)[sensor] * si_per_raw
+        return size, size / np.sqrt(2.0 * max(obs.n_poses - 1, 1))
+    sigma = (obs.pose_force_sigma, obs.pose_rate_sigma)[sensor]
     assert sigma is not None
-    error = np.median(sigma, axis=0) * model.context.si_per_raw(sensor)
-    return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)
+    error = np.median(sigma, axis=0) * si_per_raw
+    return np.ptp(model.fitted.bias(sensor), axis=0), np.asarray(np.sqrt(2.0) * error)
 
 
 def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]) -> list[Tried]:

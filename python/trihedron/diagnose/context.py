@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,23 +30,22 @@ LEAST_SWING_V = 1e-4
 class Context:
     """Signals at the points of the session (one per pose, then every sample of every move), SI, body frame.
 
-    Everything is computed from the fitted session when first used. ``latitude_deg`` is the user's, if given.
+    Everything is computed from the fitted session when first used.
     """
 
     obs: Observations
     fitted: Fit
-    latitude_deg: float | None = None
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return len(self.fitted.line.path.force)
+        return len(self.fitted.path.force)
 
     @property
     def moves(self) -> tuple[slice, ...]:
         """Points of each move."""
-        return self.fitted.line.path.move_slices
+        return self.fitted.path.move_slices
 
     @cached_property
     def move_edges(self) -> npt.NDArray[np.int64]:
@@ -55,30 +55,37 @@ class Context:
     @cached_property
     def time_s(self) -> FloatArray:
         """(points,) middle of each pose, time of each sample."""
-        times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
+        times: FloatArray = self.obs.time_s[self.fitted.path.point_samples].copy()
         times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
 
     @cached_property
     def elapsed(self) -> FloatArray:
         """(points,) time from 0 at the first to 1 at the last sample of the recording."""
-        out: FloatArray = (self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9)
-        return out
+        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9))
 
     # -- motion ---------------------------------------------------------------------------------------------------
     @property
     def force(self) -> FloatArray:
         """(points, 3) specific force: exactly g along the fitted vertical in poses."""
-        return self.fitted.line.path.force
+        return self.fitted.path.force
 
     @property
     def rate(self) -> FloatArray:
         """(points, 3) angular rate: zero in poses."""
-        return self.fitted.line.path.rate
+        return self.fitted.path.rate
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in poses."""
         return _core.move_derivative(self.time_s, np.ascontiguousarray(values), self.move_edges)
+
+    def shifted(self, values: FloatArray, ahead_s: float) -> FloatArray:
+        """(points, 3) values at a time ``ahead_s`` later inside moves, constant beyond their ends; unchanged in poses.
+
+        By a cubic spline per move with zero slope at its ends: linear interpolation would be a low-pass of its own.
+        """
+        values = np.ascontiguousarray(np.asarray_chkfinite(values))
+        return _core.move_shifted(self.time_s, values, self.move_edges, ahead_s)
 
     @cached_property
     def force_rate(self) -> FloatArray:
@@ -93,7 +100,7 @@ class Context:
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, propagated by the gyro from each move's start; ``force`` in poses."""
-        path, state, h = self.fitted.line.path, self.fitted.state, self.obs.n_poses
+        path, state, h = self.fitted.path, self.fitted.state, self.obs.n_poses
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
             out[where] = state.gravity * path.attitude[where.start - h : where.stop - h] @ state.up[before]
@@ -103,16 +110,12 @@ class Context:
     @cached_property
     def accel_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
-        S = self.fitted.state.accel_S
-        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return sensor_axes(self.fitted.state.accel_S)
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected rate when gyro j alone reads 1 rad/s more along its own axis."""
-        S = self.fitted.state.gyro_S
-        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return sensor_axes(self.fitted.state.gyro_S)
 
     @cached_property
     def axis_force(self) -> FloatArray:
@@ -123,6 +126,10 @@ class Context:
     def axis_rate(self) -> FloatArray:
         """(points, 3) angular rate along each gyro's own axis."""
         return self.rate @ np.linalg.inv(self.gyro_axes).T
+
+    def axis_motion(self, sensor: int) -> FloatArray:
+        """(points, 3) :attr:`axis_force` of sensor 0, :attr:`axis_rate` of sensor 1."""
+        return self.axis_rate if sensor else self.axis_force
 
     def on_accelerometers(self, values: FloatArray) -> FloatArray:
         """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
@@ -135,7 +142,7 @@ class Context:
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
         """Values of a whole-recording signal (n, ...) at the points: pose means, then move samples."""
-        out = np.array(samples[self.fitted.line.path.point_samples], dtype=np.float64)
+        out = np.array(samples[self.fitted.path.point_samples], dtype=np.float64)
         out[: self.obs.n_poses] = self.obs.pose_means(samples)
         return out
 
@@ -146,49 +153,40 @@ class Context:
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):
             force[pose.start : pose.stop] = state.gravity * state.up[i]
-        finite = np.where(np.isfinite(force), force, 0.0)
-        out: FloatArray = finite @ np.linalg.inv(self.accel_axes).T
-        return out
+        return np.asarray(_finite(force) @ np.linalg.inv(self.accel_axes).T)
+
+    def _logged(self, name: str) -> FloatArray | None:
+        """A logged channel (n,) of the recording, if it has any value."""
+        logged: FloatArray | None = getattr(self.obs.recording, name)
+        return None if logged is None or not np.isfinite(logged).any() else logged
 
     @cached_property
     def temperature(self) -> FloatArray | None:
         """(points,) logged temperature minus its mean, °C."""
-        logged = self.obs.recording.temperature_degc
-        if logged is None or not np.isfinite(logged).any():
-            return None
-        values = self.at_points(logged)
-        centred: FloatArray = values - np.nanmean(values[: self.obs.n_poses])
-        return np.where(np.isfinite(centred), centred, 0.0)
+        logged = self._logged("temperature_degc")
+        return None if logged is None else _finite(self.at_points(logged) - self.references["temperature_degc"])
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
         """(points,) rate of change of the logged temperature, smoothed over ``TEMPERATURE_WINDOW_S``, K/s."""
-        recording = self.obs.recording
-        logged = recording.temperature_degc
-        if logged is None or not np.isfinite(logged).any():
+        recording, logged = self.obs.recording, self._logged("temperature_degc")
+        if logged is None:
             return None
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
-        slope = smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz)
-        return self.at_points(slope)
+        return self.at_points(smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz))
 
     @cached_property
     def supply(self) -> FloatArray | None:
         """(points,) relative deviation of the logged supply voltage from its mean."""
-        logged = self.obs.recording.supply_v
-        if logged is None or not np.isfinite(logged).any():
-            return None
-        values = self.at_points(logged)
-        relative: FloatArray = values / np.nanmean(values[: self.obs.n_poses]) - 1.0
-        return np.where(np.isfinite(relative), relative, 0.0)
+        logged = self._logged("supply_v")
+        return None if logged is None else _finite(self.at_points(logged) / self.references["supply_v"] - 1.0)
 
     @property
-    def references(self) -> dict[str, float]:
+    def references(self) -> Mapping[str, float]:
         """Means subtracted from (or dividing) the logged signals: needed to apply the model to another recording."""
-        recording, out = self.obs.recording, {}
-        for name, logged in (("temperature_degc", recording.temperature_degc), ("supply_v", recording.supply_v)):
-            if logged is not None and np.isfinite(logged).any():
-                out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_poses]))
-        return out
+        known = {name: self._logged(name) for name in ("temperature_degc", "supply_v")}
+        n = self.obs.n_poses
+        return {k: float(np.nanmean(self.at_points(v)[:n])) for k, v in known.items() if v is not None}
 
     @cached_property
     def pose_power(self) -> FloatArray:
@@ -199,12 +197,10 @@ class Context:
             out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
         return out
 
-    def si_per_raw(self, sensor: str) -> FloatArray:
-        """(3,) SI size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``."""
+    def si_per_raw(self, sensor: int) -> FloatArray:
+        """(3,) SI size of one raw unit along each axis of sensor 0 (accelerometer) or 1 (gyro)."""
         state = self.fitted.state
-        S = state.accel_S if sensor == "accelerometer" else state.gyro_S
-        out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
-        return out
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(state.gyro_S if sensor else state.accel_S), axis=1))
 
     @cached_property
     def vibration_power(self) -> FloatArray:
@@ -256,7 +252,7 @@ class Context:
 
         Poses that no chain of moves reaches keep NaN.
         """
-        obs, state, path = self.obs, self.fitted.state, self.fitted.line.path
+        obs, state, path = self.obs, self.fitted.state, self.fitted.path
         out = np.full((obs.n_poses, 3, 3), np.nan)
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
@@ -282,6 +278,15 @@ class Context:
         if obs.rate_density is not None:
             out[1] = np.sqrt((state.gyro_S**2) @ obs.rate_density**2) * root_rate
         return out
+
+
+def sensor_axes(S: FloatArray) -> FloatArray:
+    """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
+    return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:

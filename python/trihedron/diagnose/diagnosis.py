@@ -7,19 +7,20 @@ from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.special import ndtr
 
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
 from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths, noise_bounds
+from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.sample_steps import step_errors
-from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
+from trihedron.diagnose.effects.timing_jitter import STEP_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
-from trihedron.diagnose.relation_records import records
+from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
-from trihedron.diagnose.residuals.goodness_of_fit import hidden_biases, judge_rows, judge_timing
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
@@ -28,12 +29,11 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
-from trihedron.diagnose.shapes import with_shapes
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis, Verdict
-from trihedron.records.domains import DomainTest
+from trihedron.records.domains import DomainTest, Where
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.noise import Strengths
@@ -71,9 +71,7 @@ def diagnose_recording(
     ValueError
             When there is nothing to compare a model with: no accelerometer, fewer than two poses.
     """
-    return diagnosed(
-        recording, segments, calibration, calibration_is_given=calibration_is_given, alpha=alpha, progress=progress
-    )[0]
+    return _diagnosed(recording, segments, calibration, calibration_is_given, alpha, progress or _silently)[0]
 
 
 def diagnose_recordings(
@@ -97,28 +95,30 @@ def diagnose_recordings(
     """
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
-    tell = progress or (lambda _fraction, _text: None)
+    tell = progress or _silently
     each = []
-    for k, one in enumerate(given):
-        tell(0.8 * k / len(given), f"diagnosing {one[0].source}")
-        each.append(diagnosed(*one, alpha=alpha))
+    for k, (recording, segments, calibration) in enumerate(given):
+        tell(0.8 * k / len(given), f"diagnosing {recording.source}")
+        each.append(_diagnosed(recording, segments, calibration, False, alpha, _silently))
     tell(0.8, "asking what all recordings share")
     effects, candidates_together = shared_effects([model for _, model in each], alpha)
     tell(1.0, "done")
     return SharedDiagnosis(tuple(one for one, _ in each), effects, candidates_together)
 
 
-def diagnosed(
+def _silently(_fraction: float, _text: str) -> None:
+    pass
+
+
+def _diagnosed(
     recording: Recording,
     segments: Segments,
     calibration: Calibration,
-    *,
-    calibration_is_given: bool = False,
-    alpha: float = 0.01,
-    progress: Progress | None = None,
+    calibration_is_given: bool,
+    alpha: float,
+    tell: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
-    tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
@@ -136,23 +136,13 @@ def diagnosed(
     final = base if verdict == "consistent" else answer.numbers.fitted
     residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
-        verdict=verdict,
-        domains=run.domains,
-        effects=accepted_effects(answer, residuals),
-        remaining=run.remaining,
-        candidates=candidates(answer, run.candidates, run.asked),
-        baseline=with_covariance(linear_model(base), base),
-        extended=with_covariance(linear_model(final), final),
-        noise=_noise(model),
-        gravity_m_s2=calibration.gravity_m_s2,
-        alpha=alpha,
-        recording_source=recording.source,
-        recording_sha256=recording.sha256,
-        references=MappingProxyType(model.context.references),
-        residuals=residuals,
-        relations=relations,
-        stages=held_out_stages(run.bare, answer),
-    )
+        verdict=verdict, domains=run.domains, effects=accepted_effects(answer, residuals), remaining=run.remaining,
+        candidates=candidates(answer, run.candidates, run.asked), baseline=with_covariance(linear_model(base), base),
+        extended=with_covariance(linear_model(final), final), noise=_noise(model),
+        gravity_m_s2=calibration.gravity_m_s2, alpha=alpha, recording_source=recording.source,
+        recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
+        residuals=residuals, relations=relations, stages=held_out_stages(run.bare, answer),
+    )  # fmt: skip
     tell(1.0, "done")
     return result, model
 
@@ -161,15 +151,14 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise density, noise corner time and bias changes of both sensors."""
     state, obs = model.fitted.state, model.obs
     accel, gyro = hidden_biases(model.fitted)
+    density = None if obs.rate_density is None else np.sqrt((state.gyro_S**2) @ obs.rate_density**2).tolist()
     return MappingProxyType(
         {
             "accelerometer_density": np.sqrt((state.accel_S**2) @ obs.force_density**2).tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
             "accelerometer_corner_s": state.strengths[0][0],
             "accelerometer_bias": asdict(accel),
-            "gyroscope_density": None
-            if obs.rate_density is None
-            else np.sqrt((state.gyro_S**2) @ obs.rate_density**2).tolist(),
+            "gyroscope_density": density,
             "gyroscope_unit": "rad/s/sqrt(Hz)",
             "gyroscope_corner_s": state.strengths[0][1],
             "gyroscope_bias": None if gyro is None else asdict(gyro),
@@ -193,9 +182,9 @@ class _Run:
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
     predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior, alpha)
-    context = Context(predicted.line.obs, predicted)
+    context = Context(predicted.obs, predicted)
     tell(0.2, "looking at the samples")
-    observed, known = look(Observed(predicted.line.obs, predicted), context, alpha, start, prior)
+    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
     domains = _all_domains(context, alpha, observed.refused)
     tell(0.3, "letting effects compete")
     bare, found = _searched(observed, prior, alpha)
@@ -232,7 +221,7 @@ def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hy
 
 def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alpha: float) -> Fit:
     """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
-    context = Context(predicted.line.obs, predicted)
+    context = Context(predicted.obs, predicted)
     found = settling(context)
     if found.score < threshold(alpha):
         return predicted
@@ -240,19 +229,27 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
-    common = common_time_error(step_errors(context), 1.0 / context.obs.recording.rate_hz)
-    return (
-        *judge_rows(context.fitted, alpha),
-        judge_within_poses(context.obs, alpha),
-        judge_timing(common, _found(context, refused) if np.isfinite(common[1]) else [], alpha),
-    )
+    """Every domain's test; ``refused`` are ids of effects that did not improve the prediction of held-out moves: jolts
+    look like lost samples."""
+    rows, within = judge_rows(context.fitted, alpha), judge_within_poses(context.obs, alpha)
+    return (*rows, within, _judge_timing(context, alpha, refused))
 
 
-def _found(context: Context, refused: Collection[str]) -> list[Evidence]:
-    """Evidence for lost samples and jitter; ``refused`` are ids of effects that did not improve the prediction of
-    held-out moves: jolts look like lost samples."""
+def _judge_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
+    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests."""
+    value, spread, n = common_time_error(context)
+    if not np.isfinite(spread):
+        return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
     looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
-    return [evidence for look in looks if (evidence := look.find(context)) is not None]
+    found = [evidence for look in looks if (evidence := look.find(context)) is not None]
+    z = value / spread
+    p = min([min(1.0, 2.0 * e.p_value) for e in found], default=float(min(1.0, max(2.0 * ndtr(-z), 0.05))))
+    where = Where(
+        (), tuple(s for e in found for s in e.where.segments), tuple(t for e in found for t in e.where.times_s)
+    )
+    chi2_per_dof = 1.0 + max(z, 0.0) ** 2 / n + sum(e.strength for e in found if e.reweigh is not None) / n
+    rms = float(np.sqrt(max(value, 0.0) / STEP_FACTOR))
+    return DomainTest("timing", chi2_per_dof, float(n), p, p < alpha / N_DOMAINS_TESTED, where, rms, "s")
 
 
 # The verdict: which domains could be tested, which disagree still, and one word.

@@ -11,11 +11,11 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
 from trihedron.diagnose.session.state import (
     Distortion,
-    Linearisation,
     Prior,
     SessionState,
     contiguous,
@@ -24,6 +24,7 @@ from trihedron.diagnose.session.state import (
     stacked,
     state_of,
 )
+from trihedron.records.domains import HeldOut
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 from trihedron.threads import side_by_side
 
@@ -89,12 +90,12 @@ class Hypothesis:
     @property
     def log_evidence(self) -> float:
         """Log-likelihood with everything but the noise strengths integrated out, up to a constant."""
-        return self.fitted.line.core.log_marginal
+        return self.fitted.core.log_marginal
 
     @property
     def strengths(self) -> Strengths:
         """Corner times [s], scatter and its departure during moves in their units, factors on the noise of moves."""
-        return self.fitted.line.core.strengths
+        return self.fitted.core.strengths
 
     @cached_property
     def context(self) -> Context:
@@ -109,7 +110,7 @@ class Hypothesis:
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds = self.within if within is None else within
-        found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
+        found = self.fitted.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
         return [AddedTerms(*one) for one in found]
 
     def gains(
@@ -119,14 +120,12 @@ class Hypothesis:
 
         With ``parts``, lists of column numbers, the gain of each of these subsets.
         """
-        found = self.fitted.line.core.candidate_gains(
-            _columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts
-        )
+        found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [AtStrengths(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""
-        ((found, *_),) = self.fitted.line.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
+        ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
         return max(self.log_evidence, float(found))
 
     def span(self, k: int) -> slice:
@@ -137,7 +136,7 @@ class Hypothesis:
     def value(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Parameters of term ``k`` and their covariance."""
         covariance = self.fitted.covariance()
-        n, at = self.fitted.n_effect, self.span(k)
+        n, at = self.fitted.distortion.n_parameters, self.span(k)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
 
@@ -163,8 +162,7 @@ def hypothesis(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
     )  # fmt: skip
-    state = state_of(core, start.gravity)
-    fitted = Fit(state, Linearisation(obs, state, distortion, prior, core), has_free_strengths=True)
+    fitted = Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths=True)
     return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 
@@ -179,3 +177,20 @@ def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
     """The hypothesis without each of its terms."""
     terms = known.terms
     return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
+
+
+def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
+    """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
+    was, now = before.prediction, after.prediction
+    rms_before, unit = physical_rms(before.fitted, was.innovation)
+    rms_after, _ = physical_rms(after.fitted, now.innovation)
+    out = []
+    for d, name in ROW_DOMAINS.items():
+        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
+            continue
+        gain = float(np.log(rms_before[d] / max(rms_after[d], 1e-300)))
+        # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
+        left = float(now.chi2[d] / now.n_rows[d])
+        before_over_it = left * (rms_before[d] / max(rms_after[d], 1e-300)) ** 2
+        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
+    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

@@ -47,7 +47,7 @@ class Observed:
     @property
     def obs(self) -> Observations:
         """The observations as corrected."""
-        return self.fitted.line.obs
+        return self.fitted.obs
 
 
 def look(
@@ -59,7 +59,7 @@ def look(
     only: Collection[str] = (),
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations corrected for every effect that its own test detects, and the result of every test."""
-    held = {one.effect.id for one in observed.seen if not one.effect.repeatable} | observed.refused
+    held = {one.effect.id for one in observed.seen if not one.effect.is_local} | observed.refused
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
@@ -70,7 +70,7 @@ def look(
             candidates[effect.id] = Candidate(effect.id, None, False, reason)
             continue
         evidence = effect.find(context)
-        if not effect.repeatable or evidence is not None:
+        if not effect.is_local or evidence is not None:
             candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
         # Half of the false-alarm rate is for these tests, half for the search.
         if evidence is not None and evidence.p_value * len(catalogue()) < alpha / 2.0:

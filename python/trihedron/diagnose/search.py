@@ -12,20 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
-from trihedron.diagnose.candidates import NEAR, Tried, all_beside, candidates_beside
+from trihedron.diagnose.candidates import NEAR, Tried, all_beside, as_fits_best, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.diagnose.session.state import (
-    DYNAMICS,
-    MOVES,
-    STATIC_ACCEL,
-    STATIC_GYRO,
-    Distortion,
-)
-from trihedron.diagnose.shapes import as_fits_best
+from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
@@ -212,7 +205,7 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
     best: tuple[float, Hypothesis, Term] | None = None
     for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)
-        if not term.effect.is_plausible_variant(term.variant, value, covariance):
+        if not term.effect.is_plausible(term.variant, value, covariance):
             continue
         score = 2.0 * larger.log_evidence - term.cost
         if best is None or score > best[0]:
@@ -221,11 +214,9 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term = as_fits_best(model, tried)
-    state = model.fitted.state
+    term, state = as_fits_best(model, tried), model.fitted.state
     start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
-    strengths = tried.asked.strengths
-    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, strengths)
+    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:
@@ -267,7 +258,7 @@ def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesi
         for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
             fitted = as_fits_best(without, other)
             swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
-            if fitted.effect.is_plausible_variant(fitted.variant, *swapped.value(k)):
+            if fitted.effect.is_plausible(fitted.variant, *swapped.value(k)):
                 scored.append((2.0 * swapped.log_evidence - fitted.cost, swapped, fitted))
         _, model, chosen = max(scored, key=lambda one: one[0])
         least = model.log_evidence - 0.5 * NEAR

@@ -164,22 +164,18 @@ def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
     """The score of a shared effect beside all others, and its record."""
     fewer = held.without(k)
     joint = _full(fewer.models, held.terms(k))
-    term = joint.terms[0]
-    unit = term.sizes
+    term, unit = joint.terms[0], joint.terms[0].sizes
 
     def parameters(value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         return term.effect.parameters(term.variant, value * unit, covariance * np.outer(unit, unit))
 
     alone = [together([part], joint.scale) for part in joint.parts]
+    p_agree = agreement(joint.parts)
     return joint.score, SharedEffect(
-        id=term.effect.id,
-        score=joint.score,
-        parameters=parameters(joint.value, joint.covariance),
-        scores=tuple(2.0 * gain - term.cost for gain, *_ in alone),
-        each=tuple(parameters(value, covariance) for _, value, covariance in alone),
-        p_agree=(p_agree := agreement(joint.parts)),
-        is_of_instrument=p_agree > alpha,
-    )
+        term.effect.id, joint.score, parameters(joint.value, joint.covariance),
+        tuple(2.0 * gain - term.cost for gain, *_ in alone),
+        tuple(parameters(value, covariance) for _, value, covariance in alone), p_agree, p_agree > alpha,
+    )  # fmt: skip
 
 
 def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Joint]:

@@ -66,15 +66,10 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     freedom = max(width - 1, 1)
     fast, slow, limits, is_quiet, white, drift = _core.noise_floor(
-        channels.mean,
-        channels.variance,
-        channels.is_valid,
-        inside_the_range(channels, ends),
-        channels.quantisation_variance,
-        channels.length,
-        (width, channels.blocks(SEED_S), probability.chdtri(freedom, 0.5) / freedom),
-        TAILS,
-    )
+        channels.mean, channels.variance, channels.is_valid, inside_the_range(channels, ends),
+        channels.quantisation_variance, channels.length,
+        (width, channels.blocks(SEED_S), probability.chdtri(freedom, 0.5) / freedom), TAILS,
+    )  # fmt: skip
     return Activity(fast, slow, limits[0], limits[1], is_quiet, white, drift)
 
 

@@ -22,11 +22,7 @@ POSES_FOR_NINE = 9
 
 
 def judge_runs(
-    recording: Recording,
-    channels: Channels,
-    runs: list[Run],
-    poses: tuple[Pose, ...],
-    noise: MeanNoise,
+    recording: Recording, channels: Channels, runs: list[Run], poses: tuple[Pose, ...], noise: MeanNoise
 ) -> list[Finding]:
     """Settling, disturbances and unsteadiness of single poses, each with its number and time."""
     found: list[Finding] = []
@@ -36,39 +32,25 @@ def judge_runs(
         worst, k = max(creeping)
         found.append(
             Finding.of(
-                FindingCode.POSE_SETTLING,
-                poses=len(creeping),
-                worst_pose=k + 1,
-                worst_s=_start_s(recording, poses[k]),
-                worst_sigmas=worst,
-                which=_named([c for _, c in creeping]),
+                FindingCode.POSE_SETTLING, poses=len(creeping), worst_pose=k + 1,
+                worst_s=_start_s(recording, poses[k]), worst_sigmas=worst, which=_named([c for _, c in creeping]),
             )
-        )
+        )  # fmt: skip
     bumped = [k for k, pose in enumerate(poses) if pose.disturbed]
     if bumped:
-        n = sum(len(poses[k].disturbed) for k in bumped)
-        lost = sum((b - a) for k in bumped for a, b in poses[k].disturbed) / recording.rate_hz
-        first = poses[bumped[0]]
+        spans = [span for k in bumped for span in poses[k].disturbed]
+        lost = sum(b - a for a, b in spans) / recording.rate_hz
         found.append(
             Finding.of(
-                FindingCode.POSE_DISTURBED,
-                disturbances=n,
-                poses=len(bumped),
-                which=_named(bumped),
-                left_out_s=lost,
-                first_s=recording.time_s[first.disturbed[0][0]],
+                FindingCode.POSE_DISTURBED, disturbances=len(spans), poses=len(bumped), which=_named(bumped),
+                left_out_s=lost, first_s=recording.time_s[spans[0][0]],
             )
-        )
+        )  # fmt: skip
     unsteady = [k for k, pose in enumerate(poses) if pose.is_unsteady]
     if unsteady:
-        found.append(
-            Finding.of(
-                FindingCode.POSE_UNSTEADY,
-                poses=len(unsteady),
-                which=_named(unsteady),
-                first_s=_start_s(recording, poses[unsteady[0]]),
-            )
-        )
+        first_s = _start_s(recording, poses[unsteady[0]])
+        which = _named(unsteady)
+        found.append(Finding.of(FindingCode.POSE_UNSTEADY, poses=len(unsteady), which=which, first_s=first_s))
     return found
 
 
@@ -97,19 +79,18 @@ def _halves(run: Run) -> tuple[list[Range], list[Range]]:
     half = sum(b - a for a, b in ranges) // 2
     if half < 2:
         return [], []
-    first, left = [], half
+    mirrored = [(-b, -a) for a, b in reversed(ranges)]
+    return _first_blocks(ranges, half), [(-b, -a) for a, b in reversed(_first_blocks(mirrored, half))]
+
+
+def _first_blocks(ranges: list[Range], count: int) -> list[Range]:
+    """The first ``count`` blocks of some ranges."""
+    out, left = [], count
     for a, b in ranges:
-        first.append((a, min(b, a + left)))
-        left -= first[-1][1] - a
-        if not left:
-            break
-    last, left = [], half
-    for a, b in reversed(ranges):
-        last.append((max(a, b - left), b))
-        left -= b - last[-1][0]
-        if not left:
-            break
-    return first, last[::-1]
+        if left:
+            out.append((a, min(b, a + left)))
+            left -= out[-1][1] - a
+    return out
 
 
 def without_cut(
@@ -129,11 +110,7 @@ def without_cut(
 
 
 def judge_log(
-    recording: Recording,
-    channels: Channels,
-    runs: list[Run],
-    poses: tuple[Pose, ...],
-    turning: BoolArray,
+    recording: Recording, channels: Channels, runs: list[Run], poses: tuple[Pose, ...], turning: BoolArray
 ) -> list[Finding]:
     """Findings on the log as a whole: number of poses, slow rotation, no initial pose."""
     found: list[Finding] = []

@@ -61,15 +61,14 @@ def average_poses(
     rounding = rounding_bias_variance(channels, runs)
     variance = noise.variance(duration[:, None]) * shrunk + rounding
     out = PoseMeans(mean, np.sqrt(variance), n_averaged)
-    up = (
-        upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
-        if recording.accelerometer is not None and runs
-        else None
-    )
+    if recording.accelerometer is None or not runs:
+        return out
+    up = upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
     if up is None:
         return out
-    upward = along(channels, runs, up)
-    model = noise_along(upward, runs)
+    upward = _along(channels, runs, up)
+    steady_ranges = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
+    model = pool_mean_noise(upward, steady_ranges or [r for run in runs for r in run.quiet_ranges()])
     ratio, freedom = _excess(upward, runs, model)
     own = model.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
     return replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
@@ -97,37 +96,22 @@ def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[Fl
     mean = np.empty((len(poses), 3 * len(triads)))
     n_averaged = np.zeros(len(poses), dtype=np.int64)
     for k, pose in enumerate(poses):
-        sums = [_Sum() for _ in triads]
+        # Relative to a first row, so that a large offset costs no digits.
+        about = np.full((len(triads), 3), np.nan)
+        total, count = np.zeros((len(triads), 3)), np.zeros((len(triads), 1))
         for first, last in pose.undisturbed():
             # In pieces, so that a pose of hours is not copied as a whole.
             for start in range(first, last, PIECE):
                 readings = [triad[start : min(start + PIECE, last)] for triad in triads]
                 finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
                 n_averaged[k] += int(np.logical_and.reduce(finite).sum())
-                for sum_, r, f in zip(sums, readings, finite, strict=True):
-                    sum_.add(r if f.all() else r[f])
-        mean[k] = np.concatenate([sum_.mean() for sum_ in sums])
+                for j, rows in enumerate(r[f] for r, f in zip(readings, finite, strict=True)):
+                    if len(rows) and not count[j]:
+                        about[j] = rows[0]
+                    total[j] += (rows - about[j]).sum(axis=0)
+                    count[j] += len(rows)
+        mean[k] = (about + total / np.maximum(count, 1.0)).ravel()
     return mean, n_averaged
-
-
-class _Sum:
-    """A mean relative to the first row, so that a large offset costs no digits."""
-
-    def __init__(self) -> None:
-        self.about: FloatArray | None = None
-        self.total: FloatArray = np.zeros(3)
-        self.n = 0
-
-    def add(self, rows: FloatArray) -> None:
-        if not len(rows):
-            return
-        if self.about is None:
-            self.about = np.array(rows[0])
-        self.total = self.total + (rows - self.about).sum(axis=0)
-        self.n += len(rows)
-
-    def mean(self) -> FloatArray:
-        return np.full(3, np.nan) if self.about is None else np.asarray(self.about + self.total / self.n)
 
 
 def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:
@@ -248,11 +232,10 @@ def upright(mean: FloatArray, *, has_unit: bool) -> FloatArray | None:
 
 
 def _unit(rows: FloatArray) -> FloatArray:
-    out: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    return out
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
-def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
+def _along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
     """The accelerometer's blocks along each pose's own direction ``up`` (h, 3), as the first axis of a triad.
 
     A soft support, a tremor and settling rotate gravity across itself: readings across the vertical change by the
@@ -267,9 +250,3 @@ def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
             variance[a:b, 0] = channels.variance[a:b, force] @ direction**2
     quantum = np.array([float(channels.quantum[force].min()), 0.0, 0.0])
     return replace(channels, mean=mean, variance=variance, quantum=quantum, is_gyroscope=np.zeros(3, dtype=bool))
-
-
-def noise_along(channels: Channels, runs: list[Run]) -> MeanNoise:
-    """Noise of the mean along that axis, from steady poses where there are any."""
-    pooled = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
-    return pool_mean_noise(channels, pooled or [r for run in runs for r in run.quiet_ranges()])

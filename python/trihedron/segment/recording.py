@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs, without_cut
-from trihedron.segment.means import average_poses
+from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
@@ -35,7 +36,7 @@ from trihedron.segment.runs import (
     trim_edges,
     widen,
     without_approaches,
-)
+)  # fmt: skip
 from trihedron.segment.shaken import find_vibrating
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
 from trihedron.units import AccelerationUnit, rate_to_si
@@ -95,15 +96,12 @@ def segment_blocks(
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
     gravity = _gravity_reading(recording, channels)
     scale = None
-    if gravity is None:
-        turning = turning_blocks(channels, quiet, None, None)
-        quiet &= ~turning
-    else:
-        is_counts = recording.accelerometer_unit is AccelerationUnit.COUNTS
-        centre = centre_of(is_counts, channels, quiet)
-        scale = radians_per_reading(recording, channels, ranges_of(quiet), centre)
-        turning = turning_blocks(channels, quiet, gravity, scale)
-        quiet &= ~turning
+    if gravity is not None:
+        centre = _centre(recording, channels, quiet)
+        scale = _radians_per_reading(recording, channels, ranges_of(quiet), centre)
+    turning = turning_blocks(channels, quiet, gravity, scale)
+    quiet &= ~turning
+    if gravity is not None:
         drifting = drifting_blocks(channels, quiet, ranges_of(quiet), centre, activity.white_variance)
         quiet = cut_slow_motion(
             channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_POSE_S)
@@ -153,32 +151,14 @@ def _describe(
 ) -> Segments:
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
-    noise = pool_mean_noise(channels, pooled) if pooled else _no_noise(channels)
+    noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
     moves = tuple(Move(k, k, k + 1, before.stop, after.start) for k, (before, after) in enumerate(pairwise(poses)))
     means = average_poses(recording, channels, runs, poses, noise)
-    if pooled:
-        white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0)
-    else:
-        white = activity.white_variance
+    white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
-    time_s = recording.time_s
-    findings: list[Finding] = [
-        *judge_runs(recording, channels, runs, poses, noise),
-        *judge_log(recording, channels, runs, poses, turning),
-    ]
-    return _assemble(
-        recording,
-        poses,
-        moves,
-        sigma,
-        (means.mean, means.sigma),
-        means.n_averaged,
-        np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses], dtype=np.float64),
-        np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in poses], dtype=np.float64),
-        tuple(findings),
-        (means.up, means.sigma_up),
-    )
+    found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
+    return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 
 def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Pose:
@@ -189,31 +169,18 @@ def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: 
     upper = runs[index + 1].first if index + 1 < len(runs) else channels.n_blocks
     outer_start = max(run.outer_first - reach, lower, 0)
     outer_stop = min(run.outer_last + reach, upper, channels.n_blocks)
-    stop = run.last * m
     bumps = tuple((a * m, b * m) for a, b in run.bumps)
-    return Pose(
-        index,
-        run.first * m,
-        min(stop, n_samples),
-        min(outer_start, run.first) * m,
-        max(outer_stop, run.last) * m,
-        bumps,
-        run.is_unsteady,
-    )
-
-
-def _no_noise(channels: Channels) -> MeanNoise:
-    zero = np.zeros(channels.mean.shape[1])
-    return MeanNoise(zero, zero, zero)
+    first, last = run.first * m, run.last * m
+    outer = min(outer_start, run.first) * m, max(outer_stop, run.last) * m
+    return Pose(index, first, min(last, n_samples), *outer, bumps, run.is_unsteady)
 
 
 def _nothing_found(recording: Recording, channels: Channels) -> Segments:
     n_channels = channels.mean.shape[1]
     empty = np.zeros((0, n_channels))
-    none = np.zeros(0)
+    means = PoseMeans(empty, empty, np.zeros(0, dtype=np.int64))
     findings = tuple(judge_log(recording, channels, [], (), np.zeros(0, dtype=bool)))
-    sigma = np.full(n_channels, np.nan)
-    return _assemble(recording, (), (), sigma, (empty, empty), np.zeros(0, dtype=np.int64), none, none, findings)
+    return _assemble(recording, (), (), np.full(n_channels, np.nan), means, findings)
 
 
 def _assemble(
@@ -221,38 +188,25 @@ def _assemble(
     poses: tuple[Pose, ...],
     moves: tuple[Move, ...],
     sigma: FloatArray,
-    means: tuple[FloatArray, FloatArray],
-    n_averaged: np.ndarray[tuple[int], np.dtype[np.int64]],
-    time_mid_s: FloatArray,
-    duration_s: FloatArray,
+    means: PoseMeans,
     findings: tuple[Finding, ...],
-    vertical: tuple[FloatArray | None, FloatArray | None] = (None, None),
 ) -> Segments:
     """Segments, with the channels assigned to their sensors."""
-    accelerometer = slice(0, 3) if recording.accelerometer is not None else None
-    gyroscope = None
-    if recording.gyroscope is not None:
-        gyroscope = slice(3, 6) if accelerometer is not None else slice(0, 3)
-
-    def part(values: FloatArray, which: slice | None) -> FloatArray | None:
-        return None if which is None else np.ascontiguousarray(values[..., which])
-
+    present = [name for name in ("accelerometer", "gyroscope") if getattr(recording, name) is not None]
+    by_sensor: dict[str, Any] = {}
+    for k, name in enumerate(present):
+        for suffix, values in (("sigma", sigma), ("mean", means.mean), ("sigma_mean", means.sigma)):
+            by_sensor[f"{name}_{suffix}"] = np.ascontiguousarray(values[..., 3 * k : 3 * k + 3])
+    for name in {"accelerometer", "gyroscope"}.difference(present):
+        by_sensor |= {f"{name}_{suffix}": None for suffix in ("sigma", "mean", "sigma_mean")}
+    t = recording.time_s
     return Segments(
-        poses=poses,
-        moves=moves,
-        accelerometer_sigma=part(sigma, accelerometer),
-        gyroscope_sigma=part(sigma, gyroscope),
-        accelerometer_mean=part(means[0], accelerometer),
-        gyroscope_mean=part(means[0], gyroscope),
-        accelerometer_sigma_mean=part(means[1], accelerometer),
-        gyroscope_sigma_mean=part(means[1], gyroscope),
-        n_averaged=n_averaged,
-        time_mid_s=time_mid_s,
-        duration_s=duration_s,
-        findings=findings,
-        accelerometer_up=vertical[0],
-        accelerometer_sigma_up=vertical[1],
-    )
+        poses=poses, moves=moves, n_averaged=means.n_averaged, findings=findings, accelerometer_up=means.up,
+        accelerometer_sigma_up=means.sigma_up,
+        time_mid_s=np.array([0.5 * (t[h.start] + t[h.stop - 1]) for h in poses], dtype=np.float64),
+        duration_s=np.array([t[h.stop - 1] - t[h.start] + 1.0 / recording.rate_hz for h in poses], dtype=np.float64),
+        **by_sensor,
+    )  # fmt: skip
 
 
 # Approximate scale of a gyro reading, sufficient to separate a support that settles from a body that rotates.
@@ -264,7 +218,7 @@ USUAL = 0.8
 level axis, smaller for all others."""
 
 
-def radians_per_reading(
+def _radians_per_reading(
     recording: Recording, channels: Channels, ranges: list[Range], centre: FloatArray
 ) -> float | None:
     """Scale [rad/s per raw unit] by the unit, or by the rotation of gravity between quiet ranges; to a factor of two.
@@ -295,10 +249,9 @@ def radians_per_reading(
     return quantile(angle[told] / path[told], USUAL) if told.any() else None
 
 
-def centre_of(recording_is_counts: bool, channels: Channels, quiet: BoolArray) -> FloatArray:
+def _centre(recording: Recording, channels: Channels, quiet: BoolArray) -> FloatArray:
     """(3,) accelerometer reading without force: zero in a unit, the middle of the quiet readings in counts."""
-    if not recording_is_counts or not quiet.any():
+    if recording.accelerometer_unit is not AccelerationUnit.COUNTS or not quiet.any():
         return np.zeros(3)
     reading = channels.mean[quiet][:, ~channels.is_gyroscope]
-    out: FloatArray = 0.5 * (reading.min(axis=0) + reading.max(axis=0))
-    return out
+    return np.asarray(0.5 * (reading.min(axis=0) + reading.max(axis=0)))

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import ranges_of
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.segment.shaken import is_shaken_by_a_support
@@ -31,18 +31,10 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
     spans: list[tuple[int, int, int]] = []
     was_bumped = False
     for i, pose in enumerate(segments.poses):
-        cuts = [(a, b) for a, b in pose.disturbed if b > a]
-        first = pose.start
-        pieces: list[tuple[int, int]] = []
-        for a, b in cuts:
-            pieces.append((first, a))
-            first = b
-        pieces.append((first, pose.stop))
-        kept = [(a, b) for a, b in pieces if b - a >= shortest]
-        was_bumped |= bool(cuts)
-        if not kept:
-            kept = [(pose.start, pose.stop)]
-        spans += [(a, b, i) for a, b in kept]
+        edges = [pose.start, *(k for cut in pose.disturbed if cut[1] > cut[0] for k in cut), pose.stop]
+        was_bumped |= len(edges) > 2
+        kept = [(a, b, i) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest]
+        spans += kept or [(pose.start, pose.stop, i)]
     shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
     merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
     if len(merged) == segments.n_poses and not shaken and not was_bumped:
@@ -80,11 +72,8 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
         if n * block < LONG_S * recording.rate_hz:
             continue
         quiet = np.ones(n, dtype=bool)
-        pairs = (
-            (recording.accelerometer, segments.accelerometer_sigma),
-            (recording.gyroscope, segments.gyroscope_sigma),
-        )
-        for values, sigma in pairs:
+        sigmas = (segments.accelerometer_sigma, segments.gyroscope_sigma)
+        for values, sigma in zip((recording.accelerometer, recording.gyroscope), sigmas, strict=True):
             if values is None or sigma is None:
                 continue
             steps = np.diff(values[move.start : move.start + n * block].reshape(n, block, 3), axis=1)
@@ -105,60 +94,55 @@ def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
 
 
 def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
-    def is_unsteady(source: int) -> bool:
-        return source < 0 or segments.poses[source].is_unsteady
-
-    poses = tuple(Pose(k, a, b, a, b, is_unsteady=is_unsteady(source)) for k, (a, b, source) in enumerate(spans))
+    old = segments.poses
+    poses = tuple(
+        Pose(k, a, b, a, b, is_unsteady=source < 0 or old[source].is_unsteady) for k, (a, b, source) in enumerate(spans)
+    )
     moves = tuple(Move(k, k, k + 1, poses[k].stop, poses[k + 1].start) for k in range(len(poses) - 1))
-
-    def statistics(values: FloatArray | None, sigma: FloatArray | None, old: FloatArray | None):  # type: ignore[no-untyped-def]
-        if values is None or sigma is None or old is None:
-            return None, None
-        mean = np.array([np.nanmean(values[a:b], axis=0) for a, b, _ in spans])
-        error = np.zeros_like(mean)
-        # Ratio of the old means' errors to white noise, for pieces of other durations.
-        colour = np.median(old / (sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]), axis=0)
-        for k, (a, b, source) in enumerate(spans):
-            n = b - a
-            if source >= 0 and n == segments.poses[source].stop - segments.poses[source].start:
-                mean[k] = np.nanmean(values[a:b], axis=0)
-                error[k] = old[source]
-            else:
-                part = values[a:b][np.isfinite(values[a:b]).all(axis=1)]
-                blocks = np.array_split(part, 8) if len(part) >= 8 else [np.zeros((1, 3))] * 8
-                scatter = np.std([block.mean(axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
-                floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
-                # Eight blocks detect a pose that goes on settling (several times the noise), not 20 % of its noise.
-                error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
-        return mean, error
-
-    accel_mean, accel_error = statistics(
-        recording.accelerometer, segments.accelerometer_sigma, segments.accelerometer_sigma_mean
-    )
-    gyro_mean, gyro_error = statistics(recording.gyroscope, segments.gyroscope_sigma, segments.gyroscope_sigma_mean)
-    t = recording.time_s
-    same = np.array(
-        [
-            source >= 0 and poses[k].stop - poses[k].start == segments.poses[source].stop - segments.poses[source].start
-            for k, (_, _, source) in enumerate(spans)
-        ]
-    )
-    sources = np.array([source for _, _, source in spans])
+    same = np.array([source >= 0 and b - a == old[source].stop - old[source].start for a, b, source in spans])
+    means: dict[str, FloatArray | None] = {}
+    for name in ("accelerometer", "gyroscope"):
+        values, sigma = getattr(recording, name), getattr(segments, f"{name}_sigma")
+        error = getattr(segments, f"{name}_sigma_mean")
+        is_known = values is not None and sigma is not None and error is not None
+        found = _means_of(values, sigma, error, segments.n_averaged, spans, same) if is_known else (None, None)
+        means[f"{name}_mean"], means[f"{name}_sigma_mean"] = found
+    t, sources = recording.time_s, np.array([source for _, _, source in spans])
     up, error_up = segments.accelerometer_up, segments.accelerometer_sigma_up
     return replace(
-        segments,
-        poses=poses,
-        moves=moves,
-        accelerometer_mean=accel_mean,
-        accelerometer_sigma_mean=accel_error,
-        gyroscope_mean=gyro_mean,
-        gyroscope_sigma_mean=gyro_error,
-        n_averaged=np.array([b - a for a, b, _ in spans]),
+        segments, poses=poses, moves=moves, n_averaged=np.array([b - a for a, b, _ in spans]),
         time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
         duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
         accelerometer_up=None if up is None else up[sources],
         accelerometer_sigma_up=None if error_up is None else np.where(same, error_up[sources], np.nan),
-    )
+        **means,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def _means_of(
+    values: FloatArray,
+    sigma: FloatArray,
+    old: FloatArray,
+    n_averaged: IntArray,
+    spans: list[tuple[int, int, int]],
+    same: BoolArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Means (n, 3) over ``spans`` and their errors: those known (``old``) where a span is the ``same`` as before."""
+    mean = np.array([np.nanmean(values[a:b], axis=0) for a, b, _ in spans])
+    error = np.zeros_like(mean)
+    # Ratio of the old means' errors to white noise, for pieces of other durations.
+    colour = np.median(old / (sigma / np.sqrt(np.maximum(n_averaged, 1))[:, None]), axis=0)
+    for k, (a, b, source) in enumerate(spans):
+        if same[k]:
+            error[k] = old[source]
+            continue
+        part = values[a:b][np.isfinite(values[a:b]).all(axis=1)]
+        blocks = np.array_split(part, 8) if len(part) >= 8 else [np.zeros((1, 3))] * 8
+        scatter = np.std([block.mean(axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
+        floor = np.maximum(colour, 1.0) * sigma / np.sqrt(b - a)
+        # Eight blocks detect a pose that goes on settling (several times the noise), not 20 % of its noise.
+        error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
+    return mean, error
 
 
 MAX_TURNING = 0.05
@@ -172,9 +156,9 @@ def _shaken(
     if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
         return []
     assert segments.accelerometer_sigma is not None
+    assert segments.gyroscope_sigma is not None
     block = max(round(block_s * recording.rate_hz), 5)
     bias = np.median(segments.gyroscope_mean, axis=0)
-    assert segments.gyroscope_sigma is not None
     spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
     # A bias that depends on vibration is no motion: rates far below those of real moves count as zero.
     moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])

@@ -301,15 +301,9 @@ def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
     """
     n = run.last - run.first
     start, tail = _core.ends_to_trim(
-        channels.mean[run.first : run.last],
-        [(a - run.first, b - run.first) for a, b in run.bumps],
-        edges.terms,
-        channels.quantisation_variance,
-        channels.step_s,
-        edges.variance,
-        edges.live,
-        edges.limit,
-    )
+        channels.mean[run.first : run.last], [(a - run.first, b - run.first) for a, b in run.bumps], edges.terms,
+        channels.quantisation_variance, channels.step_s, edges.variance, edges.live, edges.limit,
+    )  # fmt: skip
     stop = n - tail
     bumps = tuple((a, b) for a, b in run.bumps if b > run.first + start and a < run.first + stop)
     bumps = tuple((max(a, run.first + start), min(b, run.first + stop)) for a, b in bumps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from trihedron.segment.runs import (
     trim_edges,
     turns_on,
     widen,
-)
+)  # fmt: skip
 
 SMOOTH_S = 1.0
 """Length of the raised cosine that averages vibration of some hertz and more out of the attitude, but not the
@@ -221,9 +221,5 @@ def _own_noise(channels: Channels, run: Run, steady: list[Range]) -> MeanNoise:
     quarter = (run.last - run.first) // 4
     own = pool_mean_noise(channels, [(run.first + quarter, run.last - quarter)])
     still = pool_mean_noise(channels, steady)
-    return replace(
-        still,
-        white=np.maximum(own.white, still.white),
-        flicker=np.maximum(own.flicker, still.flicker),
-        walk=np.maximum(own.walk, still.walk),
-    )
+    pairs = ((own.white, still.white), (own.flicker, still.flicker), (own.walk, still.walk))
+    return MeanNoise(*(np.maximum(*pair) for pair in pairs))

@@ -105,9 +105,8 @@ def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     width = ordered[quarter:] - ordered[: n - quarter] if n > quarter else np.zeros((1, values.shape[1]))
     at = width.argmin(axis=0)
     axes = np.arange(values.shape[1])
-    middle: FloatArray = ordered[at + quarter // 2, axes]
-    deviation: FloatArray = width[at, axes] / (2.0 * float(probability.ndtri(0.5 + 0.25 / 2.0)))
-    return middle, deviation
+    deviation = width[at, axes] / (2.0 * float(probability.ndtri(0.5 + 0.25 / 2.0)))
+    return ordered[at + quarter // 2, axes], deviation
 
 
 HALVES_S = (0.5, 1.0, 2.0)
@@ -203,16 +202,14 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
     if windows.rate is not None and len(windows.first) >= 2 * FEWEST_WINDOWS:
         # A channel that never changes has no noise for a weight.
         scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
-        rest = windows.left(_share_of_gyroscope(windows.some(MOST_FITTED), scale))
+        some = windows.some(MOST_FITTED)
+        assert some.rate is not None
+        # Least absolute deviations in units of the white noise.
+        share = _core.share_of_gyroscope(some.change, some.mean, some.rate, scale.tolist())
+        rest = windows.left(np.array(share))
     seen = medians(rest**2) / float(probability.chdtri(1, 0.5))
     floor = 2.0 * channels.quantisation_variance[accelerometer] / (half * channels.length)
     return np.maximum(np.maximum(seen, white), floor)
-
-
-def _share_of_gyroscope(windows: _Windows, scale: FloatArray) -> FloatArray:
-    """(12,) coefficients of the gyro for the changes, by least absolute deviations in units of ``scale`` (3,)."""
-    assert windows.rate is not None
-    return np.array(_core.share_of_gyroscope(windows.change, windows.mean, windows.rate, scale.tolist()))
 
 
 def cut_slow_motion(
@@ -235,8 +232,7 @@ def cut_slow_motion(
         moving = np.zeros(size, dtype=bool)
         for half_s, marks in zip(HALVES_S, drifting, strict=True):
             half = max(channels.blocks(half_s), 2)
-            inside = np.flatnonzero(marks[first:last])
-            for start, stop in _stretches(inside):
+            for start, stop in ranges_of(marks[first:last]):
                 # The change lies between the middles of the halves; a drifting end is removed completely.
                 lower = 0 if start <= half else start - half // 2
                 upper = size if stop + half >= size else stop + half // 2
@@ -244,7 +240,7 @@ def cut_slow_motion(
         if not moving.any():
             continue
         kept = np.zeros(size, dtype=bool)
-        for start, stop in _stretches(np.flatnonzero(~moving)):
+        for start, stop in ranges_of(~moving):
             kept[start:stop] = stop - start >= shortest
         excursion = _excursion(channels, first, last)
         if excursion < limit_raw and not kept.any():
@@ -262,20 +258,8 @@ def _without_ends(moving: BoolArray) -> BoolArray:
     return out
 
 
-def _stretches(indices: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[Range]:
-    """Runs of consecutive numbers as ``[first, last)``."""
-    if not len(indices):
-        return []
-    cuts = np.flatnonzero(np.diff(indices) > 1)
-    begins = np.concatenate([[0], cuts + 1])
-    ends = np.concatenate([cuts, [len(indices) - 1]])
-    return [(int(indices[a]), int(indices[b]) + 1) for a, b in zip(begins, ends, strict=True)]
-
-
 def _excursion(channels: Channels, first: int, last: int) -> float:
     """Largest change of the accelerometer's half-second means over a range, raw unit."""
     attitude = channels.mean[first:last, ~channels.is_gyroscope]
     width = min(channels.blocks(0.5), len(attitude))
-    sums = np.vstack([np.zeros(attitude.shape[1]), np.cumsum(attitude, axis=0)])
-    smooth = (sums[width:] - sums[:-width]) / width
-    return float(np.linalg.norm(np.ptp(smooth, axis=0)))
+    return float(np.linalg.norm(np.ptp(_sums(attitude, width) / width, axis=0)))

@@ -13,6 +13,8 @@ a part of D₁ is counted.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from trihedron import _core
@@ -37,30 +39,18 @@ MARGIN = 3.0
 
 def unresolved_variance(
     readings: FloatArray,
-    move_ranges: tuple[tuple[int, int], ...],
-    pose_ranges: list[tuple[int, int]],
+    move_ranges: Sequence[tuple[int, int]],
+    pose_ranges: Iterable[Sequence[int]],
     step_s: float,
     quantum: FloatArray,
     time_s: FloatArray | None = None,
 ) -> FloatArray:
-    """Variance of every move's integral by motion above half the sampling frequency.
+    """(moves, 3) variance, (raw unit · s)², of every move's integral by motion above half the sampling frequency.
 
-    Parameters
-    ----------
-    readings : (n, 3)
-        Raw readings of one sensor.
-    move_ranges, pose_ranges : half-open sample ranges
-            The poses give the power of the noise in both bands (their median), which is subtracted.
-    step_s : float
-        Sample step, s.
-    quantum : (3,)
-            Resolution (LSB) of the ADC: a pose whose bias stays inside one LSB does not show its rounding, moves do.
-    time_s : (n,)
-            Timestamps: filters run from gap to gap, across which smooth motion would look fast.
-
-    Returns
-    -------
-    (moves, 3) array, (raw unit · s)²
+    Raw ``readings`` (n, 3) of one sensor, half-open sample ranges. The poses give the power of the noise in both bands
+    (their median), which is subtracted; at least that of rounding by the LSB ``quantum`` (3,), because a pose whose
+    bias stays inside one LSB does not show its rounding, moves do. Filters run from gap to gap of the timestamps
+    ``time_s`` (n,), across which smooth motion would look fast.
     """
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
     poses = np.array([(a, b) for a, b in pose_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)

@@ -80,19 +80,15 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
     return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]
 
 
-def _known_lines(part: FloatArray) -> tuple[tuple[float, ...], npt.NDArray[np.bool_]]:
+def _known_lines(part: FloatArray) -> tuple[list[float], npt.NDArray[np.bool_]]:
     """As :func:`find_pose_lines`, cached for poses of usual length: every change of a session needs all lines again."""
-    if len(part) > LONGEST_REMEMBERED:
-        lines, has_line = find_pose_lines(part)
-        return tuple(lines), has_line
-    return _lines_of(part.tobytes(), part.shape[1])
+    is_long = len(part) > LONGEST_REMEMBERED
+    return find_pose_lines(part) if is_long else _lines_of(part.tobytes(), part.shape[1])
 
 
 @lru_cache(maxsize=512)
-def _lines_of(readings: bytes, n_axes: int) -> tuple[tuple[float, ...], npt.NDArray[np.bool_]]:
-    lines, has_line = find_pose_lines(np.frombuffer(readings).reshape(-1, n_axes))
-    has_line.flags.writeable = False
-    return tuple(lines), has_line
+def _lines_of(readings: bytes, n_axes: int) -> tuple[list[float], npt.NDArray[np.bool_]]:
+    return find_pose_lines(np.frombuffer(readings).reshape(-1, n_axes))
 
 
 def find_pose_lines(part: FloatArray) -> tuple[list[float], npt.NDArray[np.bool_]]:
@@ -152,8 +148,7 @@ def _swing(part: FloatArray, lines: Sequence[float]) -> FloatArray:
     _, coefficient = _model(part, lines)
     m = len(lines)
     squares = coefficient[1 : 1 + m] ** 2 + coefficient[1 + m :] ** 2
-    out: FloatArray = 0.5 * (squares / (2.0 * np.pi * np.array(lines)[:, None]) ** 2).sum(axis=0)
-    return out
+    return np.asarray(0.5 * (squares / (2.0 * np.pi * np.array(lines)[:, None]) ** 2).sum(axis=0))
 
 
 def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
@@ -167,9 +162,8 @@ def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
     grid = near + np.linspace(-1.5, 1.5, 19) / len(part)
     best = float(min(grid, key=left))
     step = float(grid[1] - grid[0])
-    return float(
-        minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-3 * step}).x
-    )
+    found = minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-3 * step})
+    return float(found.x)
 
 
 def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray) -> tuple[FloatArray, FloatArray]:

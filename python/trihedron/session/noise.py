@@ -76,42 +76,32 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         raise RefusedError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
-    has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None
-    sigmas = (
-        np.maximum(segments.accelerometer_sigma_mean, floor),
-        None if not has_rate else np.maximum(np.asarray(segments.gyroscope_sigma_mean), 1e-300),
-    )
-    densities = (
-        np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s),
-        None if not has_rate else np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s),
-    )
-    spans = [(pose.start, pose.stop) for pose in segments.poses]
-    lasts = np.array([(stop - start) * step_s for start, stop in spans])
+    sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]
+    densities = [np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)]
+    spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
+    of_rate = 0.0
+    if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
+        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), 1e-300))
+        densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
+        of_rate = expected_scatter_of_axes(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
     variances = np.zeros((len(ranges), 2, 3))
     for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
-        sigma, density = sigmas[k], densities[k]
         if readings is None or not ranges:
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
-        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum, recording.time_s)
+        variances[:, k] = unresolved_variance(readings, ranges, spans, step_s, quantum, recording.time_s)
         if k == 0:
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
-        if sigma is not None and density is not None:
-            halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
-            variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
-    assert sigmas[0] is not None
-    assert densities[0] is not None
+        if k < len(sigmas):
+            halves, lasts = _second_halves_minus_first(readings, spans), np.diff(spans, axis=1)[:, 0] * step_s
+            variances[:, k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
-    scatter = 0.0
-    if along is not None:
-        scatter = expected_scatter(recording.accelerometer, np.array(spans, dtype=np.int64).reshape(-1, 2), along[0])
-    of_rate = 0.0
-    if has_rate and recording.gyroscope is not None:
-        of_rate = expected_scatter_of_axes(recording.gyroscope, np.array(spans, dtype=np.int64).reshape(-1, 2))
-    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along, scatter, of_rate)
+    scatter = 0.0 if along is None else expected_scatter(recording.accelerometer, spans, along[0])
+    of_gyro = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
+    return SessionNoise(sigmas[0], densities[0], *of_gyro, variances, along, scatter, of_rate)
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
@@ -169,25 +159,14 @@ def coloured_variance(
     pose_duration_s: FloatArray,
     move_duration_s: FloatArray,
 ) -> FloatArray:
-    """Variance that slow noise adds to every move's integral, beyond that of white noise.
+    """(moves, 3) variance, (raw unit · s)², that slow noise adds to every move's integral, beyond that of white noise.
 
     The integral of white noise over T has the variance N²T. Pose means show flicker and walk: where a mean over τ has
     c² times the white variance, c²N² replaces N² as long as T is of the order of τ. Without it most healthy sessions of
-    a consumer part (0.3 mg, 20 °/h) disagree (benches/blind_nuisances.py --flicker).
+    parts with flicker (0.2 mg, 20 °/h) disagree (benches/blind_nuisances.py --flicker).
 
-    Parameters
-    ----------
-    pose_sigma : (poses, 3)
-            Standard errors of pose means, estimated without assuming white noise, raw units.
-    halves : (poses, 3)
-            Mean of every pose's second half minus that of its first, raw units.
-    density : (3,)
-        White noise, raw units per √Hz.
-    pose_duration_s, move_duration_s : (poses,), (moves,)
-
-    Returns
-    -------
-    (moves, 3) array, (raw unit · s)²
+    ``pose_sigma`` (poses, 3) are standard errors of pose means, estimated without assuming white noise, ``halves``
+    (poses, 3) the mean of every pose's second half minus that of its first, ``density`` (3,) white noise per √Hz; raw.
     """
     white = density / np.sqrt(pose_duration_s)[:, None]
     quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
@@ -215,16 +194,8 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
 
     Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h for white noise N² and a flicker of
     one-sided density h/f. Below the frequencies that a pose of length T sees, down to those of a session of length L,
-    lies a variance h ln(L/2T). It is 0 where white noise explains the differences of halves.
-
-    Parameters
-    ----------
-    readings : (n, 3)
-        Accelerometer, raw.
-    spans : (h, 2)
-        Half-open ranges of the poses.
-    up : (h, 3)
-        Raw unit verticals; NaN where unknown.
+    lies a variance h ln(L/2T). It is 0 where white noise explains the differences of halves. ``spans`` (h, 2) are the
+    half-open ranges of the poses, ``up`` (h, 3) raw unit verticals, NaN where unknown.
     """
     size = spans[:, 1] - spans[:, 0]
     usable = (size >= FEWEST_READINGS) & np.isfinite(up).all(axis=1)

@@ -77,21 +77,12 @@ class FittedModel:
 def model_of_calibration(calibration: Calibration) -> FittedModel:
     """A calibration as given. It contains no bias change between sessions: the comparison uses the recording's."""
     accel, gyro = calibration.accelerometer, calibration.gyroscope
+    of_gyro = (None, None, "") if gyro is None else (gyro.S, gyro.b, gyro.raw_unit)
     covariance = np.array(calibration.covariance, dtype=np.float64)
     if not np.any(covariance):
         numbers = [accel.S.ravel(), accel.b] + ([] if gyro is None else [gyro.S.ravel(), gyro.b])
         covariance = np.diag((PUBLISHED_DIGITS * np.concatenate(numbers)) ** 2)
-    return FittedModel(
-        accel.S,
-        accel.b,
-        accel.raw_unit,
-        None if gyro is None else gyro.S,
-        None if gyro is None else gyro.b,
-        "" if gyro is None else gyro.raw_unit,
-        covariance,
-        np.zeros(3),
-        np.zeros(3),
-    )
+    return FittedModel(accel.S, accel.b, accel.raw_unit, *of_gyro, covariance, np.zeros(3), np.zeros(3))
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
@@ -104,23 +95,19 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
         raise RefusedError("a diagnosis is compared by its covariance, and this one carries none")
-    accel, gyro = fit.accelerometer, fit.gyroscope
+    accel, gyro = (
+        (None, None, "") if side is None else (np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]))
+        for side in (fit.accelerometer, fit.gyroscope)
+    )
+    assert accel[0] is not None
+    assert accel[1] is not None
     covariance = np.array(fit.covariance)
     widened = np.ones(len(covariance))
     widened[:12] = np.sqrt(_excess(tests, "static-accel"))
     widened[12:21] = np.sqrt(max(_excess(tests, "moves"), _excess(tests, "dynamics")))
     covariance *= np.outer(widened, widened)
-    return FittedModel(
-        np.array(accel["S"]),
-        np.array(accel["b"]),
-        str(accel["raw_unit"]),
-        None if gyro is None else np.array(gyro["S"]),
-        None if gyro is None else np.array(gyro["b"]),
-        "" if gyro is None else str(gyro["raw_unit"]),
-        covariance,
-        _floor(diagnosis, "accelerometer"),
-        np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis)),
-    )
+    of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
+    return FittedModel(accel[0], accel[1], accel[2], *gyro, covariance, _floor(diagnosis, "accelerometer"), of_gyro)
 
 
 def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:
@@ -129,10 +116,7 @@ def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:
     With sixteen degrees of freedom only values above 2 count as disagreement: small bias scatter would make the
     uncertainties a third too small.
     """
-    for test in tests:
-        if test.domain == domain:
-            return max(test.chi2_per_dof, 1.0)
-    return 1.0
+    return next((max(test.chi2_per_dof, 1.0) for test in tests if test.domain == domain), 1.0)
 
 
 def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:

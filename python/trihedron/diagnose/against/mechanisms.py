@@ -37,6 +37,11 @@ LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-bias": STANDARD_GRA
 """Largest reading that a thermal scale multiplies, where it acts like a bias: gravity; a rotation by hand [rad/s]."""
 
 
+SENSORS: Mapping[str, Literal["accelerometer", "gyroscope", "both"]] = MappingProxyType(
+    {"accel": "accelerometer", "gyro": "gyroscope"}
+)
+
+
 def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None) -> dict[str, float]:
     """Ids of parameters whose reference point these effects leave undefined, and by how much (SI).
 
@@ -70,15 +75,8 @@ def _moved(parameter: EffectParameter, number: str, unit: str, span_k: float | N
     size = abs(parameter.value) + 2.0 * abs(parameter.std)
     if parameter.unit == unit:
         return size
-    if span_k is None:
-        return None
-    if parameter.unit == f"{unit}/K":
-        return size * span_k
-    if parameter.unit == f"{unit}/K^2":
-        return size * span_k * span_k
-    if parameter.unit == "1/K" and number in LARGEST_READ:
-        return size * span_k * LARGEST_READ[number]
-    return None
+    per = {"1/K": LARGEST_READ.get(number), f"{unit}/K^2": span_k, f"{unit}/K": 1.0}.get(parameter.unit)
+    return None if span_k is None or per is None else size * span_k * per
 
 
 @dataclass(frozen=True)
@@ -228,11 +226,7 @@ def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:
 
 
 def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) -> list[ParameterDifference]:
-    sensor: Literal["accelerometer", "gyroscope", "both"] = "both"
-    if model.id.startswith("accel-"):
-        sensor = "accelerometer"
-    elif model.id.startswith("gyro-"):
-        sensor = "gyroscope"
+    sensor = SENSORS.get(model.id.partition("-")[0], "both")
     given = {p.name: p for p in model.parameters}
     shared = [(given[p.name], p) for p in recording.parameters if p.name in given and p.unit == given[p.name].unit]
     # A parameter without uncertainty on either side counts events of its session, or is an ADC code. Where the codes

@@ -144,24 +144,16 @@ def compare_numbers(
     is_judged = [float(np.abs(group.difference).max()) > left_open.get(group.id, 0.0) for group in groups]
     significant = _holm(p, alpha / 2.0) & np.array(is_judged)
     out: list[ParameterDifference] = []
-    for group, p_value, is_significant in zip(groups, p, significant, strict=True):
+    for group, p_value, is_significant in zip(groups, p.tolist(), significant.tolist(), strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group
         sigma = np.sqrt(np.maximum(np.diag(named.covariance), 0.0))
+        remark = named.remark if is_significant or named.is_relative else ""
+        values = (v.tolist() for v in (named.model, named.recording, named.difference, sigma))
         out += [
             ParameterDifference(
-                named.id,
-                named.sensor,
-                named.names[k],
-                float(named.model[k]),
-                float(named.recording[k]),
-                float(named.difference[k]),
-                float(sigma[k]),
-                named.unit,
-                float(p_value),
-                bool(is_significant),
-                named.remark if is_significant or named.is_relative else "",
+                named.id, named.sensor, name, before, after, apart, s, named.unit, p_value, is_significant, remark
             )
-            for k in range(len(named.names))
+            for name, before, after, apart, s in zip(named.names, *values, strict=True)
         ]
     return ComparedNumbers(tuple(out), factors)
 
@@ -175,79 +167,78 @@ def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One sensor of one fitted model: S, b, their covariance (12, 12), SI per reading where its unit states it, and
+    the variance (3,) of the bias between sessions."""
+
+    S: FloatArray
+    b: FloatArray
+    raw_unit: str
+    covariance: FloatArray
+    si: float | None
+    drift: FloatArray
+
+    @property
+    def spread(self) -> FloatArray:
+        """(9, 9) covariance of the invariants."""
+        J = jacobian(self.S, self.b)
+        return np.asarray(J @ self.covariance @ J.T)
+
+
+def _sides(model: FittedModel) -> tuple[_Side, _Side | None]:
+    """The accelerometer, and the gyro where there is one."""
+    C, unit = model.covariance, model.accel_unit
+    known = acceleration_to_si(AccelerationUnit(unit))
+    accel = _Side(model.accel_S, model.accel_b, unit, C[:12, :12], known, model.accel_bias_drift)
+    if model.gyro_S is None or model.gyro_b is None:
+        return accel, None
+    unit = model.gyro_unit
+    known = rate_to_si(RateUnit(unit))
+    return accel, _Side(model.gyro_S, model.gyro_b, unit, C[12:, 12:], known, model.gyro_bias_drift)
+
+
 def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[CommonFactor, ...]]:
     groups: list[_Group] = []
     factors: list[CommonFactor] = []
-    accel = (model.accel_S, model.accel_b), (recording.accel_S, recording.accel_b)
-    blocks = model.covariance[:12, :12], recording.covariance[:12, :12]
-    units = _known_acceleration(model.accel_unit), _known_acceleration(recording.accel_unit)
-    is_same = model.accel_unit == recording.accel_unit
-    more, factor = _sensor("accel", accel, blocks, units, is_same, model.accel_bias_drift, recording.accel_bias_drift)
-    groups += more
-    factors += [factor] if factor else []
-    if model.gyro_S is None or model.gyro_b is None or recording.gyro_S is None or recording.gyro_b is None:
-        return groups, tuple(factors)
-    gyro = (model.gyro_S, model.gyro_b), (recording.gyro_S, recording.gyro_b)
-    blocks = model.covariance[12:, 12:], recording.covariance[12:, 12:]
-    units = _known_rate(model.gyro_unit), _known_rate(recording.gyro_unit)
-    is_same = model.gyro_unit == recording.gyro_unit
-    more, factor = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_bias_drift, recording.gyro_bias_drift)
-    groups += more
-    factors += [factor] if factor else []
-    groups.append(_triads(model, recording))
+    prefixes: tuple[Literal["accel", "gyro"], ...] = ("accel", "gyro")
+    for prefix, given, seen in zip(prefixes, _sides(model), _sides(recording), strict=True):
+        if given is not None and seen is not None:
+            more, factor = _sensor(prefix, given, seen)
+            groups += more
+            factors += [factor] if factor else []
+            groups += [_triads(model, recording)] if prefix == "gyro" else []
     return groups, tuple(factors)
 
 
-def _known_acceleration(unit: str) -> float | None:
-    return acceleration_to_si(AccelerationUnit(unit))
-
-
-def _known_rate(unit: str) -> float | None:
-    return rate_to_si(RateUnit(unit))
-
-
-def _sensor(
-    prefix: Literal["accel", "gyro"],
-    pair: tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
-    covariances: tuple[FloatArray, FloatArray],
-    units: tuple[float | None, float | None],
-    is_same_unit: bool,
-    drift_model: FloatArray,
-    drift_recording: FloatArray,
-) -> tuple[list[_Group], CommonFactor | None]:
+def _sensor(prefix: Literal["accel", "gyro"], given: _Side, seen: _Side) -> tuple[list[_Group], CommonFactor | None]:
     """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised."""
-    (S_m, b_m), (S_r, b_r) = pair
-    a, r = invariants(S_m, b_m), invariants(S_r, b_r)
-    J_m, J_r = jacobian(S_m, b_m), jacobian(S_r, b_r)
-    covariance = J_m @ covariances[0] @ J_m.T + J_r @ covariances[1] @ J_r.T
+    a, r, units = invariants(given.S, given.b), invariants(seen.S, seen.b), (given.si, seen.si)
+    covariance = given.spread + seen.spread
     # A calibration file has no bias change between sessions: that of the recording is used.
-    before = drift_model if np.any(drift_model) else drift_recording
-    covariance[:3, :3] += np.diag(before + drift_recording)
+    before = given.drift if np.any(given.drift) else seen.drift
+    covariance[:3, :3] += np.diag(before + seen.drift)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
-    log_m, log_r, is_relative = _log_scales(a, r, units, is_same_unit)
+    log_m, log_r, is_relative = _log_scales(a, r, units, given.raw_unit == seen.raw_unit)
     common = _common_factor(sensor, log_r - log_m, _sizes_in_si(a, r, units))
     if common is not None:
         log_m = log_m + math.log(common.factor)
-    change = log_r - log_m
-    scale_covariance = covariance[3:6, 3:6]
+    of_scale = covariance[3:6, 3:6]
     if is_relative:
         # Counts against SI: only differences between axes can be compared.
         centre = np.eye(3) - np.ones((3, 3)) / 3.0
-        scale_covariance = centre @ scale_covariance @ centre.T + np.ones((3, 3)) * np.trace(scale_covariance) / 3.0
-    names = tuple(f"{a}{b}" for a, b in (("x", "y"), ("x", "z"), ("y", "z")))
-    assert len(names) == len(PAIRS)
+        of_scale = centre @ of_scale @ centre.T + np.ones((3, 3)) * np.trace(of_scale) / 3.0
+    pairs = tuple(AXES[i] + AXES[j] for i, j in PAIRS)
     # S is SI per raw unit: a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
         _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
-               _never_added(prefix, a.bias, r.bias, J_m @ covariances[0] @ J_m.T, drift_model)),
+               _never_added(prefix, a.bias, r.bias, given.spread, given.drift)),
         _Group(
-            f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",
+            f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), log_r - log_m, of_scale, "1",
             remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
         ),
-        _Group(
-            f"{prefix}-misalignment", sensor, names, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"
-        ),
+        _Group(f"{prefix}-misalignment", sensor, pairs, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"),
     ]  # fmt: skip
     return groups, common
 
@@ -312,12 +303,9 @@ def _triads(model: FittedModel, recording: FittedModel) -> _Group:
     assert model.gyro_S is not None
     assert recording.gyro_S is not None
     zero = np.zeros(3)
-    turned = [
-        triad_rotation(invariants(one.accel_S, zero), invariants(one.gyro_S, zero))
-        for one in (model, recording)
-        if one.gyro_S is not None
-    ]
-    J_m, J_r = triad_jacobian(model.accel_S, model.gyro_S), triad_jacobian(recording.accel_S, recording.gyro_S)
+    pairs = ((model.accel_S, model.gyro_S), (recording.accel_S, recording.gyro_S))
+    turned = [triad_rotation(invariants(accel, zero), invariants(gyro, zero)) for accel, gyro in pairs]
+    J_m, J_r = (triad_jacobian(*pair) for pair in pairs)
     covariance = J_m @ model.covariance @ J_m.T + J_r @ recording.covariance @ J_r.T
     difference = rotation_vector(turned[1] @ turned[0].T)
     before, after = rotation_vector(turned[0]), rotation_vector(turned[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.bias_process import BiasProcess
+from trihedron.diagnose.effects.contract import ACCELEROMETER
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
@@ -12,8 +13,7 @@ class AccelBiasRepeatability(BiasProcess):
     """Bias drawn anew in every pose, one sigma for all axes: the norm of gravity does not separate the axes."""
 
     is_spread = True
-    id = "accel-bias-repeatability"
-    sensor, walks, unit, domain = 0, False, "m/s^2", "static-accel"
+    id, sensor, walks = "accel-bias-repeatability", ACCELEROMETER, False
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         sigma, error = float((size**2).mean() ** 0.5), float((std**2).mean() ** 0.5)

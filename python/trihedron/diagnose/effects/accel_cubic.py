@@ -1,9 +1,7 @@
 """Odd-order response of the accelerometers: a capacitive bridge beyond first order."""
 
-from __future__ import annotations
-
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
 
 
 class AccelCubic(Effect):
@@ -15,5 +13,5 @@ class AccelCubic(Effect):
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
-        columns = context.on_accelerometers(context.axis_force**3)
-        return [Variant(force_only(columns), per_axis("K3"), ("1/(m/s^2)^2",) * 3)]
+        cube = on_axes(context, ACCELEROMETER, context.axis_force**3)
+        return [Variant(cube, per_axis("K3"), ("1/(m/s^2)^2",) * 3)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
-from trihedron.diagnose.effects.late_readings import TIMES_S, by_delay, is_confirmed
+from trihedron.diagnose.effects.sensor_lag import TIMES_S, is_near_one
 
 
 class AccelGyroTimeOffset(Effect):
@@ -22,10 +22,11 @@ class AccelGyroTimeOffset(Effect):
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         return _offset(context, variant.scale * float(value[0]), variant.label)
 
-    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:
-        return is_confirmed(value, covariance)
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        return is_near_one(value, covariance) and value[0] > 0.0
 
 
 def _offset(context: Context, delay_s: float, label: str) -> Variant:
-    columns = force_only(by_delay(context, context.force, delay_s)[:, :, None])
-    return Variant(columns, ("accelerometer_delay",), ("s",), label=label, scale=delay_s)
+    """What a delay adds to readings: y(t) - y(t + δ)."""
+    column = context.force - context.shifted(context.force, delay_s)
+    return Variant(force_only(column[:, :, None]), ("accelerometer_delay",), ("s",), label=label, scale=delay_s)

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 PLAY_M_S2, CREEP = 0.02, 0.005
@@ -26,31 +26,31 @@ class AccelHysteresis(Effect):
         return np.full(3, PLAY_M_S2 if variant.label == "play" else CREEP)
 
     def variants(self, context: Context) -> list[Variant]:
-        return [self._play(context, width) for width in PLAY_WIDTHS_M_S2] + [
-            self._creep(context, tau) for tau in CREEP_TIMES_S
-        ]
+        creeps = [_creep(context, tau) for tau in CREEP_TIMES_S]
+        return [_play(context, width) for width in PLAY_WIDTHS_M_S2] + creeps
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
-        return self._play(context, value) if variant.label == "play" else self._creep(context, value)
+        return _play(context, value) if variant.label == "play" else _creep(context, value)
 
-    def _coarse(self, context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
-        """History of the force every 0.1 s, the index of the interval of each sample, and samples per interval."""
-        step = max(1, round(0.1 * context.obs.recording.rate_hz))
-        coarse = context.history[::step]
-        return coarse, np.minimum(np.arange(len(context.history)) // step, len(coarse) - 1), step
 
-    def _play(self, context: Context, width: float) -> Variant:
-        coarse, index, _ = self._coarse(context)
-        # Hysteresis adds minus the lead of the force over its follower.
-        memory = -_core.play(coarse, width)[index]
-        columns = context.on_accelerometers(context.at_points(memory))
-        shape = {"half_width": (width, "m/s^2")}
-        return Variant(force_only(columns), per_axis("offset"), ("m/s^2",) * 3, shape, "play")
+def _coarse(context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
+    """History of the force every 0.1 s, the index of the interval of each sample, and samples per interval."""
+    step = max(1, round(0.1 * context.obs.recording.rate_hz))
+    coarse = context.history[::step]
+    return coarse, np.minimum(np.arange(len(context.history)) // step, len(coarse) - 1), step
 
-    def _creep(self, context: Context, tau: float) -> Variant:
-        coarse, index, step = self._coarse(context)
-        keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
-        slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
-        columns = context.on_accelerometers(context.at_points((slow - coarse)[index]))
-        shape = {"time_constant": (tau, "s")}
-        return Variant(force_only(columns), per_axis("creep"), ("1",) * 3, shape, "creep")
+
+def _play(context: Context, width: float) -> Variant:
+    coarse, index, _ = _coarse(context)
+    # Hysteresis adds minus the lead of the force over its follower.
+    columns = on_axes(context, ACCELEROMETER, context.at_points(-_core.play(coarse, width)[index]))
+    shape = {"half_width": (width, "m/s^2")}
+    return Variant(columns, per_axis("offset"), ("m/s^2",) * 3, shape, "play")
+
+
+def _creep(context: Context, tau: float) -> Variant:
+    coarse, index, step = _coarse(context)
+    keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
+    slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
+    columns = on_axes(context, ACCELEROMETER, context.at_points((slow - coarse)[index]))
+    return Variant(columns, per_axis("creep"), ("1",) * 3, {"time_constant": (tau, "s")}, "creep")

@@ -1,9 +1,7 @@
 """Second-order response of the accelerometers."""
 
-from __future__ import annotations
-
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
 
 
 class AccelQuadratic(Effect):
@@ -15,5 +13,5 @@ class AccelQuadratic(Effect):
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
-        columns = context.on_accelerometers(context.axis_force**2)
-        return [Variant(force_only(columns), per_axis("K2"), ("1/(m/s^2)",) * 3)]
+        square = on_axes(context, ACCELEROMETER, context.axis_force**2)
+        return [Variant(square, per_axis("K2"), ("1/(m/s^2)",) * 3)]

@@ -1,11 +1,7 @@
 """Accelerometer scale that differs between positive and negative force."""
 
-from __future__ import annotations
-
-import numpy as np
-
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
 
 
 class AccelScaleAsymmetry(Effect):
@@ -17,5 +13,5 @@ class AccelScaleAsymmetry(Effect):
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
-        columns = context.on_accelerometers(np.abs(context.axis_force))
-        return [Variant(force_only(columns), per_axis("half_difference"), ("1",) * 3)]
+        size = on_axes(context, ACCELEROMETER, abs(context.axis_force))
+        return [Variant(size, per_axis("half_difference"), ("1",) * 3)]

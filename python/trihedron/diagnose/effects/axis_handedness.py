@@ -23,16 +23,14 @@ class AxisHandedness(DirectEffect):
         S = context.fitted.state.gyro_S
         if context.obs.raw_rate is None or len(context.moves) < 3:
             return None
-        unit = S / np.linalg.norm(S, axis=0)
-        main = np.argmax(np.abs(unit), axis=0)
+        main = np.argmax(np.abs(S), axis=0)
         if sorted(main.tolist()) != [0, 1, 2]:
             return None
-        cov = context.fitted.covariance()[9:18, 9:18]
-        sigma = np.sqrt(np.maximum(np.diag(cov), 0.0)).reshape(3, 3)
+        sigma = np.sqrt(np.maximum(np.diag(context.fitted.covariance())[9:18], 0.0)).reshape(3, 3)
+        largest, signs = S[main, range(3)], np.sign(S[main, range(3)])
         # The sign of an axis is used only where its scale is determined.
-        if any(abs(S[main[j], j]) < SIGN_SIGMA * sigma[main[j], j] for j in range(3)):
+        if (np.abs(largest) < SIGN_SIGMA * sigma[main, range(3)]).any():
             return None
-        signs = np.array([np.sign(unit[main[j], j]) for j in range(3)])
         if (signs > 0).all() and (main == np.arange(3)).all():
             return None
         n_reversed = int((signs < 0).sum())
@@ -43,9 +41,6 @@ class AxisHandedness(DirectEffect):
             "reversed", is_one=n_reversed == 1, is_two=n_reversed == 2, is_three=n_reversed == 3,
             reversed=reversed_axes, kept=kept,
         )  # fmt: skip
-        parameters = tuple(
-            EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in zip(AXES, signs, strict=True)
-        )
-        return Evidence(
-            1e-300, 1e6, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)),
-        )  # fmt: skip
+        signed = zip(AXES, signs, strict=True)
+        parameters = tuple(EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in signed)
+        return Evidence(1e-300, 1e6, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))

@@ -5,13 +5,10 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects.contract import GYRO, SENSORS, Effect, Variant
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.domains import Domain
 from trihedron.records.words import Words, why_not
 
 FEWEST_POSES = 6
@@ -25,11 +22,14 @@ class BiasProcess(Effect):
     """0 accelerometer, 1 gyro."""
     walks: ClassVar[bool]
     """Whether the bias walks from pose to pose; otherwise it is drawn anew in each."""
-    unit: ClassVar[str]
-    domain: ClassVar[Domain]
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the bias."""
+        return SENSORS[self.sensor].unit
 
     def unavailable(self, context: Context) -> str | None:
-        if self.sensor == 1 and context.obs.raw_rate is None:
+        if self.sensor == GYRO and context.obs.raw_rate is None:
             return why_not("no-gyro")
         return why_not("six-poses") if context.obs.n_poses < FEWEST_POSES else None
 
@@ -43,5 +43,5 @@ class BiasProcess(Effect):
 
 def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
     """One parameter per axis."""
-    named = zip(AXES, np.asarray(size), np.asarray(std), strict=True)
+    named = zip(AXES, size, std, strict=True)
     return tuple(EffectParameter(f"{symbol}_{axis}", float(v), float(s), unit) for axis, v, s in named)

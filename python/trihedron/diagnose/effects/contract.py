@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,10 +18,21 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
 from trihedron.records.words import Words, effect_words, experiment_for, why_not
 
+
+class Side(NamedTuple):
+    """How one sensor is called in variants, in names of parameters, and the SI unit of its readings."""
+
+    label: str
+    prefix: str
+    unit: str
+
+
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 """3 mg and 0.1 °/s: typical errors of consumer parts."""
 LEAST_RMS = 1e-12
 """Smallest rms of a column, so that a column of zeros does not divide by zero."""
+ACCELEROMETER, GYRO = 0, 1
+SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 
@@ -59,9 +70,6 @@ class Effect(ABC):
     """Whether the effect can be compensated in another recording of the same sensor, from logged signals alone."""
     needs_moves: ClassVar[bool] = False
     """Whether it shows only in moves between poses, which need a gyro."""
-    repeatable: ClassVar[bool] = False
-    """Whether it may be accepted more than once (a second pose, a second line)."""
-
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
     """Domains of samples whose disagreement this effect explains."""
 
@@ -79,7 +87,8 @@ class Effect(ABC):
     drifts_as: ClassVar[str] = ""
     """Id of the effect that replaces it where its channel is not logged: without a temperature it is a bias drift."""
     is_local: ClassVar[bool] = False
-    """Whether it concerns one pose or move only: its gain may then come from one fold of the cross-validation."""
+    """Whether it concerns one pose only: its gain may come from one fold of the cross-validation, and it may be
+    accepted once for each of several poses."""
 
     size: ClassVar[float] = 0.0
     """Typical size of one parameter in data sheets, one sigma, in the reported unit; 0 where :meth:`sizes` is
@@ -115,13 +124,9 @@ class Effect(ABC):
         """A scaled variant computed again for its fitted size; ``None`` where its columns do not depend on the size."""
         return None
 
-    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        """Whether the mechanism can have the fitted parameters."""
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        """Whether the mechanism can have the fitted parameters of a variant."""
         return True
-
-    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        """Whether the mechanism can have the fitted parameters in this variant."""
-        return self.is_plausible(value, covariance)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones, then the shape parameters with ``shape_sigma`` as uncertainty."""
@@ -133,19 +138,14 @@ class Effect(ABC):
         shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())
         return linear + shape
 
-    def n_shape(self, parameters: tuple[EffectParameter, ...]) -> int:
-        """Number of shape parameters at the end of ``parameters``."""
-        return sum(1 for p in parameters if p.name in SHAPE_NAMES)
-
     def told(self, case: str, /, **values: Any) -> Words:
         """The catalogue's sentence for this effect, by case and values (SI)."""
         return effect_words(self.id, case, **values)
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
-        strongest = max(
-            parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300)
-        )
+        linear = [p for p in parameters if p.name not in SHAPE_NAMES]
+        strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, 1e-300))
         return self.told(
             "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
             unit=strongest.unit,
@@ -169,3 +169,14 @@ def force_only(columns: FloatArray) -> Distortion:
 def rate_only(columns: FloatArray) -> Distortion:
     """A distortion of the gyro alone."""
     return Distortion(None, columns)
+
+
+def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
+    """Values (points, 3) along the axes of a sensor (0 accelerometer, 1 gyro), or (points, 1) alike on all of them, as
+    three parameters each."""
+    columns = [
+        (context.on_gyros if sensor else context.on_accelerometers)(np.broadcast_to(one, (len(one), 3)))
+        for one in values
+    ]
+    whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
+    return rate_only(whole) if sensor else force_only(whole)

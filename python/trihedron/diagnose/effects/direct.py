@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
@@ -33,7 +30,6 @@ class Evidence:
     ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: these moves must improve.
     ``share`` is the share of its domain's misfit that it explains, for effects that do not show in poses and moves.
     ``statement`` is the catalogue's (:meth:`Effect.told`), or that of a user's own effect.
-    ``series`` is a curve shown with the result, as plain JSON types.
     ``restate`` gives the parameters again from the session fitted with ``reweigh`` applied.
     """
 
@@ -45,11 +41,9 @@ class Evidence:
     where: Where = NOWHERE
     held_out: tuple[HeldOut, ...] = ()
     reweigh: Callable[[Observations], Observations] | None = None
-    confounded_with: tuple[str, ...] = ()
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
     share: float | None = None
     touched: tuple[int, ...] | None = None
-    series: Mapping[str, Any] = field(default_factory=dict)
 
 
 class DirectEffect(Effect):
@@ -67,11 +61,3 @@ class DirectEffect(Effect):
     def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
         """No columns: a direct effect takes no part in the search unless it overrides this."""
         return []
-
-
-def without_moves(
-    ranges: tuple[tuple[int, int], ...], poses: npt.NDArray[np.intp], bad: set[int]
-) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
-    """Move ranges and their poses, without the moves in ``bad``."""
-    keep = [m for m in range(len(ranges)) if m not in bad]
-    return tuple(ranges[m] for m in keep), poses[keep]

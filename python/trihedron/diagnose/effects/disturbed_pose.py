@@ -53,19 +53,16 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     side = max(int(0.5 * rate), 5)
     block = max(int(0.1 * rate), 2)
     first, last = max(a - side, 0), min(b + side, len(obs.time_s))
-    pairs = [(obs.raw_force, obs.force_density)]
-    if obs.raw_rate is not None and obs.rate_density is not None:
-        pairs.append((obs.raw_rate, obs.rate_density))
     n = (last - first) // block
     if n < FEWEST_BLOCKS:
         return None
     k = np.arange(n)
     outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
     inside, outside = [], []
-    for values, density in pairs:
+    for values in obs.whitened:
         means = values[first : first + n * block].reshape(n, block, 3).mean(axis=1)
         line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
-        away = (means - (line[0] + np.outer(k, line[1]))) / (density * np.sqrt(rate / block))
+        away = (means - (line[0] + np.outer(k, line[1]))) * np.sqrt(block)
         inside.append(away)
         outside.append(away[outer])
     worst = np.sort(np.abs(np.hstack(inside)).max(axis=1))[::-1]
@@ -90,7 +87,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
         gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ state.gyro_S.T,
         accel_bias=np.zeros((n, 3)),
     )
-    fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior), context.fitted)
+    fits = (fit(whole, start, NO_DISTORTION, context.fitted.prior), context.fitted)
     before, after = (predict_held_out(one, folds_of(one)) for one in fits)
     gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
     if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
@@ -109,7 +106,7 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     scatter = pose_scatter(obs)
     own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
-    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    x = obs.readings
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):
         pose = obs.segments.poses[i]
@@ -134,9 +131,8 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
     poses, free = fitted.system.segment[rows], 1.0 - fitted.leverage[rows]
     chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
-    out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * np.maximum(
-        np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF
-    )
+    dof = np.maximum(np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF)
+    out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * dof
     for halves, sigma in zip(obs.half_means, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
         if halves is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
@@ -151,17 +147,12 @@ class DisturbedPose(DirectEffect):
     size = 0.05
     """m/s²: a push too weak to be noticed by hand."""
     is_of_session = True
-    repeatable = True
     is_local = True
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
-        seen = {span: _bump(obs, span) for span in obs.disturbed_s}
-        bumps = {
-            span: bump
-            for span, bump in seen.items()
-            if bump is not None and bump.chi2_per_dof_after < bump.chi2_per_dof_before
-        }
+        seen = [(span, bump) for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None]
+        bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
         bumped = list(bumps)
         held = _gained_by_cutting(context) if bumped else ()
         if bumped:

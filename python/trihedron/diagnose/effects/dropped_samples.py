@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence, without_moves
-from trihedron.diagnose.effects.hidden_losses import bridge, hidden_losses, residual_after
-from trihedron.diagnose.effects.sample_steps import Loss, find_losses, most_lost
+from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence
+from trihedron.diagnose.effects.lost_samples import Loss, bridge, find_losses, hidden_losses, most_lost, residual_after
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
@@ -43,9 +43,9 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     session is fitted without the moves concerned, so that a loss cannot bias it. Computed once per set of observations.
     """
     if context.obs not in _KNOWN:
-        losses = find_losses(context)
-        ranges, _ = without_moves(context.obs.move_ranges, context.obs.move_poses, {one.move for one in losses})
-        if len(ranges) < FEWEST_MOVES or len(context.fitted.state.effect):
+        losses = list(find_losses(context.obs))
+        n_clean = context.obs.n_moves - len({one.move for one in losses})
+        if n_clean < FEWEST_MOVES or len(context.fitted.state.effect):
             _KNOWN[context.obs] = losses, {one.sample: 0.5 + UNSETTLED * one.count for one in losses}
         else:
             _KNOWN[context.obs] = _by_gravity(context, losses)
@@ -54,10 +54,7 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
 
 def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[int, float]]:
     obs, touched = context.obs, {loss.move for loss in losses}
-    ranges, poses = without_moves(obs.move_ranges, obs.move_poses, touched)
-    clean = _of_moves_that_agree(
-        replace(obs, move_ranges=ranges, move_poses=poses), context.fitted.state, context.fitted.line.prior
-    )
+    clean = _of_moves_that_agree(obs.without_moves(touched), context.fitted.state, context.fitted.prior)
     misfit = (move_residuals(obs, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
     limit = CONTRADICTS * MEDIAN_OF_FIVE * usual
@@ -127,10 +124,9 @@ def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | 
         state = fit(obs, state, NO_DISTORTION, prior).state
         misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
         bad = {int(m) for m in np.flatnonzero(misfit > CONTRADICTS * np.median(misfit))}
-        ranges, poses = without_moves(obs.move_ranges, obs.move_poses, bad)
-        if not bad or len(ranges) < FEWEST_MOVES:
+        if not bad or obs.n_moves - len(bad) < FEWEST_MOVES:
             return state
-        obs = replace(obs, move_ranges=ranges, move_poses=poses)
+        obs = obs.without_moves(bad)
     return state
 
 
@@ -170,8 +166,7 @@ class DroppedSamples(DirectEffect):
 
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)
-            mended = observe(recording, segments, old.averaging)
-            return replace(mended, jitter_s=old.jitter_s)
+            return replace(observe(recording, segments, old.averaging), jitter_s=old.jitter_s)
 
         where = Where(
             (),
@@ -219,30 +214,22 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
             out[k + shift[k] + 1 : k + shift[k] + 1 + n] = bridge(values, k, n)
         return out
 
-    mended = replace(
-        recording,
-        time_s=time_s,
-        accelerometer=bridged(recording.accelerometer),
-        gyroscope=bridged(recording.gyroscope),
-        temperature_degc=bridged(recording.temperature_degc),
-        supply_v=bridged(recording.supply_v),
-        auxiliary=type(recording.auxiliary)({}),
-    ).with_facts(recording.facts.moved(new_index))
+    channels = ("accelerometer", "gyroscope", "temperature_degc", "supply_v")
+    values: dict[str, Any] = {name: bridged(getattr(recording, name)) for name in channels}
+    mended = replace(recording, time_s=time_s, auxiliary=type(recording.auxiliary)({}), **values)
+    mended = mended.with_facts(recording.facts.moved(new_index))
 
     def at(index: int) -> int:
         return int(new_index[index]) if index < n_old else total
 
     poses = tuple(
         replace(
-            pose,
-            start=at(pose.start),
-            stop=at(pose.stop - 1) + 1,
-            outer_start=at(pose.outer_start),
+            pose, start=at(pose.start), stop=at(pose.stop - 1) + 1, outer_start=at(pose.outer_start),
             outer_stop=at(pose.outer_stop - 1) + 1,
             disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
         )
         for pose in segments.poses
-    )
+    )  # fmt: skip
     moves = tuple(
         replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
     )

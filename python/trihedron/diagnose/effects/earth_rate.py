@@ -120,7 +120,7 @@ class EarthRate(Effect):
             )
         ]  # fmt: skip
 
-    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         # The length of Earth rate is known and gravity limits the latitude: any other vector is another effect.
         near = nearest_turning(value, covariance)
         least, most = latitudes_of(variant.given["gravity"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
+from trihedron.diagnose.effects.contract import GYRO
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
@@ -12,8 +13,7 @@ class GyroBiasRepeatability(BiasProcess):
     """The bias of every axis is drawn anew in every pose, beyond noise and drift."""
 
     is_spread = True
-    id = "gyro-bias-repeatability"
-    sensor, walks, unit, domain = 1, False, "rad/s", "static-gyro"
+    id, sensor, walks = "gyro-bias-repeatability", GYRO, False
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         return per_axis_parameters("sigma", size, std, self.unit), self.told("scatter", sigma=size)

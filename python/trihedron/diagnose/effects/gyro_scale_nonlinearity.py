@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+from trihedron.diagnose.effects.contract import GYRO, Effect, Variant, on_axes, per_axis
 
 LEAST_RATE = 1e-3
 """rad/s: lower bound of the fastest rate, for recordings without rotation."""
@@ -27,12 +27,10 @@ class GyroScaleNonlinearity(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         w = context.axis_rate
-        cubic, square = context.on_gyros(w**3), context.on_gyros(w**2)
-        both = np.concatenate([cubic, square], axis=2)
         c, q = per_axis("cubic"), per_axis("quadratic")
         cu, qu = ("1/(rad/s)^2",) * 3, ("1/(rad/s)",) * 3
         return [
-            Variant(rate_only(cubic), c, cu, label="cubic"),
-            Variant(rate_only(square), q, qu, label="quadratic"),
-            Variant(rate_only(both), c + q, cu + qu, label="both"),
+            Variant(on_axes(context, GYRO, w**3), c, cu, label="cubic"),
+            Variant(on_axes(context, GYRO, w**2), q, qu, label="quadratic"),
+            Variant(on_axes(context, GYRO, w**3, w**2), c + q, cu + qu, label="both"),
         ]

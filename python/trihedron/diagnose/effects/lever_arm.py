@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.ndimage import uniform_filter1d
 from scipy.special import fdtrc
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import clipped_samples
+from trihedron.diagnose.effects.plateaus import clipped_samples
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
@@ -150,7 +151,7 @@ def _written(context: Context) -> _Moves:
         e = _smooth(context.force[where], width) - gravity
         # α × r + ω × (ω × r) as a matrix on r; a delay changes gravity by d/dt of -g, which is -ω × (-g).
         made = np.concatenate([_cross(a) + _cross(w) @ _cross(w), -np.cross(w, gravity)[:, :, None]], axis=2)
-        begun = context.fitted.line.path.attitude[where.start - poses : where.stop - poses].transpose(0, 2, 1)
+        begun = context.fitted.path.attitude[where.start - poses : where.stop - poses].transpose(0, 2, 1)
         shapes = _shapes(t, n_shapes)
         targets.append(shapes.T @ (begun @ e[:, :, None])[:, :, 0])
         columns.append(np.tensordot(shapes.T, begun @ made, axes=1))
@@ -161,8 +162,7 @@ def _shapes(time_s: FloatArray, count: int) -> FloatArray:
     """(n, count) Legendre polynomials over the time of a move, of mean square 1, times the weight of each sample."""
     x = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
     weight = 0.5 * np.gradient(x)
-    out: FloatArray = legvander(x, count - 1) * np.sqrt(2.0 * np.arange(count) + 1.0) * weight[:, None]
-    return out
+    return np.asarray(legvander(x, count - 1) * np.sqrt(2.0 * np.arange(count) + 1.0) * weight[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,16 +244,9 @@ def _held_out(moves: _Moves, found: _Arm, shapes: FloatArray) -> tuple[FloatArra
 
 def _cross(v: FloatArray) -> FloatArray:
     """(n, 3, 3) matrices of the cross product with every row."""
-    x, y, z = v.T
-    nothing = np.zeros_like(x)
-    rows = [[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]]
-    return np.asarray(np.moveaxis(np.array(rows), 2, 0))
+    return np.asarray(np.cross(v[:, None, :], np.eye(3)).transpose(0, 2, 1))
 
 
 def _smooth(x: FloatArray, width: int) -> FloatArray:
     """Running mean, applied alike to both sides of the comparison, so that differences are less noisy."""
-    if len(x) < width:
-        return x
-    padded = np.pad(x, ((width // 2, width // 2), (0, 0)), mode="edge")
-    kernel = np.ones(width) / width
-    return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(x.shape[1])], axis=1)
+    return x if len(x) < width else np.asarray(uniform_filter1d(x, width, axis=0, mode="nearest"))

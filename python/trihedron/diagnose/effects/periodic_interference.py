@@ -28,9 +28,7 @@ class PeriodicInterference(DirectEffect):
             return None
         strongest = min(lines, key=lambda line: line.p_value)
         same = [line for line in lines if abs(line.frequency_hz - strongest.frequency_hz) < line.resolution_hz]
-        parameters = [
-            EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz"),
-        ]
+        parameters = [EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz")]
         state = context.fitted.state
         for line in same:
             S = state.accel_S if line.channel[0] == "a" else state.gyro_S

@@ -7,8 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from trihedron.arrays import BoolArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.channel_facts import Limit
+
+HALF_WINDOW = 6
+"""Samples on either side of an interval that determine the local motion."""
 
 
 @dataclass(frozen=True)
@@ -49,3 +53,13 @@ def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
                 ends = max(first, int(starts[move])), min(last, int(stops[move]))
                 found.append(Plateau(limit, *ends, limit in exact))
     return found
+
+
+@lru_cache(maxsize=8)
+def clipped_samples(obs: Observations) -> BoolArray:
+    """(n,) samples within ``HALF_WINDOW`` of a plateau at a range limit: their steps give no time error."""
+    mask = np.zeros(len(obs.time_s), dtype=bool)
+    for is_gyro in (False, True):
+        for run in plateaus_of(obs, is_gyro=is_gyro):
+            mask[max(run.start - HALF_WINDOW, 0) : run.stop + HALF_WINDOW] = True
+    return mask

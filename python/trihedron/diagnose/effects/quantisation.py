@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_poses import CHANNELS
+from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -214,8 +214,7 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     S = context.fitted.state.accel_S if is_accel else context.fitted.state.gyro_S
     place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
     sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
-    scale = context.si_per_raw("accelerometer" if is_accel else "gyroscope")[k]
-    return float(scale), sigma / abs(float(S[k, k]))
+    return float(context.si_per_raw(channel // 3)[k]), sigma / abs(float(S[k, k]))
 
 
 LEAST_LEFT = 0.01
@@ -226,19 +225,16 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's pose means and noise as estimated from the codes."""
     is_accel = one.channel < 3
     k = one.channel % 3
-    mean = (obs.pose_force if is_accel else obs.pose_rate).copy()  # type: ignore[union-attr]
-    sigma = (obs.pose_force_sigma if is_accel else obs.pose_rate_sigma).copy()  # type: ignore[union-attr]
-    density = (obs.force_density if is_accel else obs.rate_density).copy()  # type: ignore[union-attr]
+    kind = "force" if is_accel else "rate"
+    mean, sigma, density = (getattr(obs, n).copy() for n in (f"pose_{kind}", f"pose_{kind}_sigma", f"{kind}_density"))
     mean[:, k] += one.mean_shift
     sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, 1e-300), 1.0), one.mean_sigma)
     # In motion the readings cross many codes: the rounding error is white, of variance LSB²/12 per reading.
     density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
-    if is_accel:
-        along = obs.force_up
-        if along is not None:
-            # Change of the variance along the vertical.
-            up, error = along
-            changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.pose_force_sigma[:, k] ** 2)
-            along = up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))
-        return replace(obs, pose_force=mean, pose_force_sigma=sigma, force_density=density, force_up=along)
-    return replace(obs, pose_rate=mean, pose_rate_sigma=sigma, rate_density=density)
+    if is_accel and obs.force_up is not None:
+        # Change of the variance along the vertical.
+        up, error = obs.force_up
+        changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.pose_force_sigma[:, k] ** 2)
+        obs = replace(obs, force_up=(up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))))
+    known = {f"pose_{kind}": mean, f"pose_{kind}_sigma": sigma, f"{kind}_density": density}
+    return replace(obs, **known)

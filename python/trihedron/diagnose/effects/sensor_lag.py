@@ -1,4 +1,9 @@
-"""A low-pass of first or second order in one of the sensors."""
+"""A low-pass of first or second order in one of the sensors, to all orders that a recording can determine.
+
+A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass of first order
+x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All begin with τ y'; the next term separates
+them. Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +11,25 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
-from trihedron.diagnose.effects.late_readings import NEAR_ONE, by_low_pass, times_for
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, force_only, on_axes, per_axis, rate_only
 
+TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
+"""Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
+NEAR_ONE = (0.6, 1.6)
+"""Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
+LEAST_STEPS = 0.25
+"""In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
 SIGMAS = 3.0
 """Standard errors by which a lag may be negative: filters are causal."""
+FIRST_ORDER_S = 0.01
+"""s: unit of the first-order columns; their parameter is a lag in hundredths of a second."""
+SECOND = "second order"
+
+
+def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
+    """Whether a scaled parameter is near one, within three standard errors."""
+    sigma = SIGMAS * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
+    return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma)
 
 
 class SensorLag(Effect):
@@ -22,49 +41,42 @@ class SensorLag(Effect):
     """s: the delay of a filter."""
 
     def variants(self, context: Context) -> list[Variant]:
-        unit = FIRST_ORDER_S
-        force, rate = -unit * context.force_rate[:, :, None], -unit * context.angular_acceleration[:, :, None]
-        accel = context.on_accelerometers(-unit * context.derivative(context.axis_force))
-        gyro = context.on_gyros(-unit * context.derivative(context.axis_rate))
-        out = [
-            Variant(force_only(force), ("accelerometer_lag",), ("s",), label="accelerometer", scale=unit),
-            Variant(rate_only(rate), ("gyro_lag",), ("s",), label="gyro", scale=unit),
-            Variant(force_only(accel), per_axis("accelerometer_lag"), ("s",) * 3, label="accelerometer, per axis",
-                    scale=unit),
-            Variant(rate_only(gyro), per_axis("gyro_lag"), ("s",) * 3, label="gyro, per axis", scale=unit),
-        ]  # fmt: skip
-        out += [
-            _second_order(context, name, t, f"{name}, {SECOND}, {1e3 * t:.0f} ms")
-            for t in times_for(context)
-            for name in ("accelerometer", "gyro")
+        unit, out = FIRST_ORDER_S, []
+        for sensor, slope in enumerate((context.force_rate, context.angular_acceleration)):
+            columns = (rate_only if sensor else force_only)(-unit * slope[:, :, None])
+            name = SENSORS[sensor].label
+            out.append(Variant(columns, (f"{name}_lag",), ("s",), label=name, scale=unit))
+        for sensor, label in enumerate(("accelerometer, per axis", "gyro, per axis")):
+            columns = on_axes(context, sensor, -unit * context.derivative(context.axis_motion(sensor)))
+            name = SENSORS[sensor].label
+            out.append(Variant(columns, per_axis(f"{name}_lag"), ("s",) * 3, label=label, scale=unit))
+        # A shorter time than the sampling resolves is that of a delay.
+        least_s = LEAST_STEPS / context.obs.recording.rate_hz
+        times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
+        return out + [
+            _second_order(context, sensor, t, f"{SENSORS[sensor].label}, {SECOND}, {1e3 * t:.0f} ms")
+            for t in times
+            for sensor in range(2)
         ]
-        return out
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         if SECOND not in variant.label or not value[0] > 0.0:
             return None
-        name = variant.label.split(",")[0]
-        return _second_order(context, name, variant.scale * float(value[0]), variant.label)
+        sensor = 1 if variant.distortion.force is None else 0
+        return _second_order(context, sensor, variant.scale * float(value[0]), variant.label)
 
-    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         if (value < -SIGMAS * sigma).any() or not (value > 0.0).any():
             return False
-        if SECOND not in variant.label:
-            return True
-        low, high = NEAR_ONE
-        return bool(low - SIGMAS * sigma[0] < value[0] < high + SIGMAS * sigma[0])
+        return SECOND not in variant.label or is_near_one(value, covariance)
 
 
-SECOND = "second order"
-
-
-def _second_order(context: Context, name: str, time_s: float, label: str) -> Variant:
-    is_accelerometer = name == "accelerometer"
-    columns = by_low_pass(context, context.force if is_accelerometer else context.rate, time_s)[:, :, None]
-    only = force_only if is_accelerometer else rate_only
-    return Variant(only(columns), (f"{name}_lag",), ("s",), label=label, scale=time_s, is_family=True)
-
-
-FIRST_ORDER_S = 0.01
-"""s: unit of the first-order columns; their parameter is a lag in hundredths of a second."""
+def _second_order(context: Context, sensor: int, time_s: float, label: str) -> Variant:
+    """What a second-order low-pass of this delay adds to readings: -(τ y' + τ²/2 y'')."""
+    values = context.rate if sensor else context.force
+    step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
+    twice = context.shifted(values, step) - 2.0 * values + context.shifted(values, -step)
+    column = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
+    distortion = (rate_only if sensor else force_only)(column[:, :, None])
+    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s, is_family=True)

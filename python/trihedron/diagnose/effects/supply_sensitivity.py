@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import LEAST_SWING_V, Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.records.words import why_not
 
 
@@ -18,22 +18,15 @@ class SupplySensitivity(Effect):
     def unavailable(self, context: Context) -> str | None:
         if context.supply is None:
             return why_not("no-supply")
-        if np.ptp(context.supply) < LEAST_SWING_V:
-            return why_not("steady-supply")
-        return None
+        return why_not("steady-supply") if np.ptp(context.supply) < LEAST_SWING_V else None
 
     def variants(self, context: Context) -> list[Variant]:
         assert context.supply is not None
         v = context.supply[:, None]
-        offset = context.on_accelerometers(v * np.ones(3))
-        scale = context.on_accelerometers(v * context.axis_force)
-        accel = force_only(np.concatenate([scale, offset], axis=2))
-        names = per_axis("accel_scale") + per_axis("accel_offset")
-        out = [Variant(accel, names, ("1",) * 3 + ("m/s^2",) * 3, label="accelerometer")]
-        if context.obs.raw_rate is not None:
-            offset = context.on_gyros(v * np.ones(3))
-            scale = context.on_gyros(v * context.axis_rate)
-            gyro = rate_only(np.concatenate([scale, offset], axis=2))
-            names = per_axis("gyro_scale") + per_axis("gyro_offset")
-            out.append(Variant(gyro, names, ("1",) * 3 + ("rad/s",) * 3, label="gyro"))
+        out = []
+        for sensor, (label, prefix, unit) in enumerate(SENSORS):
+            if sensor == 0 or context.obs.raw_rate is not None:
+                names = per_axis(f"{prefix}_scale") + per_axis(f"{prefix}_offset")
+                columns = on_axes(context, sensor, v * context.axis_motion(sensor), v)
+                out.append(Variant(columns, names, ("1",) * 3 + (unit,) * 3, label=label))
         return out

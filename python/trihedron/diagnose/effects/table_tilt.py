@@ -8,7 +8,7 @@ from scipy.special import chdtrc, ndtr, stdtrit
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import Evidence
-from trihedron.diagnose.effects.table_turns import TableEffect, table_turns
+from trihedron.diagnose.effects.table_turns import P_LIMIT, TableEffect, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
@@ -16,8 +16,6 @@ FEWEST_TO_SCATTER = 3
 """Rotations from which their scatter is used."""
 LEAST_SINE = 0.3
 """Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
-P_LIMIT = 1e-4
-"""False-alarm rate of the χ² test on a level table: no tilt in 24 healthy sessions on a table."""
 ORDINARY_DEG = 0.05
 """Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
 
@@ -52,12 +50,8 @@ class TableTilt(TableEffect):
             if half < LEAST_SINE:
                 continue
             change = state.up[after] - state.up[before]
-            sigma = float(
-                np.sqrt(
-                    ((state.accel_S**2) @ (obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2)).mean()
-                )
-            )
-            sigma /= state.gravity
+            variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
+            sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
             chi2 += float(change @ change) / sigma**2
             dof += 2
             tilts.append(float(np.linalg.norm(change)) / (2.0 * half))

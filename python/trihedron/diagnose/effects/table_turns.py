@@ -19,6 +19,8 @@ MOST_ACROSS = 0.25
 """Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
 FEWEST_TURNS, NEARLY_ALL = 4, 0.7
 """Hand moves end near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
+P_LIMIT = 1e-4
+"""False-alarm rate of the χ² tests on a level table and on all angles together: none in 24 healthy sessions."""
 HALF_RIGHT_RAD = np.pi / 4
 """45°: a smaller angle is nearer to 0° than to 90°."""
 
@@ -52,17 +54,13 @@ def table_turns(context: Context) -> list[TableTurn]:
     return out
 
 
-def meant_as_multiples(turns: list[TableTurn]) -> bool:
-    """Whether the rotations are meant as multiples of 90°: at least four, nearly all close to one."""
-    near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in turns]
-    return len(turns) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
-
-
 class TableEffect(DirectEffect):
     """An effect of an experiment on a table."""
 
     is_of_session = True
 
     def unavailable(self, context: Context) -> str | None:
-        is_there = context.moves and meant_as_multiples(table_turns(context))
+        """Unless at least four rotations, nearly all of them close to a multiple of 90°, are meant as such."""
+        near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in table_turns(context)]
+        is_there = len(near) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
         return None if is_there else why_not("no-table-turns")

@@ -8,22 +8,26 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import LEAST_SWING_K, Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
-from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants, thermal_sizes
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.records.words import why_not
+
+LEAST_RATE_RANGE = 0.3
+"""Range of the rate of temperature over its largest value, below which it is confounded with a constant."""
+BRANCH_K_S = 0.002
+"""Rate of change at which a branch reaches three quarters: an oven has ten times as much, a room a tenth."""
 
 
 class Thermal(Effect):
     """Applies where a temperature was logged and changed."""
 
     applies_elsewhere = True
+    sensor: ClassVar[int]
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:
             return why_not("no-temperature")
-        if np.ptp(context.temperature) < LEAST_SWING_K:
-            return why_not("steady-temperature", least_k=LEAST_SWING_K)
-        return None
+        is_steady = np.ptp(context.temperature) < LEAST_SWING_K
+        return why_not("steady-temperature", least_k=LEAST_SWING_K) if is_steady else None
 
 
 class ThermalScale(Thermal):
@@ -31,22 +35,17 @@ class ThermalScale(Thermal):
 
     size = 3e-4
     """1/K: 300 ppm."""
-    is_gyro: ClassVar[bool] = False
 
     def variants(self, context: Context) -> list[Variant]:
         assert context.temperature is not None
-        t = context.temperature[:, None]
-        if self.is_gyro:
-            distortion = rate_only(context.on_gyros(t * context.axis_rate))
-        else:
-            distortion = force_only(context.on_accelerometers(t * context.axis_force))
+        distortion = on_axes(context, self.sensor, context.temperature[:, None] * context.axis_motion(self.sensor))
         return [Variant(distortion, per_axis("scale_per_kelvin"), ("1/K",) * 3)]
 
 
 class AccelThermalScale(ThermalScale):
     """Accelerometer scale."""
 
-    id = "accel-thermal-scale"
+    id, sensor = "accel-thermal-scale", ACCELEROMETER
     confounded_with = ("accel-bias", "accel-scale")
     drifts_as = "accel-bias-drift"
 
@@ -54,8 +53,7 @@ class AccelThermalScale(ThermalScale):
 class GyroThermalScale(ThermalScale):
     """Gyro scale."""
 
-    id = "gyro-thermal-scale"
-    is_gyro = True
+    id, sensor = "gyro-thermal-scale", GYRO
     confounded_with = ("gyro-bias", "gyro-scale")
     drifts_as = "gyro-bias-drift"
 
@@ -65,21 +63,43 @@ class ThermalBias(Thermal):
 
     per_kelvin: ClassVar[float]
     """Typical bias change per kelvin, one sigma, SI."""
-    is_gyro: ClassVar[bool] = False
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        return thermal_sizes(context, variant, self.per_kelvin)
+        """Quadratic, rate and hysteresis terms change the bias by a third of what the linear term does."""
+        assert context.temperature is not None
+        swing = float(np.ptp(context.temperature))
+        beside = self.per_kelvin * swing / 3.0
+        by_name = {"bias_per_kelvin": self.per_kelvin, "bias_per_kelvin2": beside / swing**2, "half_gap": beside}
+        if context.temperature_rate is not None:
+            by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
+        return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
 
     def variants(self, context: Context) -> list[Variant]:
-        if self.is_gyro:
-            return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")
-        return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")
+        """Forward models, simplest first. Temperature is relative to its mean over the poses, its rate to 0."""
+        assert context.temperature is not None
+        t, speed, unit = context.temperature[:, None], context.temperature_rate, SENSORS[self.sensor].unit
+        beside = [("quadratic", "bias_per_kelvin2", f"{unit}/K^2", t**2)]
+        # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
+        is_fitted = context.obs.n_poses > 0
+        if speed is not None and (not is_fitted or _varies(speed)):
+            beside.append(("rate", "bias_per_kelvin_per_s", f"{unit}/(K/s)", speed[:, None]))
+            if not is_fitted or (speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S):
+                beside.append(("hysteresis", "half_gap", unit, np.tanh(speed / BRANCH_K_S)[:, None]))
+        names, units = per_axis("bias_per_kelvin"), (f"{unit}/K",) * 3
+        return [Variant(on_axes(context, self.sensor, t), names, units, label="linear")] + [
+            Variant(on_axes(context, self.sensor, t, more), names + per_axis(name), units + (of,) * 3, label=label)
+            for label, name, of, more in beside
+        ]
+
+
+def _varies(speed: FloatArray) -> bool:
+    return bool(speed.any() and np.ptp(speed) >= LEAST_RATE_RANGE * np.abs(speed).max())
 
 
 class AccelThermalBias(ThermalBias):
     """Accelerometer bias: half a mg per kelvin."""
 
-    id = "accel-thermal-bias"
+    id, sensor = "accel-thermal-bias", ACCELEROMETER
     confounded_with = ("accel-bias",)
     drifts_as = "accel-bias-drift"
     per_kelvin = 0.005
@@ -88,8 +108,7 @@ class AccelThermalBias(ThermalBias):
 class GyroThermalBias(ThermalBias):
     """Gyro bias: 0.02 °/s per kelvin."""
 
-    id = "gyro-thermal-bias"
-    is_gyro = True
+    id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
     drifts_as = "gyro-bias-drift"
     per_kelvin = 4e-4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -11,7 +12,7 @@ from scipy.special import ndtr
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
+from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 
@@ -58,13 +59,9 @@ def timestamp_errors(obs: Observations) -> TimestampErrors | None:
     rms = float(np.sqrt(np.mean(delta**2)))
     if rms < EVEN * step or np.abs(delta).max() > step:
         return None
-    root = np.sqrt(obs.recording.rate_hz)
-    sensors = [obs.raw_force / (obs.force_density * root)]
-    if obs.raw_rate is not None and obs.rate_density is not None:
-        sensors.append(obs.raw_rate / (obs.rate_density * root))
     jump = np.convolve(delta, _CONTRAST, mode="same")
     top = both = square = 0.0
-    for x in sensors:
+    for x in obs.whitened:
         slope = np.gradient(x, axis=0) / step
         left = np.stack([np.convolve(x[:, c], _CONTRAST, mode="same") for c in range(3)], axis=1)
         for a, b in obs.move_ranges:
@@ -92,22 +89,55 @@ ORDINARY = 0.01
 """Jitter, in sample intervals, below which the common curvature of a smooth motion may cause it: not named."""
 
 
-def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, int]:
+@lru_cache(maxsize=8)
+def _step_errors(obs: Observations) -> tuple[FloatArray, FloatArray]:
+    """(k, sensors) extra time [s] that each sensor sees in its step in the inner intervals of all moves, and its noise.
+
+    A step minus the mean of the two steps beside it, in units of the local slope of the signal. The slope is that of a
+    line through the six samples on either side, the two of the step left out, so that vibration is not taken for
+    motion. Each sensor is evaluated by itself: only an error common to both is one of time.
+    """
+    sensors, clipped, w = obs.whitened, clipped_samples(obs), HALF_WINDOW
+    offsets = np.r_[-w:0, 2 : w + 2].astype(float) - 0.5  # the interval's middle is zero
+    weights = offsets / (offsets**2).sum()
+    extra, sigma = [np.zeros((0, len(sensors)))], [np.zeros((0, len(sensors)))]
+    for a, b in obs.move_ranges:
+        if b - a < 2 * w + HALF_WINDOW:
+            continue
+        step_s = float(np.median(np.diff(obs.time_s[a:b])))
+        k = np.arange(w, b - a - w - 1)
+        k = k[~clipped[a + k]]
+        errors, powers = [], []
+        for x in sensors:
+            z = x[a:b]
+            slope = np.tensordot(weights, np.stack([z[k + int(o + 0.5)] for o in offsets]), 1) / step_s
+            # Zero for a parabola; the third derivative and higher orders remain.
+            error = (z[k + 1] - z[k]) - 0.5 * ((z[k] - z[k - 1]) + (z[k + 2] - z[k + 1]))
+            powers.append(np.maximum((slope**2).sum(axis=1) / STEP_FACTOR, 1e-30))
+            errors.append((slope * error).sum(axis=1) / STEP_FACTOR / powers[-1])
+        extra.append(np.stack(errors, axis=1))
+        sigma.append(1.0 / np.sqrt(np.stack(powers, axis=1)))
+    return np.concatenate(extra), np.concatenate(sigma)
+
+
+def common_time_error(context: Context) -> tuple[float, float, int]:
     """Covariance of the extra times that the two sensors see, its standard error (s²), and the number of intervals.
 
     Noise, curvature and vibration differ between the sensors; an error of time is the same in both.
     """
-    if steps.extra_s.shape[1] < 2:
+    extra_s, sigma_s = _step_errors(context.obs)
+    step_s = 1.0 / context.obs.recording.rate_hz
+    if extra_s.shape[1] < 2:
         return 0.0, np.inf, 0
-    sharp = (steps.sigma_s < SHARP * step_s).all(axis=1)
+    sharp = (sigma_s < SHARP * step_s).all(axis=1)
     n = int(sharp.sum())
     if n < FEWEST_SHARP:
         return 0.0, np.inf, n
     # Clipped at five robust standard deviations, so that single losses do not dominate.
-    e = steps.extra_s[sharp]
+    e = extra_s[sharp]
     bound = 5.0 * 1.4826 * np.median(np.abs(e), axis=0)
     product = np.prod(np.clip(e, -bound, bound), axis=1)
-    weight = 1.0 / (np.prod(steps.sigma_s[sharp], axis=1) + (0.05 * step_s) ** 2)
+    weight = 1.0 / (np.prod(sigma_s[sharp], axis=1) + (0.05 * step_s) ** 2)
     value = float((weight * product).sum() / weight.sum())
     # Neighbouring step errors share samples (correlation over three): the error of the mean comes from blocks.
     blocks = np.array_split(np.arange(n), max(n // 12, 4))
@@ -138,12 +168,9 @@ class TimingJitter(DirectEffect):
                 return obs  # samples were inserted since
             again = observe(obs.recording.with_same_readings(time_s=even), obs.segments, obs.averaging)
             return replace(
-                again,
-                move_ranges=obs.move_ranges,
-                move_poses=obs.move_poses,
-                jitter_s=obs.jitter_s,
+                again, move_ranges=obs.move_ranges, move_poses=obs.move_poses, jitter_s=obs.jitter_s,
                 disturbed_s=obs.disturbed_s,
-            )
+            )  # fmt: skip
 
         return Evidence(
             float(max(ndtr((found.followed - 1.0) / max(found.sigma, 1e-3)), 1e-300)), max(found.gain, 1.0),
@@ -154,19 +181,15 @@ class TimingJitter(DirectEffect):
 
     def _uneven_samples(self, context: Context) -> Evidence | None:
         step_s = 1.0 / context.obs.recording.rate_hz
-        value, spread, n = common_time_error(step_errors(context), step_s)
+        value, spread, n = common_time_error(context)
         if n < FEWEST_SHARP or value <= 0.0:
             return None
         z = value / spread
         jitter = float(np.sqrt(value / STEP_FACTOR))
         if z < SURE or jitter < ORDINARY * step_s:
             return None
-
-        def reweigh(obs: Observations) -> Observations:
-            return replace(obs, jitter_s=jitter)
-
         return Evidence(
             float(max(ndtr(-z), 1e-300)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
-            self.told("samples", jitter_s=jitter), "timing", reweigh=reweigh,
+            self.told("samples", jitter_s=jitter), "timing", reweigh=lambda obs: replace(obs, jitter_s=jitter),
         )  # fmt: skip

@@ -8,14 +8,12 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import Evidence
-from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableEffect, TableTurn, table_turns
+from trihedron.diagnose.effects.table_turns import NEAR_DEG, P_LIMIT, TableEffect, TableTurn, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
 OFF_SIGMA = 4.0
 """Deviation in sigma from which a rotation is named: by chance one of 16 000."""
-P_LIMIT = 1e-4
-"""False-alarm rate of the χ² test on all rotations together: at most 1.6 σ in 24 healthy sessions."""
 
 
 class TurnAngleError(TableEffect):

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Effect, Variant, on_axes, per_axis
 from trihedron.records.words import why_not
 
 ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
@@ -27,9 +27,7 @@ class VibrationRectification(Effect):
 
     def unavailable(self, context: Context) -> str | None:
         power = context.pose_power.sum(axis=1)
-        if power.max() < STANDS_OUT * np.median(power):
-            return why_not("even-vibration")
-        return None
+        return why_not("even-vibration") if power.max() < STANDS_OUT * np.median(power) else None
 
     def variants(self, context: Context) -> list[Variant]:
         excess = context.vibration_power
@@ -37,12 +35,10 @@ class VibrationRectification(Effect):
         still = np.where(np.arange(len(excess))[:, None] < context.obs.n_poses, excess, 0.0)
         names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
         out = [
-            Variant(force_only(context.on_accelerometers(power)), names, units, label=label)
+            Variant(on_axes(context, ACCELEROMETER, power), names, units, label=label)
             for power, label in ((excess, "accelerometer"), (still, "accelerometer-in-poses"))
         ]
         if context.obs.raw_rate is not None:
-            total = excess.sum(axis=1, keepdims=True) * np.ones(3)
-            gyro = context.on_gyros(total)
-            units = ("(rad/s)/(m/s^2)^2",) * 3
-            out.append(Variant(rate_only(gyro), per_axis("gyro_bias_per_power"), units, label="gyro"))
+            gyro, units = on_axes(context, GYRO, excess.sum(axis=1, keepdims=True)), ("(rad/s)/(m/s^2)^2",) * 3
+            out.append(Variant(gyro, per_axis("gyro_bias_per_power"), units, label="gyro"))
         return out

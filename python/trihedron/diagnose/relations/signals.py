@@ -6,7 +6,8 @@ the effect is the better explanation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
@@ -36,17 +37,66 @@ class Signal:
     is_motion: bool = False
 
 
+Column = tuple[str, FloatArray, str]
+"""Name, values (points,) and unit of one variable."""
+
+
 def signals(context: Context) -> list[Signal]:
     """Every variable of this session, for both sensors; those present in poses minus their mean over the poses."""
-    out = _history(context, "accelerometer") + _warming(context, "accelerometer") + _forces(context, "accelerometer")
-    out += [
-        Signal("accelerometer", "rate", (f"w_{AXES[a]}",), context.rate[:, [a]], ("rad/s",), True) for a in range(3)
-    ]
+    w, u = context.rate.T, context.force.T / context.fitted.state.gravity
+    products, history, warming = _products("u", u, "g^2"), _history(context), _warming(context)
+    rates: list[Column] = [(f"w_{AXES[a]}", w[a], "rad/s") for a in range(3)]
+    out = [
+        *_each("accelerometer", HISTORY, history), *_each("accelerometer", "temperature", warming),
+        *_each("accelerometer", "force", products), *_each("accelerometer", "rate", rates, is_motion=True),
+    ]  # fmt: skip
     if context.obs.raw_rate is not None:
-        out += _forces(context, "gyroscope") + _gyro_only(context) + _history(context, "gyroscope")
-        out += _warming(context, "gyroscope") + _motion(context)
+        own = [(f"u_{AXES[a]}^2", u[a] ** 2, "g^2") for a in range(3)]
+        own += [(f"u_{AXES[a]}^3", u[a] ** 3, "g^3") for a in range(3)]
+        own += [(f"|u_{AXES[a]}|", np.abs(u[a]), "g") for a in range(3)]
+        up = context.fitted.state.up
+        before = context.between_poses(np.vstack([up[:1], up[:-1]])).T
+        previous = [(f"previous u_{AXES[a]}", before[a], "g") for a in range(3)]
+        mixed = [(f"w_{AXES[a]} f_{AXES[b]}", w[a] * u[b], "rad/s g") for a in range(3) for b in range(3)]
+        size = [("|w|", np.linalg.norm(w, axis=0), "rad/s")]
+        out += [
+            *_each("gyroscope", "force", [*products, *own]), *_each("gyroscope", "previous pose", previous),
+            *_each("gyroscope", HISTORY, history), *_each("gyroscope", "temperature", warming),
+            *_each("gyroscope", "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
+            *_each("gyroscope", "rate times force", mixed, is_motion=True),
+            *_each("gyroscope", "rate", size, is_motion=True),
+        ]  # fmt: skip
     h = context.obs.n_poses
     return [_centred(one, h) for one in out if np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0).all()]
+
+
+def _each(sensor: Sensor, family: str, columns: Sequence[Column], *, is_motion: bool = False) -> list[Signal]:
+    return [Signal(sensor, family, (name,), v[:, None], (unit,), is_motion) for name, v, unit in columns]
+
+
+def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:
+    """Products of two components of ``values`` (3, points)."""
+    return [
+        (f"{symbol}_{AXES[a]} {symbol}_{AXES[b]}", values[a] * values[b], unit) for a, b in combinations(range(3), 2)
+    ]
+
+
+def _history(context: Context) -> list[Column]:
+    """The rotation before a pose, about the gyro axes: the sign of a small one is used too."""
+    turn = np.zeros_like(context.fitted.state.up)
+    unknown = np.ones(len(turn))
+    for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
+        turn[after] = np.trapezoid(context.axis_rate[where], context.time_s[where], axis=0)
+        unknown[after] = 0.0
+    columns = [(f"last rotation about {AXES[a]}", turn[:, a], "rad") for a in range(3)]
+    columns += [(f"sign of the last rotation about {AXES[a]}", np.sign(turn[:, a]), "1") for a in range(3)]
+    columns += [("size of the last rotation", np.linalg.norm(turn, axis=1), "rad"), (NOT_TURNED, unknown, "1")]
+    return [(name, context.between_poses(value), unit) for name, value, unit in columns]
+
+
+def _warming(context: Context) -> list[Column]:
+    speed = context.temperature_rate
+    return [] if speed is None else [("dT/dt", speed, "K/s")]
 
 
 def room(context: Context) -> FloatArray | None:
@@ -61,66 +111,4 @@ def room(context: Context) -> FloatArray | None:
 def _centred(signal: Signal, n_poses: int) -> Signal:
     if signal.is_motion:
         return signal
-    values = signal.values - signal.values[:n_poses].mean(axis=0)
-    return Signal(signal.sensor, signal.family, signal.names, values, signal.units)
-
-
-def _forces(context: Context, sensor: Sensor) -> list[Signal]:
-    f = context.force / context.fitted.state.gravity
-    return [
-        Signal(sensor, "force", (f"u_{AXES[a]} u_{AXES[b]}",), (f[:, a] * f[:, b])[:, None], ("g^2",))
-        for a, b in combinations(range(3), 2)
-    ]
-
-
-def _gyro_only(context: Context) -> list[Signal]:
-    f = context.force / context.fitted.state.gravity
-    out = [Signal("gyroscope", "force", (f"u_{AXES[a]}^2",), f[:, [a]] ** 2, ("g^2",)) for a in range(3)]
-    out += [Signal("gyroscope", "force", (f"u_{AXES[a]}^3",), f[:, [a]] ** 3, ("g^3",)) for a in range(3)]
-    out += [Signal("gyroscope", "force", (f"|u_{AXES[a]}|",), np.abs(f[:, [a]]), ("g",)) for a in range(3)]
-    up = context.fitted.state.up
-    before = context.between_poses(np.vstack([up[:1], up[:-1]]))
-    return out + [
-        Signal("gyroscope", "previous pose", (f"previous u_{AXES[a]}",), before[:, [a]], ("g",)) for a in range(3)
-    ]
-
-
-def _history(context: Context, sensor: Sensor) -> list[Signal]:
-    """The rotation before a pose, about the gyro axes: the sign of a small one is used too."""
-    turn = np.zeros_like(context.fitted.state.up)
-    unknown = np.ones((len(turn), 1))
-    for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
-        turn[after] = np.trapezoid(context.axis_rate[where], context.time_s[where], axis=0)
-        unknown[after] = 0.0
-    columns = {f"last rotation about {AXES[a]}": (turn[:, [a]], "rad") for a in range(3)}
-    columns |= {f"sign of the last rotation about {AXES[a]}": (np.sign(turn[:, [a]]), "1") for a in range(3)}
-    columns["size of the last rotation"] = np.linalg.norm(turn, axis=1, keepdims=True), "rad"
-    columns[NOT_TURNED] = unknown, "1"
-    return [
-        Signal(sensor, HISTORY, (name,), context.between_poses(value), (unit,))
-        for name, (value, unit) in columns.items()
-    ]
-
-
-def _warming(context: Context, sensor: Sensor) -> list[Signal]:
-    speed = context.temperature_rate
-    return [] if speed is None else [Signal(sensor, "temperature", ("dT/dt",), speed[:, None], ("K/s",))]
-
-
-def _motion(context: Context) -> list[Signal]:
-    w, f = context.rate, context.force / context.fitted.state.gravity
-    out = [
-        Signal(
-            "gyroscope", "rate products", (f"w_{AXES[a]} w_{AXES[b]}",), (w[:, a] * w[:, b])[:, None],
-            ("(rad/s)^2",), True,
-        )
-        for a, b in combinations(range(3), 2)
-    ]  # fmt: skip
-    out += [
-        Signal(
-            "gyroscope", "rate times force", (f"w_{AXES[a]} f_{AXES[b]}",), (w[:, a] * f[:, b])[:, None],
-            ("rad/s g",), True,
-        )
-        for a in range(3) for b in range(3)
-    ]  # fmt: skip
-    return [*out, Signal("gyroscope", "rate", ("|w|",), np.linalg.norm(w, axis=1, keepdims=True), ("rad/s",), True)]
+    return replace(signal, values=signal.values - signal.values[:n_poses].mean(axis=0))

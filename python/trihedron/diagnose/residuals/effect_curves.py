@@ -22,14 +22,8 @@ _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """One domain of one fit: ``value`` (n, k), predicted noise ``sigma`` (n,), ``time_s`` (n,), ``names`` (n,)."""
-
-    time_s: FloatArray
-    value: FloatArray
-    sigma: FloatArray
-    names: tuple[str, ...]
+_Shown = tuple[FloatArray, FloatArray, FloatArray, tuple[str, ...]]
+"""One domain of one fit: times (n,), values (n, k), predicted noise (n,), names (n,)."""
 
 
 def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ()) -> tuple[DomainResiduals, ...]:
@@ -39,49 +33,43 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
     (0, 1) whose bias drift or repeatability was ``named``, the later fit uses the bias of each pose.
     """
     a, b = _shown(before), _shown(after, named)
-    out = []
-    for domain, quantity, unit, kind, channels in _ROWS:
-        if domain in a and domain in b:
-            x, y = a[domain], b[domain]
-            out.append(
-                DomainResiduals(
-                    domain, words(quantity), unit, kind, channels,  # type: ignore[arg-type]
-                    x.time_s, x.value, x.sigma, y.time_s, y.value, y.sigma, x.names, y.names,
-                )
-            )  # fmt: skip
-    return tuple(out)
+    return tuple(
+        DomainResiduals(
+            domain, words(quantity), unit, kind, channels,  # type: ignore[arg-type]
+            *a[domain][:3], *b[domain][:3], a[domain][3], b[domain][3],
+        )
+        for domain, quantity, unit, kind, channels in _ROWS
+        if domain in a and domain in b
+    )  # fmt: skip
 
 
 def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
-    line, state, obs = fitted.line, fitted.state, fitted.line.obs
-    h = obs.n_poses
+    state, obs, core = fitted.state, fitted.obs, fitted.core
+    h, effects = obs.n_poses, fitted.distortion
     poses = obs.pose_names(range(h))
-    out: dict[str, _Shown] = {}
-    force = obs.pose_force @ state.accel_S.T + (
-        line.core.force_bias - state.accel_bias if 0 in named else line.core.session_force_bias
-    )
-    if line.distortion.force is not None:
-        force = force - line.distortion.force[:h] @ state.effect
+    force = obs.pose_force @ state.accel_S.T
+    force = force + (core.force_bias - state.accel_bias if 0 in named else core.session_force_bias)
+    if effects.force is not None:
+        force = force - effects.force[:h] @ state.effect
     size = np.linalg.norm(force, axis=1)
-    along = (force / size[:, None]) @ state.accel_S
-    sigma = obs.norm_sigma(along)
-    out["static-accel"] = _Shown(obs.pose_time_s, (size - state.gravity)[:, None], sigma, poses)
+    sigma = obs.norm_sigma((force / size[:, None]) @ state.accel_S)
+    out: dict[str, _Shown] = {"static-accel": (obs.pose_time_s, (size - state.gravity)[:, None], sigma, poses)}
     if obs.pose_rate is not None and obs.pose_rate_sigma is not None:
         rate = obs.pose_rate @ state.gyro_S.T
-        if line.distortion.rate is not None:
-            rate = rate - line.distortion.rate[:h] @ state.effect
+        if effects.rate is not None:
+            rate = rate - effects.rate[:h] @ state.effect
         spread = np.sqrt((obs.pose_rate_sigma**2 @ (state.gyro_S**2).T).mean(axis=1))
         bias = state.gyro_bias if 1 in named else rate.mean(axis=0)
-        out["static-gyro"] = _Shown(obs.pose_time_s, rate - bias, spread, poses)
+        out["static-gyro"] = obs.pose_time_s, rate - bias, spread, poses
     if obs.n_moves:
-        residual, noise = line.move_errors
+        residual, noise = core.moves()
         variance = np.einsum("mii->mi", noise)
         moves = obs.move_names(range(obs.n_moves))
         middle = np.array([0.5 * (obs.time_s[a] + obs.time_s[b - 1]) for a, b in obs.move_ranges])
         angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / state.gravity)
         expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / state.gravity)
-        out["moves"] = _Shown(middle, angle[:, None], expected, moves)
-        out["dynamics"] = _Shown(middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)), moves)
+        out["moves"] = middle, angle[:, None], expected, moves
+        out["dynamics"] = middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)), moves
     return out
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -67,27 +68,32 @@ def jumps_in_poses(obs: Observations) -> Jumps:
     white to a walk, each weighted by its agreement with the differences inside the poses. A step at which the other
     sensor reads a motion is a pose that slipped.
     """
-    still = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    still &= np.array([pose.stop - pose.start >= LEAST_SAMPLES for pose in obs.segments.poses])
-    which = np.flatnonzero(still)
-    p, ratio, poses = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
-    if len(which) < FEWEST_POSES:
-        return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (poses[0], poses[1]))
-    sides = [None if raw is None else _block_means(obs, raw, which) for raw in (obs.raw_force, obs.raw_rate)]
-    steps = [None if side is None else _steps(side) for side in sides]
-    for k, own in enumerate(steps):
-        if own is None:
-            continue
-        other = steps[1 - k]
-        counted = np.where((own.left < LOUD) & ~_moved(own, other, k), np.maximum(own.beats - COUNTS, 0.0), 0.0)
-        total = counted.sum(axis=0)
-        axis = int(total.argmax())
-        if total[axis] > 0.0:
-            p[k] = min(1.0, N_LOOKS * _chance(len(which), float(total[axis]), _colour(own.blocks[:, :, axis])))
-        found = np.flatnonzero(counted[:, axis])
-        ratio[k] = 1.0 + float(counted[:, axis].max())
-        poses[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
-    return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (poses[0], poses[1]))
+    poses = obs.segments.poses
+    which = np.flatnonzero([not pose.is_unsteady and pose.stop - pose.start >= LEAST_SAMPLES for pose in poses])
+    none = _Found(1.0, 1.0, np.zeros(0, dtype=np.intp))
+    sides = [raw for raw in (obs.raw_force, obs.raw_rate) if raw is not None and len(which) >= FEWEST_POSES]
+    steps = [_steps(_block_means(obs, raw, which)) for raw in sides]
+    found = [_jumps(own, steps[1 - k] if len(steps) > 1 else None, k, which) for k, own in enumerate(steps)]
+    accel, gyro = (*found, none, none)[:2]
+    return Jumps(*((a, b) for a, b in zip(accel, gyro, strict=True)))
+
+
+class _Found(NamedTuple):
+    p_value: float
+    ratio: float
+    poses: npt.NDArray[np.intp]
+
+
+def _jumps(own: _Steps, other: _Steps | None, sensor: int, which: npt.NDArray[np.intp]) -> _Found:
+    counted = np.where((own.left < LOUD) & ~_moved(own, other, sensor), np.maximum(own.beats - COUNTS, 0.0), 0.0)
+    total = counted.sum(axis=0)
+    axis = int(total.argmax())
+    p = 1.0
+    if total[axis] > 0.0:
+        p = min(1.0, N_LOOKS * _chance(len(which), float(total[axis]), _colour(own.blocks[:, :, axis])))
+    found = np.flatnonzero(counted[:, axis])
+    poses = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
+    return _Found(p, 1.0 + float(counted[:, axis].max()), poses)
 
 
 def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]) -> FloatArray:

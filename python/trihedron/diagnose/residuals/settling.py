@@ -75,7 +75,7 @@ def with_settling(context: Context, found: Settling) -> Observations:
     mean = found.tau_s * (1.0 - fades) / lasts
     turned = found.rate_rad_s * found.tau_s
     begins, ends = turned * (1.0 - mean), turned * (mean - fades)
-    si_per_raw = context.si_per_raw("gyroscope")
+    si_per_raw = context.si_per_raw(1)
     unresolved = dict(obs.unresolved)
     for before, after in obs.move_poses:
         key = int(before), int(after)

@@ -12,12 +12,9 @@ from scipy.special import chdtrc, gammaincc
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
+from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.domains import DomainTest, Where
-
-CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
-
 
 MIN_LINE_SHARE = 0.03
 """Share of the variance below which a line is ignored: long poses resolve lines far below the noise that change no
@@ -70,7 +67,7 @@ class Line:
 
 def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     """``(first sample, (n, 6 or 3) raw readings minus their mean)`` of every contiguous piece of the quiet poses."""
-    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    x = obs.readings
     out = []
     # Lines are searched in quiet poses: vibration has a spectrum of its own.
     quiet: npt.NDArray[np.bool_] = np.asarray((pose_scatter(obs).ratio < 2.0).all(axis=1))
@@ -167,12 +164,6 @@ def _refine(
     x = np.concatenate([part[:, c] for _, part in pieces])
     early = np.concatenate([np.arange(len(part)) < len(part) // 2 for _, part in pieces])
 
-    def project(f: float, rows: FloatArray) -> tuple[FloatArray, float]:
-        basis = np.column_stack([np.cos(2 * np.pi * f * t[rows]), np.sin(2 * np.pi * f * t[rows])])
-        coefficient, *_ = np.linalg.lstsq(basis, x[rows], rcond=None)
-        return coefficient, float(((basis @ coefficient) ** 2).sum())
-
-    everything = np.ones(len(t), dtype=bool)
     span = float(t[-1] - t[0])
     # From the coarse bin to the resolution of the whole recording, in steps no wider than half a lobe.
     best_f, width = f0, resolution
@@ -182,7 +173,7 @@ def _refine(
         stretch = min(stretch, span)
         chosen = np.abs(t - t[len(t) // 2]) <= stretch
         if chosen.sum() < 2 * SHORTEST:
-            chosen = everything
+            chosen[:] = True
         grid = best_f + np.linspace(-width, width, GRID)
         power = _core.sinusoid_power(
             t[chosen], x[chosen], start_hz=float(grid[0]), step_hz=2.0 * width / (GRID - 1), count=GRID
@@ -192,18 +183,16 @@ def _refine(
         if stretch >= span:
             break
         stretch *= 3.0
-    coefficient, _ = project(best_f, everything)
-    amplitude = float(np.hypot(*coefficient))
+    amplitude = float(np.hypot(*_sinusoid(t, x, best_f)))
     noise = np.sqrt(density)
     sigma = float(noise * np.sqrt(2.0 / len(t)))
     if amplitude < COHERENT * sigma:
         # Not coherent through the recording: the line is real, its amplitude is that of single poses.
         stretches = [(obs.time_s[a : a + len(part)], part[:, c]) for a, part in pieces]
         return _wandering(stretches, c, f0, resolution, p, noise)
-    train, _ = project(best_f, early)
     rest = ~early
-    model = np.column_stack([np.cos(2 * np.pi * best_f * t[rest]), np.sin(2 * np.pi * best_f * t[rest])]) @ train
-    before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean((x[rest] - model) ** 2)))
+    left = x[rest] - _basis(t[rest], best_f) @ _sinusoid(t[early], x[early], best_f)
+    before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean(left**2)))
     frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / max(amplitude, 1e-300) / np.sqrt(2.0))
     return Line(
         CHANNELS[c], c % 3, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300),
@@ -226,17 +215,16 @@ def _wandering(
         power += len(x) * _core.sinusoid_power(*at, start_hz=float(tried[0]), step_hz=step, count=GRID)
     f = float(tried[np.argmax(power)])
     lengths = np.array([len(x) for _, x in stretches], dtype=np.float64)
-    squares = np.array([project_piece(t, x, f) ** 2 for t, x in stretches])
+    squares = np.array([np.hypot(*_sinusoid(t, x, f)) ** 2 for t, x in stretches])
     own = np.average(squares - 4.0 * noise**2 / lengths, weights=lengths)
     amplitude = float(np.sqrt(max(own, 0.0)))
     sums, n = np.zeros(2), 0
     for t, x in stretches:
-        basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
         part = (np.arange(len(x)) * PARTS // len(x)) % 2
         for kept in (0, 1):
-            coefficient, *_ = np.linalg.lstsq(basis[part == kept], x[part == kept], rcond=None)
             rest = part != kept
-            sums += [float((x[rest] ** 2).sum()), float(((x - basis @ coefficient)[rest] ** 2).sum())]
+            left = x[rest] - _basis(t[rest], f) @ _sinusoid(t[~rest], x[~rest], f)
+            sums += [float((x[rest] ** 2).sum()), float((left**2).sum())]
             n += int(rest.sum())
     before, after = np.sqrt(sums / max(n, 1))
     sigma = noise * float(np.sqrt(2.0 / lengths.sum()))
@@ -247,11 +235,13 @@ def _wandering(
     )  # fmt: skip
 
 
-def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
-    """Amplitude of a sinusoid of known frequency in one piece."""
-    basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
-    coefficient, *_ = np.linalg.lstsq(basis, x, rcond=None)
-    return float(np.hypot(*coefficient))
+def _basis(t: FloatArray, f: float) -> FloatArray:
+    return np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
+
+
+def _sinusoid(t: FloatArray, x: FloatArray, f: float) -> FloatArray:
+    """(2,) coefficients of a sinusoid of known frequency."""
+    return np.asarray(np.linalg.lstsq(_basis(t, f), x, rcond=None)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +256,7 @@ class PoseScatter:
 @lru_cache(maxsize=4)
 def pose_scatter(obs: Observations) -> PoseScatter:
     """Variance of first differences per pose over the median of all: sensitive to vibration, not to slow drift."""
-    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    x = obs.readings
     ratio, dof = [], []
     for pose in obs.segments.poses:
         part = x[pose.start : pose.stop]
@@ -275,13 +265,12 @@ def pose_scatter(obs: Observations) -> PoseScatter:
         ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
         # Neighbouring differences share a sample: two thirds as many are independent.
         dof.append((len(part) - 1) * 2.0 / 3.0)
-    ratio_array, dof_array = np.array(ratio), np.array(dof)
+    variance, freedom = np.array(ratio), np.array(dof)
     # Readings that toggle between two neighbouring codes scatter by up to half an LSB squared without any vibration.
-    centre = np.maximum(np.median(ratio_array, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
+    centre = np.maximum(np.median(variance, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
     centre[centre == 0] = 1.0
-    relative = ratio_array / centre
-    p = chdtrc(dof_array[:, None], dof_array[:, None] * relative)
-    return PoseScatter(relative, dof_array, np.asarray(p))
+    relative = variance / centre
+    return PoseScatter(relative, freedom, np.asarray(chdtrc(freedom[:, None], freedom[:, None] * relative)))
 
 
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:

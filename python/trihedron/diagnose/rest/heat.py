@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.effects.thermal_shapes import BRANCH_K_S
+from trihedron.diagnose.effects.thermal import BRANCH_K_S
 from trihedron.diagnose.rest.pieces import RestPieces
 from trihedron.diagnose.rest.process import DRIFT, INITIAL_SLOPE, SCATTER, WALK, BiasProcess, BiasReadings, unit_kernels
+from trihedron.diagnose.sample_evidence import VISIBLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +136,9 @@ MIN_BIC = 10.0
 FOLDS = 12
 TEMPERATURE_BINS, FEWEST_BINS = 12, 3
 """Bins of temperature, and the least number passed both while heating and cooling for a difference of branches."""
-VISIBLE = 0.98
-"""Held-out rms must fall below this factor: the same bound as for every effect."""
 ALL = (SCATTER, WALK, DRIFT)
+POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
+"""Terms that are powers of the temperature."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +164,7 @@ class Curve:
     p_value: float
 
 
-def thermal_curve(pieces: RestPieces, sensor: str) -> Curve | None:
+def thermal_curve(pieces: RestPieces, sensor: int) -> Curve | None:
     """The simplest significant curve of the biases, scatter, walk and drift being free beside it; ``None`` if none.
 
     Temperature enters to the first, second, third power, then its rate of change, then a different branch while it
@@ -171,66 +173,54 @@ def thermal_curve(pieces: RestPieces, sensor: str) -> Curve | None:
     heat, speed = pieces.temperature, pieces.temperature_rate
     if heat is None or speed is None or np.ptp(heat) < LEAST_SWING_K:
         return None
-    middle, half = float(heat.mean()), float(0.5 * np.ptp(heat))
-    u, fastest = (heat - middle) / half, float(np.abs(speed).max())
-    terms: dict[str, tuple[FloatArray, float]] = {
-        "bias_per_kelvin": (u, half), "bias_per_kelvin2": (u**2, half**2), "bias_per_kelvin3": (u**3, half**3)
-    }  # fmt: skip
-    more: dict[str, tuple[FloatArray, float]] = {}
+    half, fastest = float(0.5 * np.ptp(heat)), float(np.abs(speed).max())
+    u = (heat - float(heat.mean())) / half
+    terms = {name: (u**k, half**k) for k, name in enumerate(POWERS, start=1)}
     if fastest > 0.0:
-        more["bias_per_kelvin_per_s"] = (speed / fastest, fastest)
+        terms["bias_per_kelvin_per_s"] = (speed / fastest, fastest)
     if speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S:
-        more["half_gap"] = (np.tanh(speed / BRANCH_K_S), 1.0)
+        terms["half_gap"] = (np.tanh(speed / BRANCH_K_S), 1.0)
     cost = 3.0 * float(np.log(len(heat) / 2.0))
-    nothing = _likelihood(pieces, sensor, [])
+    nothing = best = _likelihood(pieces, sensor, [])
     chosen: list[str] = []
-    best, gained = nothing, 0.0
     for name in terms:
         value = _likelihood(pieces, sensor, [terms[k][0] for k in (*chosen, name)])
         # A lower power may be significant only with the next one: both are tried before the lower one is dropped.
         if 2.0 * (value - best) - cost > MIN_BIC:
             chosen.append(name)
             best = value
-        elif name == "bias_per_kelvin":
-            both = _likelihood(pieces, sensor, [terms[k][0] for k in ("bias_per_kelvin", "bias_per_kelvin2")])
+        elif name == POWERS[0]:
+            both = _likelihood(pieces, sensor, [terms[k][0] for k in POWERS[:2]])
             if 2.0 * (both - nothing) - 2.0 * cost <= MIN_BIC:
                 return None
             chosen.append(name)
-    terms |= more
-    for name in more:
-        value = _likelihood(pieces, sensor, [terms[k][0] for k in (*chosen, name)])
-        if 2.0 * (value - best) - cost > MIN_BIC:
-            chosen.append(name)
-            best = value
     n = len(heat) / 2.0
-    columns = [terms[k][0] for k in chosen]
+    columns, units = zip(*(terms[k] for k in chosen), strict=True)
     gained = 2.0 * (best - nothing) * max(n - len(chosen) - pieces.n_poses, 1.0) / n
-    return _curve(pieces, sensor, chosen, columns, np.array([terms[k][1] for k in chosen]), gained, cost * len(chosen))
+    return _curve(pieces, sensor, chosen, columns, np.array(units), gained, cost * len(chosen))
 
 
-def _process(pieces: RestPieces, sensor: str, axis: int, columns: list[FloatArray]) -> BiasProcess:
-    return BiasProcess.of(pieces.readings(sensor, axis, columns))
+def _process(pieces: RestPieces, sensor: int, axis: int, columns: Sequence[FloatArray]) -> BiasProcess:
+    return BiasProcess.of(pieces.readings(sensor, [axis], columns))
 
 
-def _likelihood(pieces: RestPieces, sensor: str, columns: list[FloatArray]) -> float:
+def _likelihood(pieces: RestPieces, sensor: int, columns: Sequence[FloatArray]) -> float:
     every = list(range(pieces.n_poses + len(columns)))
     return sum(_process(pieces, sensor, axis, columns).maximum(ALL, every, restricted=False)[0] for axis in range(3))
 
 
 def _curve(
-    pieces: RestPieces, sensor: str, names: list[str], columns: list[FloatArray], unit: FloatArray, gain: float,
+    pieces: RestPieces, sensor: int, names: list[str], columns: Sequence[FloatArray], unit: FloatArray, gain: float,
     cost: float,
 ) -> Curve | None:  # fmt: skip
     assert pieces.temperature is not None
     assert pieces.temperature_rate is not None
     k = pieces.n_poses
-    values = pieces.force if sensor == "accelerometer" else pieces.rate
-    assert values is not None
+    values = pieces.means[sensor]
     X = np.column_stack(columns)
     theta, std, fitted, swing = [], [], [], []
     grid = np.linspace(-1.0, 1.0, 101)
-    powers = np.column_stack([grid ** (1 + j) for j in range(sum("kelvin_per_s" not in n and n != "half_gap"
-                                                                for n in names))])  # fmt: skip
+    powers = np.column_stack([grid ** (1 + j) for j in range(len([n for n in names if n in POWERS]))])
     for axis in range(3):
         mean, covariance = _process(pieces, sensor, axis, columns).mixture(list(range(k + len(names))))
         own = mean[0, k:]
@@ -238,10 +228,8 @@ def _curve(
         std.append(np.sqrt(np.maximum(np.diag(covariance[0])[k:], 0.0)) / unit)
         fitted.append(X @ own)
         swing.append(float(np.ptp(powers @ own[: powers.shape[1]])))
-    about = np.array([values[pieces.pose == p].mean(axis=0) for p in range(k)])
-    raw = values - about[pieces.pose]
-    rest = raw - np.array(fitted).T
-    rest = rest - np.array([rest[pieces.pose == p].mean(axis=0) for p in range(k)])[pieces.pose]
+    raw = pieces.about_poses(values)
+    rest = pieces.about_poses(raw - np.array(fitted).T)
     before, after = _held_out(pieces, values, X)
     if not after < VISIBLE * before:
         return None

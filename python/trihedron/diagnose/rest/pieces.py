@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.diagnose.context import TEMPERATURE_WINDOW_S
 from trihedron.diagnose.rest.process import BiasReadings
 from trihedron.diagnose.session.state import smoothed_slope
 from trihedron.records import Recording
@@ -29,29 +30,25 @@ MOSTLY_STILL = 0.6
 """Share of a log that must be static: in one that moves, slow motion would count as static."""
 LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
 """Share and number of pieces below which an orientation is handling."""
-TEMPERATURE_WINDOW_S = 10.0
-"""Window of the mean of a logged temperature: removes its resolution; no chip heats faster than in tens of seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class RestPieces:
     """Means over the halves of static pieces of a log, raw units: n = 2 per piece, in the order of time.
 
-    ``pose`` (n,) number of the orientation, ``piece`` (n,) of the piece, ``spans`` their sample ranges; ``force``,
-    ``rate`` (n, 3) means, ``force_sigma``, ``rate_sigma`` (3,) white noise of one sample, ``count`` (n,) samples of
-    every mean; ``temperature`` (n,) °C and ``temperature_rate`` (n,) K/s, where logged.
+    ``pose`` (n,) number of the orientation, ``piece`` (n,) of the piece, ``spans`` their sample ranges; ``means``
+    (n, 3) and white noise ``sigma`` (3,) of one sample for the accelerometer and, where logged, the gyro; ``count``
+    (n,) samples of every mean; ``temperature`` (n,) °C and ``temperature_rate`` (n,) K/s, where logged.
     """
 
     time_s: FloatArray
     length_s: FloatArray
-    count: npt.NDArray[np.int64]
-    pose: npt.NDArray[np.int64]
-    piece: npt.NDArray[np.int64]
+    count: IntArray
+    pose: IntArray
+    piece: IntArray
     spans: tuple[tuple[int, int], ...]
-    force: FloatArray
-    force_sigma: FloatArray
-    rate: FloatArray | None
-    rate_sigma: FloatArray | None
+    means: tuple[FloatArray, ...]
+    sigma: tuple[FloatArray, ...]
     temperature: FloatArray | None
     temperature_rate: FloatArray | None
 
@@ -60,16 +57,19 @@ class RestPieces:
         """Number of orientations."""
         return int(self.pose.max()) + 1
 
-    def readings(self, sensor: str, axis: int, columns: list[FloatArray]) -> BiasReadings:
-        """Readings of one axis for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
-        values, sigma = (self.force, self.force_sigma) if sensor == "accelerometer" else (self.rate, self.rate_sigma)
-        assert values is not None
-        assert sigma is not None
+    def about_poses(self, values: FloatArray) -> FloatArray:
+        """Values (n, k) minus their mean over each orientation."""
+        level = np.array([values[self.pose == p].mean(axis=0) for p in range(self.n_poses)])
+        return np.asarray(values - level[self.pose])
+
+    def readings(self, sensor: int, axes: Sequence[int], columns: Sequence[FloatArray] = ()) -> BiasReadings:
+        """Readings of some axes for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
         levels = [np.ones(len(self.time_s))]
         levels += [(self.pose == k).astype(np.float64) for k in range(1, self.n_poses)]
         return BiasReadings(
-            values[None, :, axis], (sigma[axis] / np.sqrt(self.count))[None], self.time_s, self.length_s, self.piece,
-            np.column_stack([*levels, *columns]), np.ones((len(self.time_s), 1)),
+            np.ascontiguousarray(self.means[sensor].T[axes]), self.sigma[sensor][axes][:, None] / np.sqrt(self.count),
+            self.time_s, self.length_s, self.piece, np.column_stack([*levels, *columns]),
+            np.ones((len(self.time_s), 1)),
         )  # fmt: skip
 
 
@@ -111,10 +111,8 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
     count = np.full(2 * len(still), half, dtype=np.int64)
     return RestPieces(
         middles.ravel(), count / recording.rate_hz, count, np.repeat(pose, 2),
-        np.repeat(np.arange(len(still)), 2), tuple((int(a), int(a) + 2 * half) for a in still),
-        means[0], _at_least(noise[0], recording.facts.of("accelerometer")), means[1] if len(means) > 1 else None,
-        _at_least(noise[1], recording.facts.of("gyroscope")) if len(means) > 1 else None,
-        None if heat is None else heat[0], None if heat is None else heat[1],
+        np.repeat(np.arange(len(still)), 2), tuple((int(a), int(a) + 2 * half) for a in still), tuple(means),
+        tuple(_at_least(own, known) for own, known in zip(noise, facts, strict=True)), *heat,
     )  # fmt: skip
 
 
@@ -123,10 +121,11 @@ def _at_least(sigma: FloatArray, facts: ChannelFacts) -> FloatArray:
     return np.asarray(np.maximum(sigma, facts.step / np.sqrt(12.0)))
 
 
-def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> tuple[FloatArray, FloatArray] | None:
+def _logged(recording: Recording, starts: IntArray, half: int) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
+    """(n,) temperature of every half piece, and its rate of change."""
     logged = recording.temperature_degc
     if logged is None or not np.isfinite(logged).any():
-        return None
+        return None, None
     t = recording.time_s
     good = np.isfinite(logged)
     filled = np.interp(t, t[good], logged[good])
@@ -137,7 +136,7 @@ def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> t
     return np.array([filled[a:b].mean() for a, b in spans]), np.array([speed[a:b].mean() for a, b in spans])
 
 
-def _orientations(force: FloatArray) -> npt.NDArray[np.int64]:
+def _orientations(force: FloatArray) -> IntArray:
     """(n,) number of the orientation of every piece, the most frequent first; -1 for handling."""
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     out = np.full(len(up), -1, dtype=np.int64)

@@ -84,13 +84,8 @@ class Grams:
 
     def log_likelihood(self, keep: list[int], *, restricted: bool) -> FloatArray:
         """(axes, g) log-likelihood with the columns ``keep`` in the mean, restricted (REML) or not."""
-        index = [k + 1 for k in keep]
         yy = self.gram[..., 0, 0]
-        A = self.gram[..., index, :][..., index]
-        side = self.gram[..., index, 0]
-        scale = np.sqrt(np.maximum(np.einsum("...ii->...i", A), 1e-300))
-        scaled = A / (scale[..., :, None] * scale[..., None, :])
-        scaled[..., range(len(index)), range(len(index))] += 1e-12
+        scaled, scale, side = self._normal(keep)
         half = np.linalg.cholesky(scaled)
         inner = np.linalg.solve(half, (side / scale)[..., None])[..., 0]
         rest = np.maximum(yy - (inner**2).sum(axis=-1), 1e-300)
@@ -99,15 +94,20 @@ class Grams:
             out = out - np.log(np.einsum("...ii->...i", half)).sum(axis=-1) - np.log(scale).sum(axis=-1)
         return np.asarray(out)
 
-    def estimates(self, keep: list[int]) -> tuple[FloatArray, FloatArray]:
-        """Generalised least squares: (axes, g, k) coefficients and (axes, g, k, k) covariances."""
+    def _normal(self, keep: list[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Normal matrix of the columns ``keep``, its diagonal scaled to 1, those scales, and the right-hand side."""
         index = [k + 1 for k in keep]
         A = self.gram[..., index, :][..., index]
         scale = np.sqrt(np.maximum(np.einsum("...ii->...i", A), 1e-300))
         scaled = A / (scale[..., :, None] * scale[..., None, :])
         scaled[..., range(len(index)), range(len(index))] += 1e-12
+        return scaled, scale, self.gram[..., index, 0]
+
+    def estimates(self, keep: list[int]) -> tuple[FloatArray, FloatArray]:
+        """Generalised least squares: (axes, g, k) coefficients and (axes, g, k, k) covariances."""
+        scaled, scale, side = self._normal(keep)
         inverse = np.linalg.inv(scaled) / (scale[..., :, None] * scale[..., None, :])
-        theta = (inverse @ self.gram[..., index, 0][..., None])[..., 0]
+        theta = (inverse @ side[..., None])[..., 0]
         return theta, inverse
 
 
@@ -174,8 +174,7 @@ class BiasProcess:
     @cached_property
     def sizes(self) -> tuple[float, float]:
         """Divisors of walk and drift."""
-        _, _, walk, drift = unit_kernels(self.readings)
-        return walk, drift
+        return unit_kernels(self.readings)[2:]
 
     @cached_property
     def levels(self) -> FloatArray:
@@ -214,16 +213,6 @@ class BiasProcess:
 
     def maximum(self, free: tuple[int, ...], keep: list[int], *, restricted: bool) -> tuple[float, FloatArray]:
         """Largest log-likelihood with the strengths ``free`` (the others 0), and the strengths (3,) there."""
-        asked = (free, tuple(keep), restricted)
-        if asked not in self._maxima:
-            self._maxima[asked] = self._searched(free, keep, restricted=restricted)
-        return self._maxima[asked]
-
-    @cached_property
-    def _maxima(self) -> dict[tuple[tuple[int, ...], tuple[int, ...], bool], tuple[float, FloatArray]]:
-        return {}
-
-    def _searched(self, free: tuple[int, ...], keep: list[int], *, restricted: bool) -> tuple[float, FloatArray]:
         held = [k for k in range(3) if k not in free]
         rows = np.flatnonzero((self.grid.sigmas[:, held] == 0.0).all(axis=1))
         part = Grams(self.grid.sigmas[rows], self.grid.log_det[:, rows], self.grid.gram[:, rows])

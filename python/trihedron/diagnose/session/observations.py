@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,6 +90,23 @@ class Observations:
         """Moves by their numbers in the recording, from 1."""
         return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
 
+    def without_moves(self, bad: Collection[int]) -> Observations:
+        """The same without the moves ``bad``."""
+        keep = [m for m in range(self.n_moves) if m not in bad]
+        return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
+
+    @property
+    def readings(self) -> FloatArray:
+        """(n, 6) readings of both sensors; (n, 3) without a gyro."""
+        return self.raw_force if self.raw_rate is None else np.hstack([self.raw_force, self.raw_rate])
+
+    @property
+    def whitened(self) -> tuple[FloatArray, ...]:
+        """(n, 3) readings of each sensor in units of the white noise of a sample."""
+        pairs = ((self.raw_force, self.force_density), (self.raw_rate, self.rate_density))
+        root = np.sqrt(self.recording.rate_hz)
+        return tuple(raw / (density * root) for raw, density in pairs if raw is not None and density is not None)
+
     @property
     def pose_rate_noise(self) -> FloatArray | None:
         """(h, 3) standard errors of the gyro's means without settling."""
@@ -123,13 +140,9 @@ class Observations:
     @cached_property
     def half_means(self) -> tuple[FloatArray, FloatArray | None]:
         """(poses, 2, 3) raw means over the first and the second half of every pose, accelerometer and gyro."""
-        return self.part_means(2)
-
-    def part_means(self, parts: int) -> tuple[FloatArray, FloatArray | None]:
-        """(poses, parts, 3) raw means over that many equal parts of every pose, accelerometer and gyro."""
 
         def of(raw: FloatArray) -> FloatArray:
-            every = [np.array_split(raw[pose.start : pose.stop], parts) for pose in self.segments.poses]
+            every = [np.array_split(raw[pose.start : pose.stop], 2) for pose in self.segments.poses]
             return np.array([[np.nanmean(part, axis=0) for part in of_pose] for of_pose in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
@@ -144,26 +157,24 @@ class Observations:
             out[i] = away.T @ away / len(away)
         return out
 
-    def _sharpened(self, readings: FloatArray) -> FloatArray:
-        """Readings (n, 3) at the middle of the intervals over which they were averaged."""
-        return np.ascontiguousarray(sharpened(readings, self.time_s, self.averaging))
-
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
-        unresolved = np.zeros((self.n_moves, 2, 3))
-        for m, (before, after) in enumerate(self.move_poses):
-            found = self.unresolved.get((int(before), int(after)))
-            if found is not None:
-                unresolved[m] = found
+        nothing = np.zeros((2, 3))
+        unresolved = [self.unresolved.get((int(a), int(b)), nothing) for a, b in self.move_poses]
+        force, rate = (
+            None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
+            for raw in (self.raw_force, self.raw_rate)
+        )
+        assert force is not None
         return _core.SessionMoves(
             pose_time_s=np.ascontiguousarray(self.pose_time_s, dtype=np.float64),
             time_s=np.ascontiguousarray(self.time_s),
-            force=self._sharpened(self.raw_force),
-            rate=None if self.raw_rate is None else self._sharpened(self.raw_rate),
+            force=force,
+            rate=rate,
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=unresolved,
+            unresolved=np.array(unresolved).reshape(-1, 2, 3),
         )
 
 
@@ -209,30 +220,17 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
     unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, poses, strict=True)]
     return Observations(
-        recording=recording,
-        segments=segments,
-        whole=whole,
-        time_s=recording.time_s,
-        raw_force=recording.accelerometer - force_origin,
-        raw_rate=raw_rate,
-        force_origin=force_origin,
-        rate_origin=rate_origin,
-        pose_force=segments.accelerometer_mean - force_origin,
-        pose_rate=pose_rate,
-        pose_force_sigma=noise.force_sigma,
-        pose_rate_sigma=noise.rate_sigma,
+        recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
+        raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
+        rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
+        pose_force_sigma=noise.force_sigma, pose_rate_sigma=noise.rate_sigma,
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
-        force_density=noise.force_density,
-        rate_density=noise.rate_density,
-        disturbed_s=bumped,
-        force_up=noise.force_up,
-        force_scatter=noise.force_scatter,
-        rate_scatter=noise.rate_scatter,
-        unresolved=dict(zip(poses, unresolved, strict=True)),
-        averaging=averaging,
-    )
+        force_density=noise.force_density, rate_density=noise.rate_density, disturbed_s=bumped,
+        force_up=noise.force_up, force_scatter=noise.force_scatter, rate_scatter=noise.rate_scatter,
+        unresolved=dict(zip(poses, unresolved, strict=True)), averaging=averaging,
+    )  # fmt: skip
 
 
 def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:

@@ -5,12 +5,13 @@ A thin interface to :class:`trihedron._core.SessionModel`, which computes rows a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.state import (
@@ -19,12 +20,11 @@ from trihedron.diagnose.session.state import (
     STATIC_ACCEL,
     STATIC_GYRO,
     Distortion,
-    Linearisation,
     Prior,
     SessionState,
-    System,
     contiguous,
     core_model,
+    core_poses,
     core_state,
     state_of,
 )
@@ -35,48 +35,90 @@ FOLDS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """A session at its optimum: the state and the rows there.
+class Trajectory:
+    """The motion of the session state at its *points*: one per pose, then every sample of every move.
 
-    The computation is in ``line.core``; this class has what the diagnosis needs of it.
+    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by S, b and the accepted
+    effects; ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the points of each move;
+    ``point_samples`` (points,) index of the sample.
     """
 
+    force: FloatArray
+    rate: FloatArray
+    attitude: FloatArray
+    move_slices: tuple[slice, ...]
+    point_samples: npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Whitened residuals of a fit and their labels, (rows,) each.
+
+    ``domain`` and ``segment`` (number of the pose or move) state what a row tests, ``channel`` its axis; ``walk`` is 0
+    for readings, 1 and 2 for walks of the accelerometer's and the gyro's bias, above 2 for other rows without readings.
+    """
+
+    residual: FloatArray
+    domain: npt.NDArray[np.int8]
+    segment: npt.NDArray[np.intp]
+    channel: npt.NDArray[np.int8]
+    walk: npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A session at its optimum, with effects that add ``distortion``; the computation is in ``core``."""
+
+    obs: Observations
     state: SessionState
-    line: Linearisation
+    distortion: Distortion
+    prior: Prior | None
+    core: _core.SessionFit = field(repr=False)
     has_free_strengths: bool = False
 
     @cached_property
     def system(self) -> System:
         """Residual rows with their labels."""
-        labels = self.line.core.labels
+        domain, segment, channel, walk = self.core.labels.T
         return System(
-            residual=self.line.core.residual, domain=labels[:, 0].astype(np.int8), segment=labels[:, 1],
-            channel=labels[:, 2].astype(np.int8), walk=labels[:, 3].astype(np.int8),
-        )  # fmt: skip
+            self.core.residual, domain.astype(np.int8), segment, channel.astype(np.int8), walk.astype(np.int8)
+        )
 
     @cached_property
     def leverage(self) -> FloatArray:
         """(rows,) leverage of every row; the degrees of freedom of a block are the sum of 1 minus it."""
-        return self.line.core.leverage()
+        return self.core.leverage()
+
+    @cached_property
+    def path(self) -> Trajectory:
+        """The motion at every point, corrected (eq. 11.3)."""
+        rate, force, attitude = self.core.path()
+        slices, first = [], self.obs.n_poses
+        for start, stop in self.obs.move_ranges:
+            slices.append(slice(first, first + stop - start))
+            first += stop - start
+        parts = [np.arange(start, stop) for start, stop in self.obs.move_ranges]
+        mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
+        return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
     @property
-    def n_effect(self) -> int:
-        """Number of effect parameters in the fit."""
-        return self.line.distortion.n_parameters
+    def accel_white(self) -> FloatArray:
+        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
+        return core_poses(self.obs).force_white() @ np.linalg.inv(self.state.accel_S)
 
     @property
-    def chi2(self) -> float:
-        """Sum of squares of all rows."""
-        return self.line.core.chi2
+    def gyro_white(self) -> FloatArray | None:
+        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static rate; ``None`` without a gyro."""
+        sigma = self.obs.pose_rate_sigma
+        return None if sigma is None else np.linalg.inv(self.state.gyro_S) / sigma[:, :, None]
 
-    @property
-    def log_marginal(self) -> float:
-        """Log-likelihood, up to a constant, with every unknown integrated out."""
-        return self.line.core.log_marginal
+    def bias(self, sensor: int) -> FloatArray:
+        """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
+        return (self.state.accel_bias, self.state.gyro_bias)[sensor]
 
     def covariance(self) -> FloatArray:
         """(18 + effects, same) covariance of the shared unknowns: S_a lower, b_a, S_w on centred readings, effects."""
-        return self.line.core.border_covariance()
+        return self.core.border_covariance()
 
     @cached_property
     def linear(self) -> tuple[FloatArray, FloatArray]:
@@ -84,13 +126,14 @@ class Fit:
 
         It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
-        obs, core = self.line.obs, self.line.core
+        core = self.core
         if not self.has_free_strengths:
-            core = core_model(obs, self.state.gravity, self.line.prior, is_scatter_free=True).fit(
+            core = core_model(self.obs, self.state.gravity, self.prior, is_scatter_free=True).fit(
                 state=core_state(self.state), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
-                force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
+                force_effect=contiguous(self.distortion.force), rate_effect=contiguous(self.distortion.rate),
             )  # fmt: skip
-        return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
+        origins = (np.ascontiguousarray(one) for one in (self.obs.force_origin, self.obs.rate_origin))
+        return core.linear_covariance(*origins)
 
 
 def fit(
@@ -104,14 +147,10 @@ def fit(
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = core_model(obs, start.gravity, prior).fit(
-        state=core_state(start),
-        strengths=(start.strengths[0], *START_STRENGTHS[1:]),
-        force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate),
-        within=within,
-    )
-    state = state_of(core, start.gravity)
-    return Fit(state, Linearisation(obs, state, distortion, prior, core))
+        state=core_state(start), strengths=(start.strengths[0], *START_STRENGTHS[1:]),
+        force_effect=contiguous(distortion.force), rate_effect=contiguous(distortion.rate), within=within,
+    )  # fmt: skip
+    return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
 
 
 def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, prior: Prior | None) -> Fit:
@@ -121,8 +160,7 @@ def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, p
 
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
     """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
-    out: FloatArray = core_model(obs, state.gravity, None).move_residuals(core_state(state))
-    return out
+    return np.asarray(core_model(obs, state.gravity, None).move_residuals(core_state(state)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +181,7 @@ class Prediction:
     @property
     def chi2(self) -> FloatArray:
         """(domains,) innovation chi-square."""
-        out: FloatArray = self.fold_chi2.sum(axis=0)
-        return out
+        return np.asarray(self.fold_chi2.sum(axis=0))
 
     @property
     def per_row(self) -> FloatArray:
@@ -154,7 +191,7 @@ class Prediction:
 
 def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
     """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
-    system, obs = fitted.system, fitted.line.obs
+    system, obs = fitted.system, fitted.obs
     direct = system.walk == 0
     out = []
     for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
@@ -172,4 +209,4 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]]) -> Predict
     them finite; it is the same for every model that is compared.
     """
     flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
-    return Prediction(*fitted.line.core.held_out(np.ascontiguousarray(flags)))
+    return Prediction(*fitted.core.held_out(np.ascontiguousarray(flags)))

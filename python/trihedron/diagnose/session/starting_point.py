@@ -43,22 +43,25 @@ def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def start_state(obs: Observations, calibration: Calibration) -> SessionState:
     """The calibration in the lower frame on centred readings, every pose at its measured vertical and bias."""
+    _, L, b, gyro_S = _centred(obs, calibration)
+    return _at_means(obs, calibration.gravity_m_s2, L, b, gyro_S)
+
+
+def _centred(obs: Observations, calibration: Calibration) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rotation to the lower frame, and there S, b of the accelerometer and S of the gyro on centred readings."""
     Q, L = lower_frame(calibration.accelerometer.S)
-    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
     gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
-    force = obs.pose_force @ L.T + b
-    n = obs.n_poses
-    bias = np.zeros((n, 3)) if obs.pose_rate is None else obs.pose_rate @ gyro_S.T
-    return SessionState(
-        gravity=calibration.gravity_m_s2,
-        accel_S=L,
-        accel_b=b,
-        gyro_S=gyro_S,
-        up=force / np.linalg.norm(force, axis=1, keepdims=True),
-        gyro_bias=bias,
-        accel_bias=np.zeros((n, 3)),
-        effect=np.zeros(0),
-    )
+    return Q, L, Q.T @ calibration.accelerometer.b + L @ obs.force_origin, gyro_S
+
+
+def _at_means(
+    obs: Observations, gravity: float, accel_S: FloatArray, accel_b: FloatArray, gyro_S: FloatArray
+) -> SessionState:
+    """A state without effects, the vertical and the gyro bias of every pose by its mean reading."""
+    force, none = obs.pose_force @ accel_S.T + accel_b, np.zeros((obs.n_poses, 3))
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    bias = none if obs.pose_rate is None else obs.pose_rate @ gyro_S.T
+    return SessionState(gravity, accel_S, accel_b, gyro_S, up, bias, none, np.zeros(0))
 
 
 def is_open(calibration: Calibration) -> bool:
@@ -90,17 +93,8 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[SessionS
             rate_sigma = np.where(is_whole, WHOLE_SCALE, TYPICAL_SCALE)
         else:
             rate_scales = np.full(3, known_rate)
-    n = obs.n_poses
-    state = SessionState(
-        gravity=calibration.gravity_m_s2,
-        accel_S=scale * np.eye(3),
-        accel_b=scale * obs.force_origin,
-        gyro_S=np.diag(rate_scales),
-        up=up,
-        gyro_bias=np.zeros((n, 3)) if obs.pose_rate is None else rate_scales * obs.pose_rate,
-        accel_bias=np.zeros((n, 3)),
-        effect=np.zeros(0),
-    )
+    S, b = scale * np.eye(3), scale * obs.force_origin
+    state = _at_means(obs, calibration.gravity_m_s2, S, b, np.diag(rate_scales))
     mean = np.concatenate([[state.accel_S[i, j] for i, j in _LOWER], state.accel_b, state.gyro_S.ravel()])
     lower = [(TYPICAL_SCALE if i == j else TYPICAL_ANGLE) * scale for i, j in _LOWER]
     full = [(rate_sigma[i] if i == j else TYPICAL_ANGLE) * rate_scales[j] for i in range(3) for j in range(3)]
@@ -140,9 +134,7 @@ def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArra
 
 def prior_of(obs: Observations, calibration: Calibration) -> Prior:
     """A given calibration as a prior on the 18 unknowns, in the lower frame on centred readings."""
-    Q, L = lower_frame(calibration.accelerometer.S)
-    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
-    gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
+    Q, L, b, gyro_S = _centred(obs, calibration)
     mean = np.concatenate([[L[i, j] for i, j in _LOWER], b, gyro_S.ravel()])
     turn = np.kron(Q.T, np.eye(3))
     to_lower = np.zeros((6, 9))
@@ -168,36 +160,27 @@ def prior_of(obs: Observations, calibration: Calibration) -> Prior:
 
 def linear_model(fitted: Fit) -> LinearModel:
     """S, b of both sensors from a fitted session, with standard errors, on raw readings; one bias for the session."""
-    state, obs = fitted.state, fitted.line.obs
+    state, obs = fitted.state, fitted.obs
     covariance, gyro_b = fitted.linear
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    accel: dict[str, Any] = {
-        "S": state.accel_S.tolist(),
-        "b": (fitted.line.core.session_force_bias - state.accel_S @ obs.force_origin).tolist(),
-        "sigma_S": sigma[:9].reshape(3, 3).tolist(),
-        "sigma_b": sigma[9:12].tolist(),
-        "raw_unit": obs.recording.accelerometer_unit.value,
-    }
-    if obs.raw_rate is None:
-        return LinearModel(MappingProxyType(accel), None)
-    gyro: dict[str, Any] = {
-        "S": state.gyro_S.tolist(),
-        "b": gyro_b.tolist(),
-        "sigma_S": sigma[12:21].reshape(3, 3).tolist(),
-        "sigma_b": sigma[21:24].tolist(),
-        "raw_unit": obs.recording.gyroscope_unit.value,
-    }
-    return LinearModel(MappingProxyType(accel), MappingProxyType(gyro))
+    accel_b = fitted.core.session_force_bias - state.accel_S @ obs.force_origin
+    accel, gyro = (
+        MappingProxyType(
+            {"S": S.tolist(), "b": b.tolist(), "sigma_S": own[:9].reshape(3, 3).tolist(), "sigma_b": own[9:].tolist(),
+             "raw_unit": unit.value}
+        )
+        for S, b, own, unit in (
+            (state.accel_S, accel_b, sigma[:12], obs.recording.accelerometer_unit),
+            (state.gyro_S, gyro_b, sigma[12:], obs.recording.gyroscope_unit),
+        )
+    )  # fmt: skip
+    return LinearModel(accel, None if obs.raw_rate is None else gyro)
 
 
 def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
     """A linear model's sensor as a calibration record, with a diagonal covariance."""
     variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
     return SensorCalibration(
-        S=np.array(model["S"]),
-        b=np.array(model["b"]),
-        covariance=np.diag(variance),
-        raw_unit=str(model["raw_unit"]),
-        si_unit=si_unit,
-        method="diagnosis",
-    )
+        S=np.array(model["S"]), b=np.array(model["b"]), covariance=np.diag(variance),
+        raw_unit=str(model["raw_unit"]), si_unit=si_unit, method="diagnosis",
+    )  # fmt: skip

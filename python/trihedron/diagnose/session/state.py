@@ -7,11 +7,9 @@ the sensor's noise (docs/model-session.md). The arithmetic is :class:`trihedron.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
 from trihedron import _core
@@ -79,7 +77,7 @@ class SessionState:
 class Distortion:
     """What effects add to the corrected readings, linear in their parameters: SI, body frame.
 
-    ``force`` and ``rate`` (points, 3, K) or None, at the points of :class:`Trajectory` (poses, then move samples).
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of ``Trajectory`` (poses, then move samples).
     """
 
     force: FloatArray | None
@@ -115,89 +113,6 @@ def stacked(parts: list[Distortion]) -> Distortion:
     return Distortion(side("force"), side("rate"))
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """The motion of the session state at its *points*: one per pose, then every sample of every move.
-
-    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by S, b and the accepted
-    effects; ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the points of each move;
-    ``point_samples`` (points,) index of the sample.
-    """
-
-    force: FloatArray
-    rate: FloatArray
-    attitude: FloatArray
-    move_slices: tuple[slice, ...]
-    point_samples: npt.NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """Whitened residuals of a fit and their labels, (rows,) each.
-
-    ``domain`` and ``segment`` (number of the pose or move) state what a row tests, ``channel`` its axis; ``walk`` is 0
-    for readings, 1 and 2 for walks of the accelerometer's and the gyro's bias, above 2 for other rows without readings.
-    """
-
-    residual: FloatArray
-    domain: npt.NDArray[np.int8]
-    segment: npt.NDArray[np.intp]
-    channel: npt.NDArray[np.int8]
-    walk: npt.NDArray[np.int8]
-
-
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """The rows of one fit, and columns of further effects."""
-
-    obs: Observations
-    state: SessionState
-    distortion: Distortion
-    prior: Prior | None
-    core: _core.SessionFit = field(repr=False)
-
-    @cached_property
-    def path(self) -> Trajectory:
-        """The motion at every point, corrected (eq. 11.3)."""
-        h = self.obs.n_poses
-        rate, force, attitude = self.core.path()
-        slices, first = [], h
-        for start, stop in self.obs.move_ranges:
-            slices.append(slice(first, first + stop - start))
-            first += stop - start
-        parts = [np.arange(start, stop) for start, stop in self.obs.move_ranges]
-        mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
-        return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
-
-    def columns(self, distortion: Distortion) -> FloatArray:
-        """(rows, K) whitened change of every residual row per effect parameter (eq. 11.7)."""
-        return self.core.columns(contiguous(distortion.force), contiguous(distortion.rate))
-
-    @cached_property
-    def accel_white(self) -> FloatArray:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
-        inverse = np.linalg.inv(self.state.accel_S)
-        return core_poses(self.obs).force_white() @ inverse
-
-    @cached_property
-    def gyro_white(self) -> FloatArray | None:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static rate; ``None`` without a gyro."""
-        if self.obs.pose_rate_sigma is None:
-            return None
-        inverse = np.linalg.inv(self.state.gyro_S)
-        return inverse / self.obs.pose_rate_sigma[:, :, None]
-
-    @cached_property
-    def move_errors(self) -> tuple[FloatArray, FloatArray]:
-        """Residuals of moves, (moves, 5) in SI, and their noise (moves, 5, 5)."""
-        return self.core.moves()
-
-    @cached_property
-    def move_white(self) -> FloatArray:
-        """(moves, 5, 5) matrix from an error in SI to whitened rows."""
-        return self.core.whitening()
-
-
 def contiguous(values: FloatArray | None) -> FloatArray | None:
     """Values as a contiguous float64 array for the core."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
@@ -207,15 +122,12 @@ def core_poses(obs: Observations) -> _core.SessionPoses:
     """The poses of some observations, as input of the core."""
     has_rate = obs.pose_rate is not None and obs.pose_rate_sigma is not None and obs.rate_density is not None
     return _core.SessionPoses(
-        time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64),
-        force=np.ascontiguousarray(obs.pose_force),
+        time_s=np.ascontiguousarray(obs.pose_time_s, dtype=np.float64), force=np.ascontiguousarray(obs.pose_force),
         force_sigma=np.ascontiguousarray(obs.pose_force_sigma),
-        force_density=np.ascontiguousarray(obs.force_density),
-        rate=contiguous(obs.pose_rate) if has_rate else None,
+        force_density=np.ascontiguousarray(obs.force_density), rate=contiguous(obs.pose_rate) if has_rate else None,
         rate_sigma=contiguous(obs.pose_rate_sigma) if has_rate else None,
-        rate_density=contiguous(obs.rate_density) if has_rate else None,
-        force_along=obs.force_up,
-    )
+        rate_density=contiguous(obs.rate_density) if has_rate else None, force_along=obs.force_up,
+    )  # fmt: skip
 
 
 def core_model(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.diagnose.accepted import held_out_records
+from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import NOT_TURNED, ROOM_VECTOR
+from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
 from trihedron.records.words import relation_experiment, relation_resembles, words
@@ -15,8 +16,6 @@ from trihedron.records.words import relation_experiment, relation_resembles, wor
 OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 AT_REST: dict[str, Domain] = {"gyroscope": "static-gyro", "accelerometer": "static-accel"}
 IN_MOTION: dict[str, Domain] = {"gyroscope": "moves", "accelerometer": "dynamics"}
-EARTH_RATE_RAD_S = 7.292115e-5
-"""WGS 84."""
 ROOM_SIGMAS = 3.0
 """Standard uncertainties within which a coupling is that of Earth rate."""
 

@@ -1,0 +1,223 @@
+"""Losses of samples: intervals where the two sides join only if samples are inserted (eq. 8.16), and losses that quick
+motion hides from that join, whose count gravity determines (eq. 8.16b)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.ndimage import percentile_filter
+
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.diagnose.effects.direct import MUST_HALVE
+from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
+from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.solve import move_residuals
+from trihedron.diagnose.session.state import SessionState
+
+MOST_LOST, LONGEST_LOSS_S = 60, 0.15
+"""Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
+AGREEMENT = 30.0
+"""Chi-square by which the common count may fit one sensor worse than its own best count."""
+AGREEMENT_SHARE = 0.01
+"""The same as a share of the chi-square without samples inserted: a large gap is no exact cubic."""
+LEAST_GAIN = 40.0
+"""Chi-square that a count must gain: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts."""
+OVER_USUAL, LEFT_SHARE = 5.0, 0.1
+"""The gain must also be five times the usual chi-square of joins nearby, and the remainder small: no loss is found
+in 48 healthy sessions."""
+NARROW = 3
+"""Samples on either side that a join uses in quick motion."""
+PLACE_S, TRIAL_S = 0.01, 0.03
+"""Spacing of the places tried, s; length of the trial insertion for the linear response of the residuals, s."""
+MOST_IN_A_MOVE = 3
+FEWEST_OF_PARABOLA = 6
+"""Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Samples missing behind ``sample`` of ``move``: their number, and the chi-square that it gains."""
+
+    sample: int
+    move: int
+    count: int
+    gain: float
+    per_sensor: tuple[float, ...]
+
+
+def most_lost(obs: Observations) -> int:
+    """Largest number of samples tried at one place."""
+    return max(MOST_LOST, round(LONGEST_LOSS_S * obs.recording.rate_hz))
+
+
+@lru_cache(maxsize=4)
+def _joints(w: int, order: int, most: int) -> FloatArray:
+    """(counts, 2w, 2w) residual projectors of a polynomial of ``order`` coefficients across n missing samples."""
+    projectors = []
+    for n in range(most + 1):
+        t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
+        q, _ = np.linalg.qr(np.vander(t - t.mean(), order))
+        projectors.append(np.eye(2 * w) - q @ q.T)
+    return np.stack(projectors)
+
+
+def _windows(obs: Observations, samples: IntArray, w: int) -> list[FloatArray]:
+    """(2w, k, axes) readings of each sensor, ``w`` on either side of the intervals that begin at ``samples`` (k,)."""
+    return [np.stack([x[samples + o] for o in range(1 - w, w + 1)]) for x in obs.whitened]
+
+
+def _trials(projectors: FloatArray, windows: list[FloatArray]) -> FloatArray:
+    """(k, counts, sensors) chi-square of a polynomial across every count of missing samples: a projector is its own
+    square."""
+    out = []
+    for one in windows:
+        left = projectors.reshape(-1, len(one)) @ one.reshape(len(one), -1)
+        left = left.reshape(len(projectors), *one.shape)
+        out.append(np.einsum("nikc,nikc->kn", left, left))
+    return np.stack(out, axis=2)
+
+
+@lru_cache(maxsize=8)
+def find_losses(obs: Observations) -> tuple[Loss, ...]:
+    """Intervals where the motion on either side joins smoothly only if samples are inserted (eq. 8.16).
+
+    For a trial count n one cubic is fitted to six samples before and six after, those after shifted by n steps. The
+    count that fits all channels best is accepted if no sensor contradicts it and the remaining chi-square is usual.
+    """
+    losses = sorted((one for m in range(obs.n_moves) for one in _losses_of(obs, m)), key=lambda loss: -loss.gain)
+    chosen: list[Loss] = []
+    for loss in losses:
+        if all(abs(loss.sample - other.sample) > 2 * HALF_WINDOW for other in chosen):
+            chosen.append(loss)
+    return tuple(sorted(chosen, key=lambda loss: loss.sample))
+
+
+def _losses_of(obs: Observations, m: int) -> list[Loss]:
+    (a, b), w, most = obs.move_ranges[m], HALF_WINDOW, most_lost(obs)
+    k = a + np.arange(w - 1, b - a - w)
+    k = k[~clipped_samples(obs)[k]]
+    if len(k) == 0:
+        return []
+    stack = _joints(w, 4, most)
+    windows = _windows(obs, k, w)
+    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - 4)
+    # Usual chi-square of joins in motion as quick as here: jitter and curvature are no losses.
+    near = [percentile_filter(one, 75, size=8 * w + 1, mode="nearest") for one in zero.T]
+    usual = np.maximum(np.stack(near, axis=1), dof)
+    # Only steps that stand out are searched; the quieter sensor may be too noisy to show the jump.
+    suspect = np.flatnonzero((zero > 3.0 * usual).any(axis=1))
+    if len(suspect) == 0:
+        return []
+    trial = _trials(stack, [v[:, suspect] for v in windows])
+    # Quick motion over a wide gap is no cubic: a quintic is used where the cubic leaves too much.
+    quick = (trial.min(axis=1) > 3.0 * usual[suspect]).any(axis=1)
+    if quick.any():
+        trial[quick] = _trials(_joints(w, 6, most), [v[:, suspect[quick]] for v in windows])
+    total = trial.sum(axis=2)
+    # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
+    best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
+    return [
+        Loss(int(k[s]), m, n, float(gains.sum()), tuple(gains.tolist()))
+        for s, n, costs in zip(suspect, best.tolist(), trial, strict=True)
+        if 0 < n < most and (gains := _gains(costs, n, zero[s], usual[s])) is not None
+    ]
+
+
+def _gains(costs: FloatArray, n: int, zero: FloatArray, usual: FloatArray) -> FloatArray | None:
+    """(sensors,) chi-square that the count ``n`` gains, from the ``costs`` (counts, sensors); ``None`` where a sensor
+    contradicts it."""
+    left = costs[n]
+    gains = zero - left
+    # The gain must also exceed that of a count where the signal is merely rough (vibration, jitter).
+    clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero + 3.0 * usual)
+    # A sensor that does not show the loss must not contradict it; one that shows it must give the same count.
+    silent = ~clear & (left < 2.0 * usual)
+    agree = left - costs.min(axis=0) <= np.maximum(AGREEMENT, AGREEMENT_SHARE * zero)
+    return gains if clear.any() and (clear | silent).all() and agree[clear].all() else None
+
+
+def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
+    """Losses in one move that contradicts a session (``state``) beyond a chi-square of ``limit``, the largest first.
+
+    A place and a count score by how well both sensors join there and by the misfit of gravity and velocity after the
+    move, each in units of its usual chi-square: that of joins in this move, and ``usual`` of the other moves.
+    """
+    found: list[Loss] = []
+    gain, places = _of_joints(obs, m)
+    step = max(1, round(TRIAL_S * obs.recording.rate_hz))
+    for _ in range(MOST_IN_A_MOVE if len(places) else 0):
+        held = {one.sample: one.count for one in found}
+        before = residual_after(obs, state, m, held)
+        misfit = float(before @ before)
+        if misfit <= limit:
+            break
+        free = np.array([all(abs(k - other) > 2 * NARROW for other in held) for k in places])
+        by_sample = np.stack([(residual_after(obs, state, m, held | {int(k): step}) - before) / step for k in places])
+        counts = np.arange(gain.shape[1])
+        left = before + counts[None, :, None] * by_sample[:, None, :]
+        score = gain + (misfit - (left**2).sum(axis=2)) / usual
+        score[~free] = -np.inf
+        at, n = np.unravel_index(int(score.argmax()), score.shape)
+        loss = Loss(int(places[at]), m, int(n), float(score[at, n]), (float(score[at, n]),))
+        after = residual_after(obs, state, m, held | {loss.sample: loss.count})
+        if gain[at, n] < LEAST_GAIN or float(after @ after) > MUST_HALVE * misfit:
+            break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
+        found.append(loss)
+    return found
+
+
+def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, IntArray]:
+    """(places, counts) chi-square that a count gains over zero at every place of a move, and the places (samples)."""
+    a, b = obs.move_ranges[m]
+    stride = max(1, round(PLACE_S * obs.recording.rate_hz))
+    k = a + np.arange(NARROW - 1, b - a - NARROW, stride)
+    k = k[~clipped_samples(obs)[k]]
+    if not len(k):
+        return np.zeros((0, 1)), k
+    costs = _trials(_joints(NARROW, 4, most_lost(obs)), _windows(obs, k, NARROW))
+    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - 4)), 1.0)
+    return ((costs[:, :1] - costs) / ordinary).sum(axis=2), k
+
+
+def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> FloatArray:
+    """(5,) residuals of gravity and velocity after one move with ``losses`` inserted, in standard errors."""
+    a, b = obs.move_ranges[m]
+    assert obs.raw_rate is not None
+    force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
+    step = 1.0 / obs.recording.rate_hz
+    for k, n in sorted(losses.items(), reverse=True):
+        i = k - a
+        force = np.concatenate([force[: i + 1], bridge(force, i, n), force[i + 1 :]])
+        rate = np.concatenate([rate[: i + 1], bridge(rate, i, n), rate[i + 1 :]])
+        put = time[i] + step * np.arange(1, n + 1)
+        time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
+    ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
+    one = replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
+    return np.asarray(move_residuals(one, state)[0])
+
+
+def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
+    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side."""
+    if k < 1 or k + 2 >= len(values):
+        return np.repeat(values[k : k + 1], n, axis=0)
+    a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])
+    b, db = _edge(values[k + 1 : k + 2 + max(n // 2, 1)])
+    da = -da
+    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
+    width = n + 1
+    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
+    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
+    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+    return out
+
+
+def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Value and slope at the first of the samples (m, ...), from a parabola where there are enough: the noise of a
+    single step would be multiplied by the length of the gap."""
+    if len(values) < FEWEST_OF_PARABOLA:
+        return values[0], values[1] - values[0]
+    x = np.arange(len(values))
+    slope, value = np.polynomial.polynomial.polyfit(x, values.reshape(len(values), -1), 2)[1::-1]
+    return value.reshape(values.shape[1:]), slope.reshape(values.shape[1:])
