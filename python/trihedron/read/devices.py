@@ -82,29 +82,10 @@ MAX_ROWS = 50_000
 LONGEST_BURST = 256
 """Largest displacement of rows against time order where several devices write in bursts."""
 _DEVICE_NAMES = frozenset(
-    {
-        "i",
-        "addr",
-        "src",
-        "ch",
-        "channel",
-        "port",
-        "bus",
-        "slot",
-        "dev",
-        "instance",
-        "imu",
-        "imuid",
-        "imunr",
-        "imunumber",
-        "id",
-        "device",
-        "deviceid",
-        "devicename",
-        "devicenr",
-    }
-    | {"sensor", "sensorid", "sensorname", "unit", "unitid", "node", "nodeid", "mac", "macaddress", "address"}
-    | {"source", "topic", "topicname", "frameid", "headerframeid"}
+    {"i", "addr", "src", "ch", "channel", "port", "bus", "slot", "dev", "instance", "imu", "imuid", "imunr"}
+    | {"imunumber", "id", "device", "deviceid", "devicename", "devicenr", "sensor", "sensorid", "sensorname", "unit"}
+    | {"unitid", "node", "nodeid", "mac", "macaddress", "address", "source", "topic", "topicname", "frameid"}
+    | {"headerframeid"}
 )
 _ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
 _GYROSCOPE = re.compile(

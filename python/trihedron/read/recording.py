@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,6 @@ from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor, one_beside
-from trihedron.read.digest import LateSha256, hexdigest
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
@@ -78,13 +78,13 @@ def read_recording(
         else:
             sensors = of_tables(by_sensor(table_of(path)), None, options)
             source = "memory"
-        sha256: str | LateSha256 = sensors.table.sha256
+        sha256 = sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
         accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
         gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)
         sensors = merge_sensors(accelerometer, gyroscope)
         source = f"{accelerometer_path} + {gyroscope_path}"
-        sha256 = hexdigest(accelerometer.table.sha256, gyroscope.table.sha256)
+        sha256 = hashlib.sha256((accelerometer.table.sha256 + gyroscope.table.sha256).encode()).hexdigest()
     elif accelerometer_path is not None or gyroscope_path is not None:
         only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
         one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
@@ -137,7 +137,7 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
 def audited(
     sensors: Sensors,
     source: str,
-    sha256: str | LateSha256,
+    sha256: str,
     accelerometer_unit: str | AccelerationUnit | None,
     gyroscope_unit: str | RateUnit | None,
     progress: Progress | None,
@@ -146,7 +146,7 @@ def audited(
     sensors = settled(sensors)
     findings = list(sensors.findings)
     _accounted(sensors, findings)
-    time_s, table, n = sensors.time_s, sensors.table, len(sensors.time_s)
+    time_s = sensors.time_s
     rate = _rate_hz(sensors)
     present = {
         name: triad
@@ -174,14 +174,14 @@ def audited(
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:
-        findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
+        findings += audit_counter(sensors.column(counter), sensors.table.label(counter), sensors.place)
     for done, (name, triad) in enumerate(present.items()):
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
         findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
         findings += audit_steps(name, facts.of(name), windows, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
-        progress(1.0, f"read {n} samples")
+        progress(1.0, f"read {len(time_s)} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
     for array in (time_s, *present.values()):
         array.setflags(write=False)
@@ -194,14 +194,14 @@ def audited(
         rate_hz=rate,
         accelerometer_unit=acc_unit,
         gyroscope_unit=gyr_unit,
-        temperature_degc=None if temperature is None else _kept(sensors, temperature, n),
-        supply_v=None if supply is None else _kept(sensors, supply, n),
+        temperature_degc=None if temperature is None else sensors.column(temperature),
+        supply_v=None if supply is None else sensors.column(supply),
         start_epoch_s=sensors.start_s,
         source=source,
-        sha256=hexdigest(sha256),
+        sha256=sha256,
         findings=tuple(findings),
         sampling=sensors.sampling,
-        auxiliary=MappingProxyType(_auxiliary(sensors, n)),
+        auxiliary=MappingProxyType(_auxiliary(sensors)),
         onboard=sensors.table.onboard,
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
@@ -255,14 +255,7 @@ def _rate_hz(sensors: Sensors) -> float:
     return mean_rate_hz(sensors.time_s)
 
 
-def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
-    values = sensors.table.columns[column]
-    if sensors.rows is not None:
-        values = values[sensors.rows]
-    return values[sensors.offset : sensors.offset + n]
-
-
-def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
+def _auxiliary(sensors: Sensors) -> dict[str, FloatArray]:
     used = sensors.columns.used()
     table = sensors.table
     out: dict[str, FloatArray] = {}
@@ -271,11 +264,9 @@ def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
             continue
         name = table.names[i] if table.names and table.names[i] else f"column {i + 1}"
         key = name if name not in out else f"{name} ({i + 1})"
-        kept = np.array(_kept(sensors, i, n))
-        kept.setflags(write=False)
-        out[key] = kept
+        out[key] = np.array(sensors.column(i))
     if sensors.timestamps_s is not None:
-        timestamps = np.array(sensors.timestamps_s)
-        timestamps.setflags(write=False)
-        out[TIMESTAMPS] = timestamps
+        out[TIMESTAMPS] = np.array(sensors.timestamps_s)
+    for values in out.values():
+        values.setflags(write=False)
     return out

@@ -76,6 +76,12 @@ class Sensors:
         at = sample + self.offset
         return int(self.rows[at]) if self.rows is not None else at
 
+    def column(self, number: int) -> FloatArray:
+        """(n,) one column of the table in the order of the samples; empty for words."""
+        values = self.table.columns[number]
+        values = values if self.rows is None or not len(values) else values[self.rows]
+        return values[self.offset : self.offset + len(self.time_s)]
+
     def place(self, sample: int) -> Words:
         """A sample's number, file line and time, for messages."""
         return words("sample", sample=sample, row=self.table.place(self.row(sample)), time_s=self.time_s[sample])
@@ -227,12 +233,8 @@ def settled(sensors: Sensors) -> Sensors:
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
     triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
-    n, counter = len(sensors.time_s), sensors.columns.counter
-    numbers = None
-    if counter is not None:
-        numbers = sensors.table.columns[counter]
-        numbers = numbers if sensors.rows is None else numbers[sensors.rows]
-        numbers = numbers[sensors.offset : sensors.offset + n] if len(numbers) else None
+    counter = sensors.columns.counter
+    numbers = None if counter is None else sensors.column(counter)
     found = settle_clock(sensors.time_s, sensors.start_s, triads, numbers)
     return replace(
         sensors,

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.digest import LateSha256
 from trihedron.records import Finding, Onboard
 from trihedron.records.words import Words, words
 
@@ -44,7 +43,7 @@ class Table:
     path: Path
     names: tuple[str, ...] | None
     columns: tuple[FloatArray, ...]
-    sha256: str | LateSha256 = ""
+    sha256: str = ""
     metadata: dict[str, str] = field(default_factory=dict)
     first_line: int = 0
     line_of_row: npt.NDArray[np.int64] | None = None

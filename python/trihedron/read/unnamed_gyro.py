@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
 from trihedron.read.column_statement import mapping_of
 from trihedron.read.columns import Triad
 from trihedron.read.sensors import Sensors
@@ -27,9 +26,8 @@ def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
         return ()
     found = []
-    n = len(accelerometer)
     for triad in _triads(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
-        rates = np.stack([_kept(sensors, column, n) for column in triad], axis=1)
+        rates = np.stack([sensors.column(column) for column in triad], axis=1)
         turning = turning_of(accelerometer, rates, rate_hz)
         if turning is None or turning.correlation <= CLEAR_CORRELATION or turning.n < FEWEST_PAIRS:
             continue
@@ -37,12 +35,6 @@ def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
         listed = " ".join(table.label(column) for column in triad)
         found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)
-
-
-def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
-    values = sensors.table.columns[column]
-    values = values if sensors.rows is None else values[sensors.rows]
-    return values[sensors.offset : sensors.offset + n]
 
 
 def _triads(names: tuple[str, ...], taken: set[int]) -> list[Triad]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
-from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -22,22 +22,23 @@ _TAIL = 1 << 12
 """Bytes at the end of a block that nearly always contain a line end."""
 
 
-def blocks_ahead(path: Path, stream: FileIO, cursor: Cursor) -> Generator[Bytes, None, None]:
-    """Blocks (k,) of ``stream`` that end with a complete line; each is valid until the next one is requested.
+def blocks_ahead(path: Path, cursor: Cursor) -> Generator[Bytes, None, None]:
+    """Blocks (k,) of a file that end with a complete line; each is valid until the next one is requested.
 
     Raises
     ------
     ReadError
         When the file cannot be read, or has no line ends.
     """
-    most = blocks.BLOCK_BYTES
+    most, digest = blocks.BLOCK_BYTES, hashlib.sha256()
     try:
-        with ThreadPoolExecutor(1) as reader:
+        with path.open("rb", buffering=0) as stream, ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
                 view, size = buffer.data[_ROOM:], 0
                 while size < most and (count := stream.readinto(view[size:])):
                     size += count
+                digest.update(view[:size])
                 return size
 
             buffers = [np.empty(_ROOM + most, dtype=np.uint8) for _ in range(2)]
@@ -48,6 +49,7 @@ def blocks_ahead(path: Path, stream: FileIO, cursor: Cursor) -> Generator[Bytes,
                 block = _joined(rest, buffer, size)
                 cursor.is_last = size < most
                 if cursor.is_last:
+                    cursor.sha256 = digest.hexdigest()
                     if len(block):
                         yield block
                     return

@@ -26,10 +26,12 @@ _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
 
 @dataclass
 class Cursor:
-    """Position of the reader in the file: lines read so far, and whether this block is the last."""
+    """Position of the reader in the file: lines read so far, and whether this block is the last; ``sha256`` of a plain
+    file after that."""
 
     lines: int = 0
     is_last: bool = False
+    sha256: str = ""
 
 
 def compression_of(magic: bytes) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.columns import find_columns
-from trihedron.read.digest import LateSha256, file_sha256, kept_open
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
 from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
@@ -60,7 +60,7 @@ class TextReader:
     ) -> None:
         self.path, self.compression, self.size, self.progress = path, compression, size, progress
         self.content, self.true_lines = content, lines
-        self.sha256: str | LateSha256 | None = sha256
+        self.sha256 = sha256
         self.cursor = Cursor()
         self.store = Store(0)
         self.lines = RowLines()
@@ -75,17 +75,15 @@ class TextReader:
 
     def read(self) -> Table:
         """The whole file as a table."""
-        # Closed even after an exception, so that the file does not stay open until the next garbage collection.
         if self.content is None and self.compression is None:
-            with kept_open(self.path) as stream, closing(blocks_ahead(self.path, stream, self.cursor)) as ahead:
-                layout = self._read(ahead)
-            self.sha256 = LateSha256(self.path, stream, self.n_bytes)
+            parts: Generator[bytes | Bytes, None, None] = blocks_ahead(self.path, self.cursor)
         else:
-            with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
-                layout = self._read(parts)
-        return self._table(layout)
+            parts = blocks(self.path, self.compression, self.cursor, self.content)
+        # Closed even after an exception, so that the file does not stay open until the next garbage collection.
+        with closing(parts):
+            return self._table(self._read(parts))
 
-    def _read(self, parts: Iterable[bytes] | Iterable[Bytes]) -> Layout:
+    def _read(self, parts: Iterable[bytes | Bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
             # Nearly all blocks after the first contain only rows of numbers and need no further checks.
@@ -338,7 +336,7 @@ class TextReader:
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
-            sha256=file_sha256(self.path) if self.sha256 is None else self.sha256,
+            sha256=self.sha256 or self.cursor.sha256 or file_sha256(self.path),
             metadata=layout.metadata,
             first_line=self.lines.first,
             line_of_row=self.lines.all(),
