@@ -97,7 +97,7 @@ class SerialSource:
     def __init__(self, port: str, baud: int = 115_200) -> None:
         self.port, self.baud = port, baud
         self.name = f"{port} at {baud} baud"
-        self._identity = _usb_identity(port)
+        self._identity = _usb_devices().get(port)
         self._serial = _open_serial(port, baud)
 
     def set_baud(self, baud: int) -> bool:
@@ -129,7 +129,8 @@ class SerialSource:
     def reopen(self) -> bool:
         """Open the port again by its name, or the same USB device under another name."""
         self.close()
-        for port in dict.fromkeys([self.port, *_same_device(self._identity)]):
+        same = [port for port, identity in _usb_devices().items() if identity == self._identity]
+        for port in dict.fromkeys([self.port, *same]):
             if not os.path.exists(port) and not port.upper().startswith("COM"):
                 continue
             try:
@@ -193,23 +194,13 @@ def _group_advice(port: str) -> str:
     return f"join its group with `sudo usermod -aG {group} $USER`, then log out and in again."
 
 
-def _usb_identity(port: str) -> tuple[object, ...] | None:
+def _usb_devices() -> dict[str, tuple[object, ...]]:
+    """Identity of the USB device of every port, by the port's name."""
     try:
         from serial.tools.list_ports import comports
     except ImportError:
-        return None
-    for found in comports():
-        if found.device == port and found.vid is not None:
-            return (found.vid, found.pid, found.serial_number)
-    return None
-
-
-def _same_device(identity: tuple[object, ...] | None) -> list[str]:
-    if identity is None:
-        return []
-    from serial.tools.list_ports import comports
-
-    return [p.device for p in comports() if (p.vid, p.pid, p.serial_number) == identity]
+        return {}
+    return {p.device: (p.vid, p.pid, p.serial_number) for p in comports() if p.vid is not None}
 
 
 class TcpSource:
@@ -258,61 +249,37 @@ class TcpSource:
 
 
 class FileSource:
-    """A file of bytes recorded from a device, or a named pipe."""
+    """A file of bytes recorded from a device, a named pipe, or standard input (no path)."""
 
-    def __init__(self, path: Path) -> None:
-        self.name = str(path)
+    def __init__(self, path: Path | None) -> None:
+        self.name = "standard input" if path is None else str(path)
         try:
-            self._stream = path.open("rb", buffering=0)
+            where = sys.stdin.fileno() if path is None else path
+            self._stream = open(where, "rb", buffering=0, closefd=path is not None)
         except PermissionError:
             raise CaptureError(f"{path}: no permission to read this file.") from None
         except OSError as error:
             raise CaptureError(f"{path}: cannot be read ({error.strerror}).") from None
-        self.is_live = stat.S_ISFIFO(os.fstat(self._stream.fileno()).st_mode)
+        if self._stream.isatty():
+            raise CaptureError(f"{self.name} is a keyboard; pipe the bytes of a device into it.")
+        self.is_live = not stat.S_ISREG(os.fstat(self._stream.fileno()).st_mode)
 
     def read(self) -> bytes:
         """The next piece of bytes."""
+        if self.is_live and not select.select([self._stream], [], [], POLL_S)[0]:
+            return b""
         data = self._stream.read(65_536)
         if not data:
             raise SourceEndedError(f"{self.name} ended.")
-        return bytes(data)
-
-    def reopen(self) -> bool:
-        """False: a file cannot be opened again."""
-        return False
-
-    def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
-
-
-class StdinSource:
-    """Standard input."""
-
-    name = "standard input"
-    is_live = True
-
-    def __init__(self) -> None:
-        self._handle = sys.stdin.fileno()
-        if os.isatty(self._handle):
-            raise CaptureError("standard input is a keyboard; pipe the bytes of a device into it.")
-
-    def read(self) -> bytes:
-        """The next piece of bytes."""
-        ready, _, _ = select.select([self._handle], [], [], POLL_S)
-        if not ready:
-            return b""
-        data = os.read(self._handle, 65_536)
-        if not data:
-            raise SourceEndedError("standard input ended.")
         return data
 
     def reopen(self) -> bool:
-        """False: standard input cannot be opened again."""
+        """False: neither a file nor a pipe can be opened again."""
         return False
 
     def close(self) -> None:
-        """Do nothing: standard input stays open."""
+        """Close the file; standard input stays open."""
+        self._stream.close()
 
 
 def open_source(where: str, baud: int | None = None) -> Source:
@@ -324,7 +291,7 @@ def open_source(where: str, baud: int | None = None) -> Source:
         When it cannot be opened; the message says which, why, and what to do.
     """
     if where == "-":
-        return StdinSource()
+        return FileSource(None)
     if where.startswith("tcp:"):
         return TcpSource(where)
     if where.upper().startswith("COM") and where[3:].isdigit():

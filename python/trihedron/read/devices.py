@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import unwrap
+from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
@@ -122,18 +123,11 @@ def pick_kind(words: list[str], kind: str) -> str | None:
     return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
 
 
-def one_device(
-    table: Table,
-    choice: Choice,
-    used: set[int],
-    device: int | None = None,
-    readings: tuple[int, ...] = (),
-    time: int | None = None,
-) -> Table:
+def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
     """The rows of one device, where a column identifies several.
 
-    The column is ``device``, or one not ``used`` that is recognised by its name, or because its codes alternate as the
-    ``readings`` do (in order of ``time`` if there is one). Alternating devices without such a column are a serious
+    The column is that of role ``device``, or one without a role that is recognised by its name, or because its codes
+    alternate as the readings do (in order of time if there is one). Alternating devices without such a column are a serious
     finding; ``--instance 1`` then takes the first row of each turn.
 
     Raises
@@ -141,9 +135,10 @@ def one_device(
     ReadError
         When there are several devices and none is chosen, or the chosen one does not exist.
     """
-    column, words, codes = _device_column(table, used if device is None else set(), device)
+    used, time = chosen_columns.used(), chosen_columns.time
+    column, words, codes = _device_column(table, used, chosen_columns.device)
     order = _in_time(table, time, MAX_ROWS)
-    if column < 0 and (n := _n_in_turn(table, readings, order)) > 1:
+    if column < 0 and (n := _n_in_turn(table, chosen_columns.readings, order)) > 1:
         column, words, codes = _device_column(
             table, used, None, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5)
         )
@@ -239,7 +234,7 @@ def _device_column(
     for i in range(len(table.columns)) if only is None else (only,):
         name = table.names[i] if table.names is not None else ""
         plain = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
-        if i in used or (only is None and fits is None and plain not in _DEVICE_NAMES):
+        if only is None and (i in used or (fits is None and plain not in _DEVICE_NAMES)):
             continue
         if i in table.labels:
             words, codes = table.labels[i]

@@ -93,7 +93,7 @@ _RANKS = (
     ({"unfilt", "unfiltered"}, 1),
     ({"user", "free", "linear", "linacc", "filtered", "lp", "smooth", "output"}, -2),
 )
-"""Words by which one of several triads is preferred: uncorrected readings to corrected ones, with gravity to without."""
+"""Words by which one of several triads is preferred: uncorrected readings, and those with gravity."""
 
 
 @dataclass(frozen=True)

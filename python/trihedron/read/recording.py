@@ -167,10 +167,7 @@ def audited(
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     if sensors.has_clock:
-        findings += audit_timing(
-            time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.timestamps_s
-        )
-        findings += audit_pace(time_s if sensors.timestamps_s is None else sensors.timestamps_s, sensors)
+        findings += audit_timing(sensors, rate) + audit_pace(sensors)
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:

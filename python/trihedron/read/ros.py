@@ -12,7 +12,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, first_line
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding
 from trihedron.records.progress import Progress
@@ -88,11 +88,6 @@ def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Findin
 def missing_extra(path: Path, what: str, package: str, extra: str) -> ReadError:
     """The error for a library that is not installed."""
     return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install 'trihedron[{extra}]'.")
-
-
-def first_line(error: BaseException) -> str:
-    """The first line of a library's error message, at most 160 characters."""
-    return (str(error).strip().split("\n")[0] or type(error).__name__)[:160]
 
 
 _IMU = "sensor_msgs/msg/Imu"

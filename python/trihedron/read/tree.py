@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
+import pickle
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +16,10 @@ import numpy.typing as npt
 from trihedron.read.columns import find_columns
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.matlab import DamagedError, check_matlab, read_objects
+from trihedron.read.errors import ReadError, first_line
+from trihedron.read.matlab import read_objects
 from trihedron.read.memory import columns_table
-from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_extra, pick
 from trihedron.read.table import Table
 
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
@@ -57,6 +59,15 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     return (_of_groups(path, groups, choice, "this HDF5 file"),)
 
 
+_LOAD = """
+import pickle, sys
+sys.path = [folder for folder in sys.path if folder]
+from scipy.io import loadmat
+pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protocol=5)
+"""
+"""Program that reads a file: SciPy trusts the sizes in it, and a wrong one ends the process in which it is read."""
+
+
 def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
@@ -65,22 +76,12 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     ReadError
         When the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to read.
     """
-    from scipy.io import loadmat
-
+    child = subprocess.run([sys.executable, "-c", _LOAD, str(path)], capture_output=True, check=False)
     try:
-        check_matlab(path.read_bytes())
-    except DamagedError as error:
-        raise ReadError(f"{path}: this MATLAB file is damaged ({error}); save it again.") from None
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    try:
-        with warnings.catch_warnings():
-            # SciPy warns that it finds only internal data of objects.
-            warnings.simplefilter("ignore")
-            content = loadmat(str(path), simplify_cells=True)
-    # For damaged files SciPy raises errors of several kinds.
+        content = pickle.loads(child.stdout)
     except Exception as error:
-        raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({first_line(error)}); save it again.") from None
+        said = child.stderr.decode(errors="replace").strip().split("\n")[-1][:160] or first_line(error)
+        raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({said}); save it again.") from None
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
     if "__function_workspace__" in content and not _hold_a_log(path, groups):

@@ -66,8 +66,11 @@ def build_clock(
         bad = int(np.flatnonzero(~finite)[0])
         if finite.sum() < 2:
             raise ReadError(f"{table.path}: the time column {table.label(column)} holds no numbers; name another one.")
+        count = np.count_nonzero(~finite)
         findings.append(
-            Finding.of(FindingCode.NON_FINITE, "time", count=np.count_nonzero(~finite), where=table.place(bad), row=bad)
+            Finding.of(
+                FindingCode.NON_FINITE, "time", count=count, where=table.place(bad), row=bad, rows_left_out=count
+            )
         )
         rows = np.flatnonzero(finite)
         raw = raw[rows]

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
-from trihedron.read.clock.rate import steps_of
+from trihedron.read.clock.rate import steps_of, steps_of_counter
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, TimestampKind
 
@@ -184,12 +184,7 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
     """(n,) numbers of samples from 0 on, from a sample counter (continued where it wraps); ``None`` for others."""
     if len(counter) < 3 or not np.all(np.isfinite(counter)) or not np.all(counter == np.rint(counter)):
         return None
-    step = np.diff(counter)
-    if counter.min() >= 0:
-        for modulus in (2.0**8, 2.0**16, 2.0**32):
-            if counter.max() < modulus:
-                step = np.where(step < 0, step + modulus, step)
-                break
+    step = steps_of_counter(counter)
     if np.any(step <= 0):
         return None
     values, counts = np.unique(step, return_counts=True)
