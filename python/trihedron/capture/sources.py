@@ -255,7 +255,7 @@ class FileSource:
         self.name = "standard input" if path is None else str(path)
         try:
             where = sys.stdin.fileno() if path is None else path
-            self._stream = open(where, "rb", buffering=0, closefd=path is not None)
+            self._stream = open(where, "rb", buffering=0, closefd=path is not None)  # noqa: SIM115 -- closed by close()
         except PermissionError:
             raise CaptureError(f"{path}: no permission to read this file.") from None
         except OSError as error:

@@ -90,9 +90,7 @@ def read_npz(path: Path, device: int | None) -> Table:
     except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
-        raise ReadError(
-            f"{path}: this .npz archive is damaged or holds Python objects ({first_line(error)})."
-        ) from None
+        raise ReadError(f"{path}: this .npz file is damaged or holds Python objects ({first_line(error)}).") from None
     return _from_arrays(path, arrays, device)
 
 

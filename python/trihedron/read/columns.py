@@ -96,6 +96,14 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     return chosen
 
 
+def columns_or_none(table: Table) -> Columns | None:
+    """Roles of the columns of a table; None where no sensor is recognised."""
+    try:
+        return find_columns(table, None, None)
+    except ReadError:
+        return None
+
+
 def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
     """Complete ``chosen``: units from the preamble where names state none; clock columns from the format where the
     user names no other."""

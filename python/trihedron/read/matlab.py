@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from trihedron.read.columns import Columns, find_columns, sensor_of_file_name
+from trihedron.read.columns import columns_or_none, sensor_of_file_name
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
@@ -44,17 +44,17 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     except Exception as error:
         raise ReadError(f"{path}: mat-io cannot read this MATLAB file ({first_line(error)}); save it again.") from None
     tables = {name: table for name, value in content.items() if (table := _table(path, name, value)) is not None}
-    found = {name: columns for name, table in tables.items() if (columns := _columns(table)) is not None}
+    found = {name: columns for name, table in tables.items() if (columns := columns_or_none(table)) is not None}
     if not found:
         held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
         raise ReadError(
             f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it holds {held[:300]}."
         )
+    sha256 = file_sha256(path)
     if choice.topic is None:
         acc = [name for name, columns in found.items() if columns.accelerometer and not columns.gyroscope]
         gyr = [name for name, columns in found.items() if columns.gyroscope and not columns.accelerometer]
         if len(acc) == len(gyr) == 1 and len(found) == 2:
-            sha256 = file_sha256(path)
             return (
                 replace(tables[acc[0]], sensor="accelerometer", sha256=sha256),
                 replace(tables[gyr[0]], sensor="gyroscope", sha256=sha256),
@@ -63,7 +63,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, streams, choice, "this MATLAB file")
     note = choice_note("MATLAB file", taken, streams)
     table = tables[taken.topic]
-    return (replace(table, sha256=file_sha256(path), findings=(*table.findings, *note)),)
+    return (replace(table, sha256=sha256, findings=(*table.findings, *note)),)
 
 
 def _table(path: Path, name: str, value: Any) -> Table | None:
@@ -75,12 +75,5 @@ def _table(path: Path, name: str, value: Any) -> Table | None:
     named = [(f"{name}_{label}" if is_bare and label.lower() in _AXES else label, data) for label, data in items]
     try:
         return replace(columns_table(str(path), named), path=path)
-    except ReadError:
-        return None
-
-
-def _columns(table: Table) -> Columns | None:
-    try:
-        return find_columns(table, None, None)
     except ReadError:
         return None

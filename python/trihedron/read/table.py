@@ -80,6 +80,16 @@ class Table:
             rows_in_file=n_in_file,
         )
 
+    def by_sensor(
+        self, accelerometer: npt.NDArray[np.int64], gyroscope: npt.NDArray[np.int64], n_left_out: int, note: Finding
+    ) -> tuple[Table, Table]:
+        """The tables of the accelerometer's and the gyro's rows; ``n_left_out`` rows, stated in ``note``, are in
+        neither."""
+        reported = self.n_in_file - self.n_rows
+        first = self.take(accelerometer, len(accelerometer) + n_left_out + reported, note)
+        second = self.take(gyroscope, len(gyroscope))
+        return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope", findings=())
+
     @property
     def n_rows(self) -> int:
         """Number of rows."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.columns import find_columns
+from trihedron.read.columns import columns_or_none
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
@@ -54,7 +54,7 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     # For damaged files h5py raises errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
-    if has_objects and not _hold_a_log(path, groups):
+    if has_objects and not _tables(path, groups):
         return read_objects(path, choice)
     return (_of_groups(path, groups, choice, "this HDF5 file"),)
 
@@ -84,7 +84,7 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({said}); save it again.") from None
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
-    if "__function_workspace__" in content and not _hold_a_log(path, groups):
+    if "__function_workspace__" in content and not _tables(path, groups):
         return read_objects(path, choice)
     if not groups:
         raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
@@ -101,24 +101,10 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
             groups.setdefault(name, {})[key] = np.array(value)
 
 
-def _hold_a_log(path: Path, groups: Groups) -> bool:
-    """Whether arrays outside the MATLAB objects have names of a sensor."""
-    return bool(_tables(path, groups))
-
-
 def _tables(path: Path, groups: Groups) -> dict[str, Table]:
     """Groups with an accelerometer or a gyro, by name."""
-    tables: dict[str, Table] = {}
-    for name, arrays in groups.items():
-        table = _table(path, arrays)
-        if table is None:
-            continue
-        try:
-            find_columns(table, None, None)
-        except ReadError:
-            continue
-        tables[name or "/"] = table
-    return tables
+    tables = {name or "/": _table(path, arrays) for name, arrays in groups.items()}
+    return {name: table for name, table in tables.items() if table is not None and columns_or_none(table) is not None}
 
 
 def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
