@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import select
 import socket
 import stat
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -112,7 +114,6 @@ class SerialSource:
         return True
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
         port = self._serial
         try:
             first: bytes = port.read(1)
@@ -143,12 +144,9 @@ class SerialSource:
         return False
 
     def close(self) -> None:
-        """Close the port."""
-        try:
+        # The device may have been removed already.
+        with suppress(OSError):
             self._serial.close()
-        except OSError:
-            # The device was removed already.
-            return
 
 
 def _reason(error: Exception) -> str:
@@ -169,12 +167,11 @@ def _open_serial(port: str, baud: int) -> serial.Serial:
 
 
 def _why_not_open(port: str, error: OSError) -> str:
-    number = error.errno
+    number, text = error.errno, str(error)
     if number is None:
         # pyserial wraps some errors without their number.
-        text = str(error)
-        number = next((n for n in (errno.ENOENT, errno.EACCES, errno.EBUSY, errno.EAGAIN) if f"[Errno {n}]" in text), 0)
-        number = number or (errno.EBUSY if "exclusively lock" in text else 0)
+        told = re.search(r"\[Errno (\d+)\]", text)
+        number = int(told[1]) if told else errno.EBUSY if "exclusively lock" in text else 0
     if number == errno.ENOENT or not os.path.exists(port):
         return f"there is no port {port}; `trihedron ports` lists what is plugged in."
     if number == errno.EACCES:
@@ -215,14 +212,16 @@ class TcpSource:
             raise CaptureError(f"{address}: a TCP source is written tcp://host:port, for example tcp://127.0.0.1:5000.")
         self._address = (host.strip("[]"), int(port))
         try:
-            self._socket = socket.create_connection(self._address, timeout=5.0)
+            self._connect(5.0)
         except OSError as error:
             why = error.strerror or error
             raise CaptureError(f"{address}: no connection ({why}); is the device on, and is the port right?") from None
+
+    def _connect(self, timeout_s: float) -> None:
+        self._socket = socket.create_connection(self._address, timeout=timeout_s)
         self._socket.settimeout(POLL_S)
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
         try:
             data = self._socket.recv(65_536)
         except TimeoutError:
@@ -234,17 +233,14 @@ class TcpSource:
         return data
 
     def reopen(self) -> bool:
-        """Connect again."""
         self.close()
         try:
-            self._socket = socket.create_connection(self._address, timeout=1.0)
+            self._connect(1.0)
         except OSError:
             return False
-        self._socket.settimeout(POLL_S)
         return True
 
     def close(self) -> None:
-        """Close the connection."""
         self._socket.close()
 
 
@@ -265,7 +261,6 @@ class FileSource:
         self.is_live = not stat.S_ISREG(os.fstat(self._stream.fileno()).st_mode)
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
         if self.is_live and not select.select([self._stream], [], [], POLL_S)[0]:
             return b""
         data = self._stream.read(65_536)
