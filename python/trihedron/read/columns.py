@@ -309,3 +309,33 @@ def _choose(
         listed = [" ".join(table.label(c) for c in triad) for triad in others[:4]]
         notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "one-of-several", sensor=role, taken=taken, others=listed))
     return best, parsed[best[0]].unit
+
+
+# The roles of a table's columns, as a finding and as the value of --columns.
+
+
+def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
+    """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
+    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
+    time = [] if columns.time is None else [f"time={columns.time + 1}"]
+    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
+    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+
+
+def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
+    """The finding that states the role of each column, and the columns without a role."""
+    roles = []
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+        value = getattr(columns, role)
+        if value is not None:
+            which = value if isinstance(value, tuple) else (value,)
+            roles.append((role, " ".join(table.label(c) for c in which)))
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    return Finding.of(
+        FindingCode.COLUMNS_RECOGNISED,
+        has_file=bool(file_name),
+        file=file_name,
+        roles=roles,
+        has_rest=bool(rest),
+        rest=rest[:24],
+    )

@@ -14,8 +14,7 @@ from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, counts_rows
-from trihedron.read.column_statement import mapping_of, statement
-from trihedron.read.columns import Columns, Sensor, find_columns
+from trihedron.read.columns import Columns, Sensor, find_columns, mapping_of, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
