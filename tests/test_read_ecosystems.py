@@ -334,11 +334,9 @@ def test_real_files_are_read_whole(real_data, name):
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
 
 
-def test_what_matlab_writes_passes_the_walk_and_damage_does_not_reach_scipy(tmp_path):
+def test_damage_in_a_matlab_file_ends_no_process_of_ours(tmp_path):
     from scipy.io import savemat
     from scipy.sparse import eye
-
-    from trihedron.read.matlab import DamagedError, check_matlab
 
     rng = np.random.default_rng(8)
     content = {
@@ -352,21 +350,15 @@ def test_what_matlab_writes_passes_the_walk_and_damage_does_not_reach_scipy(tmp_
     }
     for compressed in (False, True):
         savemat(tmp_path / "log.mat", content, do_compression=compressed)
-        check_matlab((tmp_path / "log.mat").read_bytes())
+        read_recording(tmp_path / "log.mat", topic="/")
     savemat(tmp_path / "log.mat", content)
     whole = (tmp_path / "log.mat").read_bytes()
-    n_refused = 0
-    for _ in range(400):
+    for _ in range(12):
         damaged = bytearray(whole)
-        for at in rng.integers(128, len(whole), 3):
+        # Sizes and types are in the first bytes of an array: SciPy alone ends the process over some such files.
+        for at in rng.integers(128, 256, 3):
             damaged[at] = rng.integers(256)
         path = tmp_path / "damaged.mat"
         path.write_bytes(damaged)
-        try:
-            check_matlab(bytes(damaged))
-        except DamagedError:
-            n_refused += 1
-        # SciPy alone ends the process over one such file in a few hundred.
         with contextlib.suppress(ReadError):
             read_recording(path)
-    assert n_refused > 20

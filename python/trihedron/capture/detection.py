@@ -22,27 +22,14 @@ _FILES: tuple[tuple[bytes, str, str], ...] = (
     (rb"ULog|\xa3\x95\x80", "a log of an autopilot", _AS_LOG),
     (rb"#ROSBAG|\x89MCAP|SQLite ", "a bag of ROS", _AS_LOG),
 )
+_FOR_VNIMU = "send $VNWRG,06,19*XX to the sensor for $VNIMU lines"
+_WITMOTION = "WitMotion packets without acceleration and rate"
+_BLUETOOTH = "WitMotion's Bluetooth packets, which carry no checksum"
 _STREAMS: tuple[tuple[bytes, str, str], ...] = (
-    (
-        rb"\$VN[A-Z]{3},",
-        "VectorNav text without acceleration and rate",
-        "send $VNWRG,06,19*XX to the sensor for $VNIMU lines",
-    ),
-    (
-        rb"\xff\x5a[\x00-\x3f]\x00",
-        "SBG sbgECom without IMU data",
-        "switch the message IMU data (3) on in sbgCenter",
-    ),
-    (
-        rb"\x55\x61.{18}(?=\x55)",
-        "WitMotion's Bluetooth packets, which carry no checksum",
-        "connect the sensor by its serial port",
-    ),
-    (
-        rb"\x55[\x53-\x5f].{9}(?=\x55)",
-        "WitMotion packets without acceleration and rate",
-        "switch both on in the maker's program",
-    ),
+    (rb"\$VN[A-Z]{3},", "VectorNav text without acceleration and rate", _FOR_VNIMU),
+    (rb"\xff\x5a[\x00-\x3f]\x00", "SBG sbgECom without IMU data", "switch the message IMU data (3) on in sbgCenter"),
+    (rb"\x55\x61.{18}(?=\x55)", _BLUETOOTH, "connect the sensor by its serial port"),
+    (rb"\x55[\x53-\x5f].{9}(?=\x55)", _WITMOTION, "switch both on in the maker's program"),
     (rb"\xfa\xff\x32", "Xsens MTData of the old kind", "set the sensor to MTData2 in MT Manager"),
     (rb"ue[\x80-\x9f]", "MicroStrain MIP", "record it with SensorConnect and check the CSV"),
     (rb"\xb5b\x10", "u-blox messages", "convert ESF-RAW to CSV and check that"),
@@ -66,7 +53,7 @@ def foreign(heard: Iterable[bytes]) -> tuple[str, str] | None:
             if n >= max(3, len(data) // MOST_BETWEEN):
                 return kind, remedy
         if _of_one_layout(data):
-            return "VectorNav binary output", "send $VNWRG,06,19*XX to the sensor for $VNIMU lines"
+            return "VectorNav binary output", _FOR_VNIMU
     return None
 
 
@@ -100,6 +87,10 @@ class Found:
     share: float
 
 
+Makers = list[tuple[str, Callable[[], Decoder]]]
+"""Names of the protocols tried, and functions that make their decoders."""
+
+
 def share_understood(make: Callable[[], Decoder], data: bytes) -> tuple[float, int]:
     """Share of the bytes that belong to frames (0 to 1), and the number of frames."""
     decoder = make()
@@ -125,7 +116,7 @@ def find_protocol(
         When the device sends nothing, or no protocol decodes what it sends.
     """
     names: Sequence[str | FrameDeclaration] = list(PROTOCOLS) if protocol is None else [protocol]
-    makers = [(_name(name), decoder_factory(name, name_columns)) for name in names]
+    makers = [(one if isinstance(one, str) else one.name, decoder_factory(one, name_columns)) for one in names]
     if not isinstance(source, SerialSource):
         return _best(source, makers, _listen(source, LISTEN_S, silence_s), silence_s)
     heard: list[bytes] = []
@@ -146,36 +137,36 @@ def find_protocol(
             return _best(source, makers, data, silence_s)
         heard += [data] if data else []
     if not heard:
-        raise CaptureError(_silent(source, silence_s))
-    raise CaptureError(_not_understood(source, heard, makers, at_all_bauds=baud is None))
+        raise silent(source, silence_s)
+    raise _not_understood(source, heard, makers, at_all_bauds=baud is None)
 
 
-def _best(source: Source, makers: list[tuple[str, Callable[[], Decoder]]], data: bytes, silence_s: float) -> Found:
+def _best(source: Source, makers: Makers, data: bytes, silence_s: float) -> Found:
     started = time.monotonic()
     while True:
         found = _judged(makers, data)
         if found is not None:
             return found
         if time.monotonic() - started > LONGEST_LISTEN_S and data:
-            raise CaptureError(_not_understood(source, [data], makers, at_all_bauds=False))
+            raise _not_understood(source, [data], makers)
         if time.monotonic() - started > silence_s and not data:
-            raise CaptureError(_silent(source, silence_s))
+            raise silent(source, silence_s)
         try:
             data += source.read()
         except (SourceEndedError, SourceLostError):
             if not data:
                 raise CaptureError(f"{source.name}: it is empty.") from None
-            best = max(((share_understood(m, data), n, m) for n, m in makers), key=lambda row: row[0])
-            if best[0][1] == 0:
-                raise CaptureError(_not_understood(source, [data], makers, at_all_bauds=False)) from None
-            return Found(best[1], best[2], data, best[0][0])
+            found = _judged(makers, data, fewest=1, least=0.0)
+            if found is None:
+                raise _not_understood(source, [data], makers) from None
+            return found
 
 
-def _judged(makers: list[tuple[str, Callable[[], Decoder]]], data: bytes) -> Found | None:
+def _judged(makers: Makers, data: bytes, *, fewest: int = ENOUGH_FRAMES, least: float = GOOD_SHARE) -> Found | None:
     best: Found | None = None
     for name, make in makers:
         share, n = share_understood(make, data)
-        if n >= ENOUGH_FRAMES and share >= GOOD_SHARE and (best is None or share > best.share + 0.05):
+        if n >= fewest and share >= least and (best is None or share > best.share + 0.05):
             best = Found(name, make, data, share)
     return best
 
@@ -201,31 +192,26 @@ def _listen(source: Source, for_s: float, silence_s: float) -> bytes:
     return data
 
 
-def _name(protocol: str | FrameDeclaration) -> str:
-    return protocol.name if isinstance(protocol, FrameDeclaration) else protocol
-
-
-def _silent(source: Source, silence_s: float) -> str:
-    return (
+def silent(source: Source, silence_s: float) -> CaptureError:
+    """The error for a device that sends nothing."""
+    return CaptureError(
         f"{source.name}: not one byte came in {silence_s:g} s; is the board powered and sending, and is this its port?"
     )
 
 
-def _not_understood(
-    source: Source, heard: list[bytes], makers: list[tuple[str, Callable[[], Decoder]]], *, at_all_bauds: bool
-) -> str:
+def _not_understood(source: Source, heard: list[bytes], makers: Makers, *, at_all_bauds: bool = False) -> CaptureError:
     known = foreign(heard)
     if known is not None:
-        return f"{source.name}: this is {known[0]}, which is not decoded here; {known[1]}."
+        return CaptureError(f"{source.name}: this is {known[0]}, which is not decoded here; {known[1]}.")
     n = sum(map(len, heard))
     tried = "no known protocol" if len(makers) > 1 else f"no {makers[0][0]} frame"
     if at_all_bauds:
-        return (
+        return CaptureError(
             f"{source.name}: {n} bytes came, and at none of {len(BAUDS)} usual baud rates is there {tried}; say --baud "
             "if it is unusual, or declare the frame in a .toml file (docs/capture.md)."
         )
     remedy = "leave --baud out to have it found" if isinstance(source, SerialSource) else "say another --protocol"
-    return (
+    return CaptureError(
         f"{source.name}: {n} bytes came and there is {tried} in them; {remedy}, or declare the frame in a .toml file "
         "(docs/capture.md)."
     )

@@ -102,18 +102,14 @@ class Guide:
 
     def _step(self) -> None:
         still_s = self._stillness.still_for_s
+        if self._is_taken and not self._has_moved():
+            return
+        self._is_taken = False
         if still_s <= 0.0:
-            if self._is_taken and not self._has_moved():
-                return
-            self._is_taken = False
             if self.phase is Phase.POSE:
                 self.phase = Phase.MOVE
                 self._asked_s = self._usual_s()  # a longer duration requested for the pose just left ends with it
             return
-        if self._is_taken:
-            if not self._has_moved():
-                return
-            self._is_taken = False
         if self.phase is Phase.MOVE:
             self.phase = Phase.POSE
         if still_s >= self._asked_s:
@@ -145,18 +141,15 @@ class Guide:
         if before and self._is_repeat(examination):
             self._remark = "The board lies almost as in an earlier pose: turn it to the marked one to learn more."
         self._accepted()
-        if examination.is_good_enough:
-            self.cut_s = self._time_s
-            self.phase = Phase.CHECK if self._n_checks else Phase.DONE
-            self._target = self._far_from_all()
-        elif len(examination.poses_up) >= self._most:
+        is_last = len(examination.poses_up) >= self._most
+        if not (examination.is_good_enough or is_last):
+            self._target, self.phase = examination.next_up, Phase.MOVE
+            return
+        if not examination.is_good_enough:
             self._remark = f"{self._most} poses and the accuracy is not reached: see the warnings for the cause."
-            self.cut_s = self._time_s
-            self.phase = Phase.CHECK if self._n_checks else Phase.DONE
-            self._target = self._far_from_all()
-        else:
-            self._target = examination.next_up
-            self.phase = Phase.MOVE
+        self.cut_s = self._time_s
+        self.phase = Phase.CHECK if self._n_checks else Phase.DONE
+        self._target = self._far_from_all()
 
     def _accepted(self) -> None:
         self._is_taken = True
@@ -186,18 +179,13 @@ class Guide:
         grid = np.array([direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)])
         unit: FloatArray = grid / np.linalg.norm(grid, axis=1)[:, None]
         known = [] if self.examination is None else list(self.examination.poses_up)
-        seen = np.array([*known, *self._checks])
-        if len(seen) == 0:
-            seen = np.array([[0.0, 0.0, 1.0]])
-        out: FloatArray = unit[int(np.argmin((unit @ seen.T).max(axis=1)))]
+        seen = [*known, *self._checks] or [np.array([0.0, 0.0, 1.0])]
+        out: FloatArray = unit[int(np.argmin((unit @ np.array(seen).T).max(axis=1)))]
         return out
 
     def _up(self) -> FloatArray | None:
-        mean = self._stillness.mean
-        if mean is None:
-            return None
-        known = self.examination
-        if known is None:
+        mean, known = self._stillness.mean, self.examination
+        if mean is None or known is None:
             return None
         up: FloatArray = known.matrix @ (mean[:3] - known.centre)
         length = float(np.linalg.norm(up))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from trihedron.capture.errors import CaptureError, DiskError
@@ -52,15 +53,10 @@ class GrowingLog:
 
     def begin(self, facts: dict[str, str], columns: list[str]) -> None:
         """Write the header: constant facts, two lines to be filled later, and the column names."""
-        lines = [f"# {FORMAT}"]
-        lines += [f"# {key}: {_plain(value)}" for key, value in facts.items()]
-        text = "".join(f"{line}\n" for line in lines)
-        size = len(text.encode())
+        text = f"# {FORMAT}\n" + "".join(f"# {key}: {_plain(value)}\n" for key, value in facts.items())
         for key in ("frames", "clock"):
-            self._places[key] = size
-            line = f"# {key}: not known yet".ljust(_LINE - 1) + "\n"
-            text += line
-            size += len(line)
+            self._places[key] = len(text.encode())
+            text += f"# {key}: not known yet".ljust(_LINE - 1) + "\n"
         self._write(text + ",".join(columns) + "\n")
 
     def fill(self, key: str, value: str) -> None:
@@ -95,8 +91,7 @@ class GrowingLog:
         if not (force or now - self._flushed_s >= FLUSH_S):
             return
         if self._waiting:
-            text = "\n".join(self._waiting) + "\n"
-            self._write(text)
+            self._write("\n".join(self._waiting) + "\n")
             self.rows_saved += self._rows_waiting
             self.duration_s = self._time_waiting
             self._waiting.clear()
@@ -112,13 +107,11 @@ class GrowingLog:
 
     def close(self) -> None:
         """Write pending rows and close the file."""
-        if self._handle < 0:
-            return
         try:
-            self.flush(force=True)
+            if self._handle >= 0:
+                self.flush(force=True)
         finally:
-            os.close(self._handle)
-            self._handle = -1
+            self.abandon()
 
     def abandon(self) -> None:
         """Close the file without writing pending rows."""
@@ -146,11 +139,9 @@ class GrowingLog:
         kept = written[:whole]
         self.rows_saved += sum(1 for line in kept.split(b"\n") if line and not line.startswith(b"#"))
         self._size = start + whole
-        try:
+        # If this fails too, the reader reports an incomplete last line.
+        with suppress(OSError):
             os.ftruncate(self._handle, self._size)
-        except OSError:
-            # Nothing more can be done here; the reader reports an incomplete last line.
-            return
 
     def _refused(self, error: OSError) -> DiskError:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.arrivals import ClockLine
 from trihedron.capture.account import Count, Tally, clock_sentence
+from trihedron.capture.detection import silent
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
@@ -147,10 +148,7 @@ class Recorder:
                 self._rows.flush()
                 quiet = self._now_s() - (heard_s or 0.0)
                 if heard_s is None and quiet > self._silence_s:
-                    raise CaptureError(
-                        f"{self.source.name}: not one byte came in {self._silence_s:g} s; is the board powered and "
-                        "sending, and is this its port?"
-                    ) from None
+                    raise silent(self.source, self._silence_s) from None
                 continue
             if isinstance(item, bytes):
                 heard_s = host_s
@@ -267,7 +265,9 @@ class Recorder:
             self._before = self._sequence
         self._decoder, self._sequence = self._make(), None
         if decoder.columns:
-            _keep_layout(self._decoder, decoder)
+            # The columns of the log stay: a decoder that learns them must not learn others.
+            for name in decoder.learned:
+                setattr(self._decoder, name, getattr(decoder, name))
         self._new_connection, self._held_since_s = True, None
 
     def _count_now(self) -> None:
@@ -306,10 +306,3 @@ class Recorder:
             raise CaptureError(
                 f"{self.source.name}: {heard} and not one whole {self._decoder.name} frame; no log was written."
             )
-
-
-def _keep_layout(new: Decoder, old: Decoder) -> None:
-    """Keep the log's columns after a reconnection: a decoder that learns its columns must not learn others."""
-    adopt = getattr(new, "adopt", None)
-    if adopt is not None:
-        adopt(old)

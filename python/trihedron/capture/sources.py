@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import select
 import socket
 import stat
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -97,7 +99,7 @@ class SerialSource:
     def __init__(self, port: str, baud: int = 115_200) -> None:
         self.port, self.baud = port, baud
         self.name = f"{port} at {baud} baud"
-        self._identity = _usb_identity(port)
+        self._identity = _usb_devices().get(port)
         self._serial = _open_serial(port, baud)
 
     def set_baud(self, baud: int) -> bool:
@@ -112,7 +114,6 @@ class SerialSource:
         return True
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
         port = self._serial
         try:
             first: bytes = port.read(1)
@@ -129,7 +130,8 @@ class SerialSource:
     def reopen(self) -> bool:
         """Open the port again by its name, or the same USB device under another name."""
         self.close()
-        for port in dict.fromkeys([self.port, *_same_device(self._identity)]):
+        same = [port for port, identity in _usb_devices().items() if identity == self._identity]
+        for port in dict.fromkeys([self.port, *same]):
             if not os.path.exists(port) and not port.upper().startswith("COM"):
                 continue
             try:
@@ -142,12 +144,9 @@ class SerialSource:
         return False
 
     def close(self) -> None:
-        """Close the port."""
-        try:
+        # The device may have been removed already.
+        with suppress(OSError):
             self._serial.close()
-        except OSError:
-            # The device was removed already.
-            return
 
 
 def _reason(error: Exception) -> str:
@@ -168,12 +167,11 @@ def _open_serial(port: str, baud: int) -> serial.Serial:
 
 
 def _why_not_open(port: str, error: OSError) -> str:
-    number = error.errno
+    number, text = error.errno, str(error)
     if number is None:
         # pyserial wraps some errors without their number.
-        text = str(error)
-        number = next((n for n in (errno.ENOENT, errno.EACCES, errno.EBUSY, errno.EAGAIN) if f"[Errno {n}]" in text), 0)
-        number = number or (errno.EBUSY if "exclusively lock" in text else 0)
+        told = re.search(r"\[Errno (\d+)\]", text)
+        number = int(told[1]) if told else errno.EBUSY if "exclusively lock" in text else 0
     if number == errno.ENOENT or not os.path.exists(port):
         return f"there is no port {port}; `trihedron ports` lists what is plugged in."
     if number == errno.EACCES:
@@ -193,23 +191,13 @@ def _group_advice(port: str) -> str:
     return f"join its group with `sudo usermod -aG {group} $USER`, then log out and in again."
 
 
-def _usb_identity(port: str) -> tuple[object, ...] | None:
+def _usb_devices() -> dict[str, tuple[object, ...]]:
+    """Identity of the USB device of every port, by the port's name."""
     try:
         from serial.tools.list_ports import comports
     except ImportError:
-        return None
-    for found in comports():
-        if found.device == port and found.vid is not None:
-            return (found.vid, found.pid, found.serial_number)
-    return None
-
-
-def _same_device(identity: tuple[object, ...] | None) -> list[str]:
-    if identity is None:
-        return []
-    from serial.tools.list_ports import comports
-
-    return [p.device for p in comports() if (p.vid, p.pid, p.serial_number) == identity]
+        return {}
+    return {p.device: (p.vid, p.pid, p.serial_number) for p in comports() if p.vid is not None}
 
 
 class TcpSource:
@@ -224,14 +212,16 @@ class TcpSource:
             raise CaptureError(f"{address}: a TCP source is written tcp://host:port, for example tcp://127.0.0.1:5000.")
         self._address = (host.strip("[]"), int(port))
         try:
-            self._socket = socket.create_connection(self._address, timeout=5.0)
+            self._connect(5.0)
         except OSError as error:
             why = error.strerror or error
             raise CaptureError(f"{address}: no connection ({why}); is the device on, and is the port right?") from None
+
+    def _connect(self, timeout_s: float) -> None:
+        self._socket = socket.create_connection(self._address, timeout=timeout_s)
         self._socket.settimeout(POLL_S)
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
         try:
             data = self._socket.recv(65_536)
         except TimeoutError:
@@ -243,76 +233,48 @@ class TcpSource:
         return data
 
     def reopen(self) -> bool:
-        """Connect again."""
         self.close()
         try:
-            self._socket = socket.create_connection(self._address, timeout=1.0)
+            self._connect(1.0)
         except OSError:
             return False
-        self._socket.settimeout(POLL_S)
         return True
 
     def close(self) -> None:
-        """Close the connection."""
         self._socket.close()
 
 
 class FileSource:
-    """A file of bytes recorded from a device, or a named pipe."""
+    """A file of bytes recorded from a device, a named pipe, or standard input (no path)."""
 
-    def __init__(self, path: Path) -> None:
-        self.name = str(path)
+    def __init__(self, path: Path | None) -> None:
+        self.name = "standard input" if path is None else str(path)
         try:
-            self._stream = path.open("rb", buffering=0)
+            where = sys.stdin.fileno() if path is None else path
+            self._stream = open(where, "rb", buffering=0, closefd=path is not None)  # noqa: SIM115 -- closed by close()
         except PermissionError:
             raise CaptureError(f"{path}: no permission to read this file.") from None
         except OSError as error:
             raise CaptureError(f"{path}: cannot be read ({error.strerror}).") from None
-        self.is_live = stat.S_ISFIFO(os.fstat(self._stream.fileno()).st_mode)
+        if self._stream.isatty():
+            raise CaptureError(f"{self.name} is a keyboard; pipe the bytes of a device into it.")
+        self.is_live = not stat.S_ISREG(os.fstat(self._stream.fileno()).st_mode)
 
     def read(self) -> bytes:
-        """The next piece of bytes."""
+        if self.is_live and not select.select([self._stream], [], [], POLL_S)[0]:
+            return b""
         data = self._stream.read(65_536)
         if not data:
             raise SourceEndedError(f"{self.name} ended.")
-        return bytes(data)
-
-    def reopen(self) -> bool:
-        """False: a file cannot be opened again."""
-        return False
-
-    def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
-
-
-class StdinSource:
-    """Standard input."""
-
-    name = "standard input"
-    is_live = True
-
-    def __init__(self) -> None:
-        self._handle = sys.stdin.fileno()
-        if os.isatty(self._handle):
-            raise CaptureError("standard input is a keyboard; pipe the bytes of a device into it.")
-
-    def read(self) -> bytes:
-        """The next piece of bytes."""
-        ready, _, _ = select.select([self._handle], [], [], POLL_S)
-        if not ready:
-            return b""
-        data = os.read(self._handle, 65_536)
-        if not data:
-            raise SourceEndedError("standard input ended.")
         return data
 
     def reopen(self) -> bool:
-        """False: standard input cannot be opened again."""
+        """False: neither a file nor a pipe can be opened again."""
         return False
 
     def close(self) -> None:
-        """Do nothing: standard input stays open."""
+        """Close the file; standard input stays open."""
+        self._stream.close()
 
 
 def open_source(where: str, baud: int | None = None) -> Source:
@@ -324,7 +286,7 @@ def open_source(where: str, baud: int | None = None) -> Source:
         When it cannot be opened; the message says which, why, and what to do.
     """
     if where == "-":
-        return StdinSource()
+        return FileSource(None)
     if where.startswith("tcp:"):
         return TcpSource(where)
     if where.upper().startswith("COM") and where[3:].isdigit():

@@ -1,4 +1,4 @@
-"""An axis in static intervals: its pooled noise, its spectral lines and its spectrum."""
+"""An axis in static intervals: its pooled noise, its spectral lines, its spectrum and its low-pass."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.low_pass import Spectrum, undisturbed
+from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
+from trihedron.channel_facts.quiet import Windows, look
 from trihedron.errors import RefusedError
 from trihedron.probability import chdtri
-from trihedron.ranges import ranges_of
+from trihedron.ranges import Range, ranges_of
+from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
 
@@ -30,13 +32,8 @@ PARTS = 8
 """Parts of a log without one grid that are tested separately: its range may change, or its sensor."""
 
 
-def probe(readings: FloatArray) -> FloatArray:
-    """The evenly spaced readings (k, ...) of (n, ...) that are searched for a grid."""
-    return readings[:: probe_stride(len(readings))]
-
-
 def probe_stride(n: int) -> int:
-    """Spacing of these readings in a log of n."""
+    """Spacing of the readings of a log of n that are searched for a grid."""
     return max(1, -(-n // PROBED))
 
 
@@ -55,16 +52,16 @@ def adc_step(readings: FloatArray) -> float:
     >>> adc_step(0.25 * np.round(2.0 * noise)), adc_step(noise)
     (0.25, 0.0)
     """
-    seen = np.ascontiguousarray(probe(readings))
+    seen = np.ascontiguousarray(readings[:: probe_stride(len(readings))])
     levels, n = _core.levels_of(seen)
-    step = _grid(levels, n)
+    step = _core.adc_grid(levels, n) or 0.0
     if 0.0 < step < 1.0 and step <= SINGLE * np.abs(levels).max() and _is_power_of_two(step):
         return 0.0
     # Where most levels occur once, the step is far below the noise and does not matter.
     if step or len(levels) < TESTABLE or REPEATS * len(levels) > n:
         return step
     parts = [_core.levels_of(part) for part in np.array_split(seen, PARTS)]
-    steps = [_grid(*part) for part in parts if len(part[0]) > TESTABLE]
+    steps = [_core.adc_grid(*part) for part in parts if len(part[0]) > TESTABLE]
     return float(np.median(steps)) if steps and all(steps) else 0.0
 
 
@@ -76,11 +73,6 @@ def _is_power_of_two(step: float) -> bool:
 def adc_steps(readings: FloatArray) -> FloatArray:
     """(c,) LSB of every column of (n, c)."""
     return np.array([adc_step(column) for column in readings.T], dtype=np.float64)
-
-
-def _grid(levels: FloatArray, n: int) -> float:
-    """The step of the grid that all ``levels`` (k,) of ``n`` readings lie on, or 0."""
-    return _core.adc_grid(levels, n) or 0.0
 
 
 SHORTEST = 32
@@ -110,8 +102,7 @@ class AxisAtRest:
         if not parts:
             raise RefusedError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
         step = adc_step(np.concatenate(parts))
-        power = _Power.of(parts)
-        keep = robust_poses(power.variance, power.dof)
+        keep = robust_poses(*_power_of(parts))
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
         # A line is reported as such; it is neither white noise nor a filter's corner.
         spectrum = _segments(parts, rate_hz)
@@ -120,8 +111,7 @@ class AxisAtRest:
             parts = without_lines(parts, lines, rate_hz)
             spectrum = _segments(parts, rate_hz)
         # Correlation and tails are those of the remaining poses: a disturbed one would change them for all.
-        power = _Power.of(parts)
-        pooled = pooled_logarithm(power.variance, power.dof)
+        pooled = pooled_logarithm(*_power_of(parts))
         whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
         beside = whole.beside([line.frequency_hz for line in lines])
         return cls(parts, step, lines, pooled, undisturbed(beside, rate_hz))
@@ -149,28 +139,23 @@ def _unbroken(part: FloatArray) -> list[FloatArray]:
     return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
 
 
-@dataclass(frozen=True, eq=False)
-class _Power:
-    """Half the mean squared difference of each pose (k,), and its degrees of freedom (k,)."""
+def _power_of(parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Half the mean squared difference of each pose (n,), and its degrees of freedom, (k,) each.
 
-    variance: FloatArray
-    dof: FloatArray
-
-    @classmethod
-    def of(cls, parts: Sequence[FloatArray]) -> _Power:
-        """From poses (n,) each; correlation and kurtosis of differences are pooled over the poses."""
-        squares = [np.diff(part) ** 2 for part in parts]
-        mean = np.array([float(s.mean()) for s in squares])
-        count = np.array([len(s) for s in squares], dtype=np.float64)
-        # Relative to the level of each pose, which may differ.
-        about = [s / m - 1.0 for s, m in zip(squares, mean, strict=True) if m > 0.0]
-        spread = np.zeros(LAGS + 1)
-        for lag in range(LAGS + 1):
-            products = [float(a[lag:] @ a[: len(a) - lag]) for a in about]
-            spread[lag] = sum(products) / max(sum(len(a) - lag for a in about), 1)
-        # White noise: 2 (1 + 2/4) = 3 per difference, two thirds of a degree of freedom each.
-        per_difference = max(float(spread[0] + 2.0 * spread[1:].sum()), 0.5 * float(spread[0]), 1e-12)
-        return cls(0.5 * mean, 2.0 * count / per_difference)
+    Correlation and kurtosis of differences are pooled over the poses.
+    """
+    squares = [np.diff(part) ** 2 for part in parts]
+    mean = np.array([float(s.mean()) for s in squares])
+    count = np.array([len(s) for s in squares], dtype=np.float64)
+    # Relative to the level of each pose, which may differ.
+    about = [s / m - 1.0 for s, m in zip(squares, mean, strict=True) if m > 0.0]
+    spread = np.zeros(LAGS + 1)
+    for lag in range(LAGS + 1):
+        products = [float(a[lag:] @ a[: len(a) - lag]) for a in about]
+        spread[lag] = sum(products) / max(sum(len(a) - lag for a in about), 1)
+    # White noise: 2 (1 + 2/4) = 3 per difference, two thirds of a degree of freedom each.
+    per_difference = max(float(spread[0] + 2.0 * spread[1:].sum()), 0.5 * float(spread[0]), 1e-12)
+    return 0.5 * mean, 2.0 * count / per_difference
 
 
 def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
@@ -274,3 +259,39 @@ def _less(part: FloatArray, per_sample: float) -> FloatArray:
     found = np.linalg.lstsq(design, part, rcond=None)[0]
     out: FloatArray = found[0] + (part - design @ found) * math.sqrt(n / (n - 2.0))
     return out
+
+
+# The low-pass of each channel, from the static intervals of a log.
+
+IN_A_ROW = 16
+"""Consecutive windows that are taken together from a long log: intervals of eight seconds."""
+
+
+def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str, tuple[LowPass, ...]]:
+    """Low-passes of the three channels of each sensor (n, 3) by name; none where no quiet interval is long enough.
+
+    The method is that for poses (:func:`trihedron.channel_facts.low_pass.low_passes`), applied to the quietest
+    intervals of the log: a filter shows in the white noise of a static sensor.
+    """
+    windows = look(sensors, rate_hz, in_a_row=IN_A_ROW)
+    if windows is None:
+        return {}
+    stretches = _stretches(windows)
+    found = {}
+    for name, readings in sensors.items():
+        try:
+            axes = [AxisAtRest.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
+        except RefusedError:
+            continue  # fewer than 32 readings in a row
+        found[name] = tuple(low_passes([axis.spectrum for axis in axes], rate_hz))
+    return found
+
+
+def _stretches(windows: Windows) -> list[Range]:
+    """Ranges of consecutive quiet windows."""
+    follows = np.diff(windows.start) == windows.length
+    number = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
+    is_quiet = np.zeros(int(number[-1]) + 1, dtype=np.bool_)
+    is_quiet[number[windows.quiet]] = True
+    first_row = dict(zip(number.tolist(), windows.start.tolist(), strict=True))
+    return [(first_row[a], first_row[b - 1] + windows.length) for a, b in ranges_of(is_quiet)]

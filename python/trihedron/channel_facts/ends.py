@@ -53,10 +53,10 @@ class End:
         """(n,) readings of the axis."""
         return self.readings[:, self.axis]
 
-    def near(self, depth: float) -> tuple[int, float]:
-        """Number of other readings within ``depth`` of the extreme, and the distance of the nearest."""
-        within, width, at = _core.readings_near(self.readings, self.axis, self.value, depth)
-        return within - len(at), width
+    def near(self, depth: float) -> int:
+        """Number of other readings within ``depth`` of the extreme."""
+        within, _, at = _core.readings_near(self.readings, self.axis, self.value, depth)
+        return within - len(at)
 
     @cached_property
     def runs(self) -> IntArray:

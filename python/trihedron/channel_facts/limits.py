@@ -1,8 +1,8 @@
 """Range limits of an ADC or a sensor, detected from extreme values of readings, never from a nominal range. No other
 module searches for them.
 
-Several kinds of evidence make a value a limit, each rare enough in healthy readings: clipped peaks, readings that
-arrive steeply and stay, noise that ends abruptly, codes that repeat or are read more often than those before them.
+Two kinds of evidence make a value a limit, each rare enough in healthy readings: clipped peaks, and codes that are read
+more often than those before them.
 A channel that stands still while all others stand still too is no evidence: it is a pose, or a constant rate.
 """
 
@@ -21,31 +21,8 @@ from trihedron.probability import chdtrc
 from trihedron.quantiles import median
 from trihedron.records.channel_facts import Limit
 
-STEEP = 5.0
-"""Steps into a limit, in noise, at least: a quiet static sensor at its largest count is no limit."""
-PILED = 3.0
-"""Factor by which its samples must exceed those that the neighbouring values predict."""
-LEADS_UP = 0.01
-"""Part of the span next to the limit in which those values lie."""
-
-EQUAL = 0.5 / math.sqrt(math.pi)
-"""Chance, per LSB over noise, that neighbours of independent noise have one code."""
-LEAST_EQUAL = 0.01
-"""Least such chance: rows may be written twice, up to one in a hundred."""
-
-NOISE_ALONE = 20.0
-"""Standard deviations of the noise that contain all readings of a static log; less motion than that counts as none."""
-CARRIED = 0.5
-"""Noise over LSB from which it moves readings from one code to the next: below, a pose or a constant value looks like a
-limit."""
-ABRUPT = 0.6
-"""A tail of noise thins out: this share of the readings within 1.5 LSB of an extreme, on it, indicates clipping."""
-BESIDE = 1.5
-FEWEST_CUT, LEAST_SHARE = 10, 1e-3
-"""Readings on it, and their share of all, that this test needs."""
-
 BY_CHANCE = 1e-6
-"""False-alarm probability of readings that crowd on the outermost code of a sensor, or repeat there."""
+"""False-alarm probability of readings that crowd on the outermost code of a sensor."""
 DITHERED = 1.5
 """LSB over noise (rounding included) up to which the top of a smooth motion spreads over codes."""
 REACHES = (1, 3, 40)
@@ -53,65 +30,6 @@ REACHES = (1, 3, 40)
 the first few more often than those far below, a quick one all equally often."""
 UNREAD = 1.0 / 3.0
 """Expected readings of a code where none of its neighbours was read."""
-
-
-def is_wall(end: End, *, is_known: bool) -> bool:
-    """Whether readings arrive steeply and stay, for more samples than the top of a smooth motion has."""
-    if end.count < 3:
-        return False
-    depth = LEADS_UP * end.span
-    near, width = end.near(depth)
-    # Near the top of a smooth peak the density grows as one over the root of the distance, so the share of the
-    # topmost level among all within `depth` is the root of its width.
-    if end.count <= PILED * near * min(math.sqrt(width / depth), 1.0):
-        return False
-    values, runs = end.column, end.moving_runs
-    starts, lengths = runs[:, 0], runs[:, 1] - runs[:, 0]
-    before = np.abs(values[np.maximum(starts - 1, 0)] - end.value)
-    after = np.abs(values[np.minimum(runs[:, 1], len(values) - 1)] - end.value)
-    steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(end.noise, width))
-    # A single run may be a channel that froze; at the end of an integer's range it is the range limit.
-    return int(np.count_nonzero(steep)) >= (1 if is_known else 2)
-
-
-def is_repeated(end: End, *, is_known: bool) -> bool:
-    """Whether neighbours on the extreme are equal more often than noise that moves the last digit explains, however
-    slowly it is reached."""
-    runs = end.moving_runs
-    lengths = runs[:, 1] - runs[:, 0]
-    # A single run may be a channel that froze, as above.
-    if end.dither <= end.step or np.count_nonzero(lengths > 1) < (1 if is_known else 2):
-        return False
-    n, repeats = int(lengths.sum()), int(np.sum(lengths - 1))
-    equal = max(EQUAL * end.step / end.dither, LEAST_EQUAL)
-    if _at_least(repeats, n, equal) > BY_CHANCE:
-        return False
-    # Where rows are written again, neighbours are equal everywhere.
-    usual = float(np.mean(np.concatenate([np.diff(part) for part in end.stretches]) == 0.0))
-    return _at_least(repeats, n, max(equal, usual)) < BY_CHANCE
-
-
-def _at_least(k: int, n: int, p: float) -> float:
-    """Chernoff's bound of the probability of k or more of n, each with probability p."""
-    share = k / n
-    if share <= p:
-        return 1.0
-    return math.exp(-n * (share * math.log(share / p) + (1.0 - share) * math.log((1.0 - share) / (1.0 - p))))
-
-
-def is_cut_noise(end: End) -> bool:
-    """Whether the noise of a static log ends abruptly: a tail thins out towards its end, clipped noise does not."""
-    if end.dither <= CARRIED * end.step or end.span > NOISE_ALONE * end.noise:
-        return False
-    if end.count <= max(FEWEST_CUT, LEAST_SHARE * len(end.readings)):
-        return False
-    beside, _ = end.near(BESIDE * end.step)
-    return end.count > ABRUPT * (end.count + beside)
-
-
-def is_crowded(end: End) -> bool:
-    """Whether one extreme is read more often than motion explains (:func:`crowded_together` of one channel)."""
-    return _chance([end]) < BY_CHANCE
 
 
 def crowded_together(ends: list[End]) -> list[End]:
@@ -136,7 +54,7 @@ def _chance(ends: list[End]) -> float:
     spare = sum(end.count for end in told) - len(told)
     if spare <= 0:
         return 1.0
-    expected = sum(max(UNREAD, *(end.near((reach + 0.5) * end.step)[0] / reach for reach in REACHES)) for end in told)
+    expected = sum(max(UNREAD, *(end.near((reach + 0.5) * end.step) / reach for reach in REACHES)) for end in told)
     # Poisson probability of at least so many: a chi-square of twice as many degrees of freedom below twice its mean.
     return 1.0 - chdtrc(2.0 * spare, 2.0 * expected)
 
@@ -213,13 +131,7 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
         return False
     is_word = is_end_of_word(end.value, end.step)
     is_known = is_word or any(_is_same_code(end, other) for other in lasting if other is not end)
-    return (
-        is_cut(end, is_known=is_known, is_word=is_word)
-        or is_wall(end, is_known=is_word)
-        or is_repeated(end, is_known=is_word)
-        or is_cut_noise(end)
-        or is_crowded(end)
-    )
+    return is_cut(end, is_known=is_known, is_word=is_word) or _chance([end]) < BY_CHANCE
 
 
 def _is_same_code(one: End, other: End) -> bool:

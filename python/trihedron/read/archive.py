@@ -8,16 +8,15 @@ import tokenize
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.lib import format as npy_format
 
-from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import ReadError, first_line, from_os_error
 from trihedron.read.memory import check_memory, check_unpacked
 from trihedron.read.table import Table
 
@@ -36,9 +35,7 @@ def devices_of(path: Path) -> int:
 
 def _devices(archive: zipfile.ZipFile, name: str) -> int:
     with archive.open(name) as stream:
-        version = npy_format.read_magic(stream)
-        read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
-        shape, _, dtype = read(stream)
+        shape, _, dtype = header(stream, archive.getinfo(name).file_size)
     return int(shape[1]) if len(shape) == 3 and dtype.kind in "iuf" else 1
 
 
@@ -55,11 +52,8 @@ def read_npy(path: Path) -> Table:
     """An array (n, k) or a structured array (n,)."""
     try:
         with path.open("rb") as stream:
-            shape, _, dtype = header(stream)
-            cells = math.prod(shape)
-            if min(shape, default=1) < 0 or dtype.itemsize * cells != path.stat().st_size - stream.tell():
-                raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
-            check_memory(path, cells, 1)
+            shape, _, _ = header(stream, path.stat().st_size)
+            check_memory(path, math.prod(shape), 1)
             stream.seek(0)
             # Read, not memory-mapped: the process crashes if a mapped file is truncated.
             array = np.load(stream, allow_pickle=False)
@@ -68,17 +62,20 @@ def read_npy(path: Path) -> Table:
     except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
-        raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({_first(error)}).") from None
+        raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({first_line(error)}).") from None
     return _from_arrays(path, {"data": array}, None)
 
 
-def header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether in column-major order, and type of the array; the stream is then at the array's data."""
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+def header(stream: Any, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether in column-major order, and type of the array in a stream of ``size`` bytes; the stream is then at
+    the array's data."""
+    version = npy_format.read_magic(stream)
+    read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
     shape, by_columns, dtype = read(stream)
     if dtype.hasobject:
         raise RefusedError("objects of Python are not read")
+    if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != size - stream.tell():
+        raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
     return shape, bool(by_columns), dtype
 
 
@@ -93,7 +90,7 @@ def read_npz(path: Path, device: int | None) -> Table:
     except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
-        raise ReadError(f"{path}: this .npz archive is damaged or holds Python objects ({_first(error)}).") from None
+        raise ReadError(f"{path}: this .npz file is damaged or holds Python objects ({first_line(error)}).") from None
     return _from_arrays(path, arrays, device)
 
 
@@ -101,26 +98,11 @@ def _check_members(path: Path, archive: Any) -> None:
     """Refuse an archive whose members do not fit into memory, or are shorter than their headers state."""
     packed = unpacked = 0
     for info in archive.zip.infolist():
-        packed, said = packed + info.compress_size, info.file_size
+        packed, unpacked = packed + info.compress_size, unpacked + info.file_size
         with archive.zip.open(info) as member:
             if member.peek(6)[:6] == b"\x93NUMPY":
-                shape, _, dtype = header(member)
-                if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) > info.file_size:
-                    raise RefusedError(f"{info.filename} says {dtype} of shape {shape} and is shorter")
-        unpacked += said
+                header(member, info.file_size)
     check_unpacked(path, packed, unpacked)
-
-
-def _first(error: BaseException) -> str:
-    return (str(error).strip().split("\n")[0] or type(error).__name__)[:120]
-
-
-def _numeric(array: npt.NDArray[np.generic]) -> bool:
-    return array.dtype.kind in "iufb"
-
-
-def _column(array: npt.NDArray[np.generic]) -> FloatArray:
-    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: int | None) -> npt.NDArray[np.generic]:
@@ -137,21 +119,17 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: 
 
 def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | None) -> Table:
     names: list[str] = []
-    columns: list[FloatArray] = []
+    columns: list[npt.NDArray[Any]] = []
     metadata: dict[str, str] = {}
-    lengths = [a.shape[0] for a in arrays.values() if a.ndim >= 1 and a.shape[0] > 12]
-    n_rows = max(lengths, default=max((a.shape[0] for a in arrays.values() if a.ndim >= 1), default=0))
+    flat: dict[str, npt.NDArray[Any]] = {}
+    for name, array in arrays.items():
+        flat |= {key: array[key] for key in array.dtype.names} if array.dtype.names else {name: array}
+    lengths = [a.shape[0] for a in flat.values() if a.ndim >= 1]
+    n_rows = max([n for n in lengths if n > 12] or lengths, default=0)
     used_device = False
-    for name, given in arrays.items():
+    for name, given in flat.items():
         array = given
-        if array.dtype.names:
-            if array.ndim == 1 and array.shape[0] == n_rows:
-                for key in array.dtype.names:
-                    if _numeric(array[key]) and array[key].ndim == 1:
-                        names.append(key)
-                        columns.append(_column(array[key]))
-            continue
-        if not _numeric(array):
+        if array.dtype.kind not in "iufb":
             if array.size == 1 and array.dtype.kind in "US":
                 metadata[name] = str(array.reshape(-1)[0])
             continue
@@ -165,18 +143,18 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
             raise ReadError(f"{path}: array '{name}' has {array.ndim} dimensions; save rows x columns.")
         if array.ndim == 1:
             names.append(name)
-            columns.append(_column(array))
+            columns.append(array)
             continue
         check_memory(path, n_rows, array.shape[1])
         block = name in _BLOCK_NAMES or array.shape[1] > 3
         # Columns of a block have no names: their order is recognised as in a text log without a header.
         names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
-        columns += [_column(array[:, i]) for i in range(array.shape[1])]
+        columns += list(array.T)
     if device is not None and not used_device:
         raise ReadError(f"{path}: a device was given, but the file holds one device only; leave --device out.")
     if not columns:
         raise ReadError(
             f"{path}: there is no numeric array of rows in this file (it holds {', '.join(arrays) or 'nothing'})."
         )
-    only_block = not any(names)
-    return Table(path, None if only_block else tuple(names), tuple(columns), file_sha256(path), metadata)
+    numbers = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in columns)
+    return Table(path, tuple(names) if any(names) else None, numbers, file_sha256(path), metadata)

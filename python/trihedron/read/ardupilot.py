@@ -15,9 +15,9 @@ import numpy as np
 from trihedron.errors import RefusedError
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, first_line
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_extra, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 

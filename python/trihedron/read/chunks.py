@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 import weakref
 from collections.abc import Iterator
@@ -13,10 +12,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.errors import RefusedError
 from trihedron.files.output import Temporary, clear_leftovers
 from trihedron.read.archive import DAMAGE, header
-from trihedron.read.errors import ReadError, check_readable, from_os_error, panics_unprinted, refuse_after_fork
+from trihedron.read.errors import (
+    ReadError,
+    check_readable,
+    errors_of_polars,
+    first_line,
+    from_os_error,
+    refuse_after_fork,
+)
 from trihedron.read.text.layout import MISSING, Layout, detect
 
 
@@ -70,15 +75,12 @@ def rows_on_disk(path: Path) -> RowsOnDisk:
     """
     try:
         with path.open("rb") as stream:
-            shape, by_columns, dtype = header(stream)
+            shape, by_columns, dtype = header(stream, path.stat().st_size)
             offset = stream.tell()
-            if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != path.stat().st_size - offset:
-                raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
     except OSError as error:
         raise from_os_error(path, error) from None
     except DAMAGE as error:
-        why = (str(error).splitlines() or [type(error).__name__])[0]
-        raise ReadError(f"{path}: this .npy file is damaged ({why}); write it again.") from None
+        raise ReadError(f"{path}: this .npy file is damaged ({first_line(error)}); write it again.") from None
     if dtype.kind not in "iuf" or len(shape) != len(("rows", "columns")):
         raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {dtype} {shape}.")
     return RowsOnDisk(path, (shape[0], shape[1]), dtype, offset, by_columns)
@@ -138,8 +140,9 @@ def _convert(log: Path, layout: Layout, target: Path) -> None:
 
     refuse_after_fork(log)
     names = [f"column {k + 1}" for k in range(layout.n_fields + layout.trailing_separator)]
-    try:
-        with panics_unprinted():
+    remedy = "; repair it, or read the log whole (without --stream), which says which rows"
+    with errors_of_polars(log, f"not every row is {layout.n_fields} numbers", remedy):
+        try:
             polars.scan_csv(
                 log,
                 has_header=False,
@@ -150,19 +153,11 @@ def _convert(log: Path, layout: Layout, target: Path) -> None:
                 null_values=[word for word in MISSING if word],
                 encoding="utf8",
             ).select(names[: layout.n_fields]).sink_parquet(target, compression="lz4")
-    except polars.exceptions.PolarsError as error:
-        raise ReadError(
-            f"{log}: not every row is {layout.n_fields} numbers ({_said(error)}); repair it, or read the log whole "
-            "(without --stream), which says which rows."
-        ) from None
-    except OSError as error:
-        raise ReadError(
-            f"{log}: there is no room to make a table of it in {target.parent} ({error.strerror or error}); set TMPDIR."
-        ) from None
-
-
-def _said(error: Exception) -> str:
-    return str(error).splitlines()[0].split(". ")[0][:120]
+        except OSError as error:
+            raise ReadError(
+                f"{log}: there is no room to make a table of it in {target.parent} ({error.strerror or error}); set "
+                "TMPDIR."
+            ) from None
 
 
 ROWS = 1 << 18
@@ -203,18 +198,11 @@ class ChunkedLog:
             return part if picked == list(range(part.shape[1])) else np.ascontiguousarray(part[:, picked])
         import polars
 
-        try:
-            with panics_unprinted():
-                table = polars.scan_parquet(self.path if self.table is None else self.table.path)
-                names = table.collect_schema().names()
-                wanted = table.select([names[c] for c in self.columns])
-                part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
-        except polars.exceptions.PanicException:
-            raise ReadError(f"{self.path}: this Parquet file is damaged.") from None
-        except polars.exceptions.PolarsError as error:
-            raise ReadError(f"{self.path}: this Parquet file is damaged ({str(error).splitlines()[0]}).") from None
-        except OSError as error:
-            raise from_os_error(self.path, error) from None
+        with errors_of_polars(self.path, "this Parquet file is damaged"):
+            table = polars.scan_parquet(self.path if self.table is None else self.table.path)
+            names = table.collect_schema().names()
+            wanted = table.select([names[c] for c in self.columns])
+            part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
         if len(part) < stop - start or part.dtype.kind not in "iuf":
             raise ReadError(
                 f"{self.path}: rows {start} to {stop} of this Parquet file are not all numbers; write it again."
@@ -246,15 +234,10 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
 
         refuse_after_fork(path)
         text = None if magic[:4] == b"PAR1" else TextOnDisk(path)
-        try:
-            with panics_unprinted():
-                table = polars.scan_parquet(path if text is None else text.path)
-                n_rows = int(table.select(polars.len()).collect().item())
-                n_columns = len(table.collect_schema())
-        except polars.exceptions.PanicException:
-            raise ReadError(f"{path}: this Parquet file's description of itself is damaged.") from None
-        except polars.exceptions.PolarsError as error:
-            raise ReadError(f"{path}: this Parquet file is damaged ({str(error).splitlines()[0]}).") from None
+        with errors_of_polars(path, "this Parquet file is damaged"):
+            table = polars.scan_parquet(path if text is None else text.path)
+            n_rows = int(table.select(polars.len()).collect().item())
+            n_columns = len(table.collect_schema())
     words = [word.strip().lower() for word in columns.split(",")]
     if len(words) != n_columns:
         raise ReadError(f"{path}: --columns names {len(words)} columns, the file has {n_columns}; '-' leaves one out.")

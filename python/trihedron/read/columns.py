@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -26,6 +26,9 @@ _ALIASES = {
     **{"counter": "counter", "n": "counter", "seq": "counter", "device": "device"},
 }
 _SKIP = {"-", "_", "skip", ""}
+_SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+_SINGLE = ("time", "temperature", "supply", "counter", "device")
+"""Roles of one column."""
 _BY_PLACE = (3, 4, 6, 7)
 """Numbers of columns for which the order is known without names."""
 
@@ -48,10 +51,15 @@ class Columns:
     positional: bool = False
     findings: tuple[Finding, ...] = field(default=())
 
+    @property
+    def readings(self) -> tuple[int, ...]:
+        """Columns of both sensors."""
+        return (*(self.accelerometer or ()), *(self.gyroscope or ()))
+
     def used(self) -> set[int]:
         """Columns that are not auxiliary."""
-        single = {c for c in (self.time, self.nanoseconds, self.temperature, self.supply) if c is not None}
-        return single | set(self.accelerometer or ()) | set(self.gyroscope or ())
+        single = (self.time, self.nanoseconds, self.temperature, self.supply)
+        return {column for column in (*single, *self.readings) if column is not None}
 
 
 def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Columns:
@@ -71,8 +79,7 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     elif table.names is not None:
         chosen = _named(table, sensor)
         if explicit is not None:
-            roles = ("time", "temperature", "supply", "counter", "device")
-            said = {role: column for role in roles if (column := getattr(explicit, role)) is not None}
+            said = {role: column for role in _SINGLE if (column := getattr(explicit, role)) is not None}
             unit = chosen.time_unit if explicit.time is None else explicit.time_unit
             chosen = replace(chosen, **said, time_unit=unit)
     else:
@@ -89,17 +96,24 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     return chosen
 
 
+def columns_or_none(table: Table) -> Columns | None:
+    """Roles of the columns of a table; None where no sensor is recognised."""
+    try:
+        return find_columns(table, None, None)
+    except ReadError:
+        return None
+
+
 def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
     """Complete ``chosen``: units from the preamble where names state none; clock columns from the format where the
     user names no other."""
     said = table.clock
+    is_unstated = chosen.time_unit in ("", TICKS)
     chosen = replace(
         chosen,
         accelerometer_unit=chosen.accelerometer_unit or table.metadata.get("accelerometer unit", ""),
         gyroscope_unit=chosen.gyroscope_unit or table.metadata.get("gyroscope unit", ""),
-        time_unit=table.metadata.get("time unit", chosen.time_unit)
-        if chosen.time_unit in ("", TICKS)
-        else chosen.time_unit,
+        time_unit=table.metadata.get("time unit", chosen.time_unit) if is_unstated else chosen.time_unit,
     )
     if said.counter is not None:
         chosen = replace(chosen, counter=said.counter)
@@ -133,36 +147,21 @@ def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
         if role in roles:
             raise ReadError(f"--columns: {role} is given twice; give each role once.")
         roles[role] = _column_number(table, column_text.strip(), role)
-    triads: dict[str, Triad | None] = {}
-    units: dict[str, str] = {}
-    for name, letter in (("accelerometer", "a"), ("gyroscope", "g")):
-        axes = [roles.get(f"{letter}{axis}") for axis in "xyz"]
-        given = [axis for axis in axes if axis is not None]
-        if given and len(given) < 3:
-            missing = " ".join(f"{letter}{n}" for n, axis in zip("xyz", axes, strict=True) if axis is None)
-            raise ReadError(f"--columns: the {name} needs three columns; {missing} is missing.")
-        triads[name] = (given[0], given[1], given[2]) if given else None
-        units[name] = _unit_from_name(table, given[0] if given else None, name)
+    found: dict[str, Any] = {role: roles.get(role) for role in _SINGLE}
+    named = [parse_name(name) for name in table.names or [""] * len(table.columns)]
+    for sensor_name in _SENSORS:
+        axes = {f"{sensor_name[0]}{axis}": roles.get(f"{sensor_name[0]}{axis}") for axis in "xyz"}
+        given = tuple(column for column in axes.values() if column is not None)
+        if not given:
+            continue
+        if len(given) < 3:
+            missing = " ".join(axis for axis, column in axes.items() if column is None)
+            raise ReadError(f"--columns: the {sensor_name} needs three columns; {missing} is missing.")
+        found[sensor_name] = given
+        first = named[given[0]]
+        found[f"{sensor_name}_unit"] = first.unit if first.role == sensor_name else ""
     time = roles.get("time")
-    return Columns(
-        time=time,
-        accelerometer=triads["accelerometer"],
-        gyroscope=triads["gyroscope"],
-        temperature=roles.get("temperature"),
-        supply=roles.get("supply"),
-        counter=roles.get("counter"),
-        device=roles.get("device"),
-        accelerometer_unit=units["accelerometer"],
-        gyroscope_unit=units["gyroscope"],
-        time_unit=parse_name(table.names[time]).time_unit if table.names and time is not None else "",
-    )
-
-
-def _unit_from_name(table: Table, column: int | None, sensor: str) -> str:
-    if table.names is None or column is None:
-        return ""
-    parsed = parse_name(table.names[column])
-    return parsed.unit if parsed.role == sensor else ""
+    return Columns(**found, time_unit="" if time is None else named[time].time_unit)
 
 
 def _column_number(table: Table, text: str, role: str) -> int:
@@ -171,11 +170,9 @@ def _column_number(table: Table, text: str, role: str) -> int:
         if exact:
             return exact[0]
     if re.fullmatch(r"\d+", text) and 1 <= int(text) <= len(table.columns):
-        number = int(text) - 1
-    else:
-        listed = ", ".join(table.names)[:300] if table.names else f"1 to {len(table.columns)}"
-        raise ReadError(f"{table.path}: there is no column '{text}' for {role}; the columns are {listed}.")
-    return number
+        return int(text) - 1
+    listed = ", ".join(table.names)[:300] if table.names else f"1 to {len(table.columns)}"
+    raise ReadError(f"{table.path}: there is no column '{text}' for {role}; the columns are {listed}.")
 
 
 def _positional(table: Table, sensor: Sensor | None) -> Columns:
@@ -185,22 +182,19 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
     while filled and len(filled) not in _BY_PLACE and not np.isfinite(table.columns[filled[-1]]).any():
         filled.pop()
     n = len(filled)
-    if n in (3, 4):
-        time = filled[0] if n == 4 else None
-        triad = (filled[-3], filled[-2], filled[-1])
-        if sensor == "gyroscope":
-            return Columns(time=time, gyroscope=triad, positional=True)
-        assumed = () if sensor else (Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n),)
-        return Columns(time=time, accelerometer=triad, positional=True, findings=assumed)
-    if n in (6, 7):
-        at = n - 6
-        first: Triad = (filled[at], filled[at + 1], filled[at + 2])
-        second: Triad = (filled[at + 3], filled[at + 4], filled[at + 5])
-        return Columns(time=filled[0] if at else None, accelerometer=first, gyroscope=second, positional=True)
-    raise ReadError(
-        f"{table.path}: {n} columns without names could mean anything; "
-        "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
-    )
+    if n not in _BY_PLACE:
+        raise ReadError(
+            f"{table.path}: {n} columns without names could mean anything; "
+            "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
+        )
+    x, y, z, *others = filled[n % 3 :]
+    found = Columns(time=filled[0] if n % 3 else None, accelerometer=(x, y, z), positional=True)
+    if others:
+        return replace(found, gyroscope=(others[0], others[1], others[2]))
+    if sensor == "gyroscope":
+        return replace(found, accelerometer=None, gyroscope=(x, y, z))
+    assumed = () if sensor else (Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n),)
+    return replace(found, findings=assumed)
 
 
 def _named(table: Table, sensor: Sensor | None) -> Columns:
@@ -212,7 +206,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     notes: list[Finding] = []
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
-    for role in ("accelerometer", "gyroscope"):
+    for role in _SENSORS:
         groups = _triads(parsed, role)
         triads[role], units[role] = _choose(table, parsed, groups, role, notes)
     if triads["accelerometer"] is None and triads["gyroscope"] is not None:
@@ -221,23 +215,19 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
             triads["accelerometer"] = tilt[0]
     own_time: int | None = None
     unnamed = sum(1 for i, name in enumerate(table.names) if not name and len(table.columns[i]))
-    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in _BY_PLACE:
+    if not any(triads.values()) and unnamed in _BY_PLACE:
         by_place = _positional(table, sensor)
         triads = {"accelerometer": by_place.accelerometer, "gyroscope": by_place.gyroscope}
         own_time = by_place.time
         notes += by_place.findings
     bare = _triads(parsed, "bare")
-    if bare and triads["accelerometer"] is None and triads["gyroscope"] is None:
+    if bare and not any(triads.values()):
         name = parsed[bare[0][0]]
-        by_unit: Sensor | None = (
-            "gyroscope" if name.unit_for("gyroscope") and not name.unit_for("accelerometer") else None
-        )
-        if by_unit is None and name.unit_for("accelerometer") and not name.unit_for("gyroscope"):
-            by_unit = "accelerometer"
-        told = sensor or sensor_of_file_name(table.path.name) or by_unit
+        by_unit: list[Sensor] = [one for one in _SENSORS if name.unit_for(one)]
+        told = sensor or sensor_of_file_name(table.path.name) or (by_unit[0] if len(by_unit) == 1 else None)
         guess: Sensor = told or "accelerometer"
         triads[guess] = bare[0]
-        units[guess] = parsed[bare[0][0]].unit_for(guess)
+        units[guess] = name.unit_for(guess)
         if told is None:
             notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
     # A program may write an empty column for a clock that it does not have.
@@ -247,12 +237,9 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         time = own_time  # the device's clock, not that of the receiving program
     first = {role: next((i for i, p in enumerate(parsed) if p.role == role), None) for role in _SINGLE}
     return Columns(
-        time=time,
+        **{**first, "time": time},
         accelerometer=triads["accelerometer"],
         gyroscope=triads["gyroscope"],
-        temperature=first["temperature"],
-        supply=first["supply"],
-        counter=first["counter"],
         nanoseconds=_nanoseconds_beside(table.names, time),
         accelerometer_unit=units["accelerometer"],
         gyroscope_unit=units["gyroscope"],
@@ -286,16 +273,11 @@ def _nanoseconds_beside(names: tuple[str, ...], time: int | None) -> int | None:
     return next((i for i, name in enumerate(plain) if name in wanted), None)
 
 
-_SENSORS = ("accelerometer", "gyroscope")
-_SINGLE = ("temperature", "supply", "counter")
-
-
 def sensor_of_file_name(name: str) -> Sensor | None:
     """The sensor that a file's name contains; None where it contains both or neither."""
     lower = name.lower()
-    says_acc = bool(re.search(r"acc", lower))
-    says_gyro = bool(re.search(r"gyr|angular|omega|rotationrate", lower))
-    if says_acc == says_gyro:
+    says_acc, says_gyro = (re.search(words, lower) for words in ("acc", "gyr|angular|omega|rotationrate"))
+    if bool(says_acc) == bool(says_gyro):
         return None
     return "accelerometer" if says_acc else "gyroscope"
 
@@ -327,3 +309,33 @@ def _choose(
         listed = [" ".join(table.label(c) for c in triad) for triad in others[:4]]
         notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "one-of-several", sensor=role, taken=taken, others=listed))
     return best, parsed[best[0]].unit
+
+
+# The roles of a table's columns, as a finding and as the value of --columns.
+
+
+def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
+    """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
+    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
+    time = [] if columns.time is None else [f"time={columns.time + 1}"]
+    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
+    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+
+
+def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
+    """The finding that states the role of each column, and the columns without a role."""
+    roles = []
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+        value = getattr(columns, role)
+        if value is not None:
+            which = value if isinstance(value, tuple) else (value,)
+            roles.append((role, " ".join(table.label(c) for c in which)))
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    return Finding.of(
+        FindingCode.COLUMNS_RECOGNISED,
+        has_file=bool(file_name),
+        file=file_name,
+        roles=roles,
+        has_rest=bool(rest),
+        rest=rest[:24],
+    )

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import unwrap
+from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
@@ -82,29 +83,10 @@ MAX_ROWS = 50_000
 LONGEST_BURST = 256
 """Largest displacement of rows against time order where several devices write in bursts."""
 _DEVICE_NAMES = frozenset(
-    {
-        "i",
-        "addr",
-        "src",
-        "ch",
-        "channel",
-        "port",
-        "bus",
-        "slot",
-        "dev",
-        "instance",
-        "imu",
-        "imuid",
-        "imunr",
-        "imunumber",
-        "id",
-        "device",
-        "deviceid",
-        "devicename",
-        "devicenr",
-    }
-    | {"sensor", "sensorid", "sensorname", "unit", "unitid", "node", "nodeid", "mac", "macaddress", "address"}
-    | {"source", "topic", "topicname", "frameid", "headerframeid"}
+    {"i", "addr", "src", "ch", "channel", "port", "bus", "slot", "dev", "instance", "imu", "imuid", "imunr"}
+    | {"imunumber", "id", "device", "deviceid", "devicename", "devicenr", "sensor", "sensorid", "sensorname", "unit"}
+    | {"unitid", "node", "nodeid", "mac", "macaddress", "address", "source", "topic", "topicname", "frameid"}
+    | {"headerframeid"}
 )
 _ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
 _GYROSCOPE = re.compile(
@@ -124,7 +106,7 @@ class Choice:
     instance: str | None = None
 
 
-def kind_of(word: str) -> str:
+def _kind_of(word: str) -> str:
     """The sensor of records of this name: ``accelerometer``, ``gyroscope`` or "" for neither."""
     text = word.strip().replace("_", " ").strip("$:")
     if _ACCELEROMETER.fullmatch(text):
@@ -134,35 +116,30 @@ def kind_of(word: str) -> str:
 
 def pick_kind(words: list[str], kind: str) -> str | None:
     """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
-    fitting = [word for word in words if kind_of(word) == kind]
+    fitting = [word for word in words if _kind_of(word) == kind]
     letters = [word.strip("$:").lower() for word in words]
     if not fitting and set(letters) <= _LETTERS.keys():
         fitting = [word for word, letter in zip(words, letters, strict=True) if _LETTERS[letter] == kind]
     return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
 
 
-def one_device(
-    table: Table,
-    choice: Choice,
-    used: set[int],
-    device: int | None = None,
-    readings: tuple[int, ...] = (),
-    time: int | None = None,
-) -> Table:
+def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
     """The rows of one device, where a column identifies several.
 
-    The column is ``device``, or one not ``used`` that is recognised by its name, or because its codes alternate as the
-    ``readings`` do (in order of ``time`` if there is one). Alternating devices without such a column are a serious
-    finding; ``--instance 1`` then takes the first row of each turn.
+    The column is that of role ``device``, or one without a role that is recognised by its name, or because its codes
+    alternate as the readings do (in order of time if there is one). Alternating devices without such a column are a
+    serious finding; ``--instance 1`` then takes the first row of each turn.
 
     Raises
     ------
     ReadError
         When there are several devices and none is chosen, or the chosen one does not exist.
     """
-    column, words, codes = _device_column(table, used if device is None else set(), device)
+    used, time = chosen_columns.used(), chosen_columns.time
+    column, words, codes = _device_column(table, used, chosen_columns.device)
     order = _in_time(table, time, MAX_ROWS)
-    if column < 0 and (n := _n_in_turn(table, readings, order)) > 1:
+    readings = [table.columns[i][order] for i in chosen_columns.readings if len(table.columns[i])]
+    if column < 0 and readings and (n := n_interleaved(np.stack(readings, axis=1))) > 1:
         column, words, codes = _device_column(
             table, used, None, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5)
         )
@@ -225,11 +202,6 @@ def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]
     return order if np.abs(order - as_they_stand).max(initial=0) <= LONGEST_BURST else as_they_stand
 
 
-def _n_in_turn(table: Table, readings: tuple[int, ...], order: npt.NDArray[np.int64]) -> int:
-    columns = [table.columns[i][order] for i in readings if len(table.columns[i])]
-    return n_interleaved(np.stack(columns, axis=1)) if columns else 1
-
-
 def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
     """Every n-th row, if the timestamps show that no device's row is missing."""
     if instance not in [str(k + 1) for k in range(n)]:
@@ -254,28 +226,19 @@ def _device_column(
 ) -> tuple[int, list[str], npt.NDArray[np.int64]]:
     """Column, words and codes (n,) of the device column: ``only``, or the first whose codes pass ``fits``, or the
     first whose name means device."""
-    none = np.zeros(0, dtype=np.int64)
     for i in range(len(table.columns)) if only is None else (only,):
         name = table.names[i] if table.names is not None else ""
         plain = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
-        if i in used or (only is None and fits is None and plain not in _DEVICE_NAMES):
+        if only is None and (i in used or (fits is None and plain not in _DEVICE_NAMES)):
             continue
-        if i in table.labels:
-            words, codes = table.labels[i]
-            present, inverse = np.unique(codes, return_inverse=True)
-            if 2 <= len(present) <= MAX_DEVICES and (fits is None or fits(inverse)):
-                return i, [words[k] for k in present], inverse.astype(np.int64)
-            continue
-        values = table.columns[i]
-        if not len(values) or not np.isfinite(values).all() or not np.all(values == np.rint(values)):
-            continue
-        different = np.unique(values[: 1 << 16])
-        if len(different) > MAX_DEVICES:
+        words, values = table.labels.get(i, ((), table.columns[i]))
+        if not len(values) or not np.all(values == np.rint(values)) or len(np.unique(values[: 1 << 16])) > MAX_DEVICES:
             continue
         different, codes = np.unique(values, return_inverse=True)
-        if 2 <= len(different) <= MAX_DEVICES and (fits is None or fits(codes)):
-            return i, [f"{value:.0f}" for value in different], codes.astype(np.int64)
-    return -1, [], none
+        if 2 <= len(different) <= MAX_DEVICES and np.isfinite(different).all() and (fits is None or fits(codes)):
+            names = [words[int(k)] for k in different] if words else [f"{value:.0f}" for value in different]
+            return i, names, codes.astype(np.int64)
+    return -1, [], np.zeros(0, dtype=np.int64)
 
 
 def by_sensor(table: Table) -> tuple[Table, ...]:
@@ -292,10 +255,7 @@ def by_sensor(table: Table) -> tuple[Table, ...]:
         counts = phrase("counted", words=[(word, np.count_nonzero(codes == k)) for k, word in enumerate(words)])
         both = phrase("both", one=acc, other=gyr)
         note = chosen(phrase("column", column=table.label(i)), both, counts, left)
-        reported = table.n_in_file - table.n_rows
-        first = table.take(rows[acc], len(rows[acc]) + left + reported, note)
-        second = replace(table.take(rows[gyr], len(rows[gyr])), findings=())
-        return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
+        return table.by_sensor(rows[acc], rows[gyr], left, note)
     return (table,)
 
 

@@ -43,6 +43,27 @@ class ReadError(RefusedError):
     """A file that cannot become a recording. The message is one sentence: which file, which line, what to do."""
 
 
+@contextmanager
+def errors_of_polars(path: Path, damage: str, remedy: str = "") -> Iterator[None]:
+    """Convert errors and panics of polars, and of the system, to a :class:`ReadError` that states ``damage``."""
+    import polars
+
+    try:
+        with panics_unprinted():
+            yield
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except polars.exceptions.PanicException:
+        raise ReadError(f"{path}: {damage}{remedy}.") from None
+    except polars.exceptions.PolarsError as error:
+        raise ReadError(f"{path}: {damage} ({first_line(error)}){remedy}.") from None
+
+
+def first_line(error: BaseException) -> str:
+    """The first line of a library's error message, at most 160 characters."""
+    return (str(error).strip().split("\n")[0] or type(error).__name__)[:160]
+
+
 def from_os_error(path: Path, error: OSError) -> ReadError:
     """The operating system's error as a :class:`ReadError` with advice."""
     if isinstance(error, FileNotFoundError):

@@ -56,11 +56,8 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
         gyroscope_rows=len(rows[1]),
         rows_left_out=left,
     )
-    table = _without_counter(table, chosen.counter)
-    reported = table.n_in_file - table.n_rows
-    first = _filled(table.take(rows[0], len(rows[0]) + left + reported, note))
-    second = _filled(replace(table.take(rows[1], len(rows[1])), findings=()))
-    return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
+    first, second = _without_counter(table, chosen.counter).by_sensor(rows[0], rows[1], left, note)
+    return _filled(first), _filled(second)
 
 
 def _has_reading(table: Table, triad: Triad, most: int | None) -> npt.NDArray[np.bool_]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.quiet import is_integer
 from trihedron.read.clock.rate import mean_rate_hz
-from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.sensing import WHOLE
 from trihedron.read.sensors import Sensors, settled
@@ -52,31 +51,25 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     seen = {(f.code, f.seen) for f in accelerometer.findings}
     extra = [f for f in gyroscope.findings if (f.code, f.seen) not in seen]
     kept = slice(merged.first, merged.first + len(merged.time_s))
-    return Sensors(
-        merged.time_s,
-        merged.start_s,
-        merged.accelerometer,
-        merged.gyroscope,
-        base.table,
-        Columns(
-            time=base.columns.time,
-            accelerometer=accelerometer.columns.accelerometer if base is accelerometer else None,
-            gyroscope=gyroscope.columns.gyroscope if base is gyroscope else None,
-            temperature=base.columns.temperature,
-            supply=base.columns.supply,
-            counter=base.columns.counter,
+    return replace(
+        base,
+        time_s=merged.time_s,
+        start_s=merged.start_s,
+        accelerometer=merged.accelerometer,
+        gyroscope=merged.gyroscope,
+        columns=replace(
+            base.columns,
+            accelerometer=base.columns.accelerometer if base is accelerometer else None,
+            gyroscope=base.columns.gyroscope if base is gyroscope else None,
             accelerometer_unit=_unit_before(accelerometer.columns.accelerometer_unit, accelerometer.accelerometer),
         ),
-        base.rows,
-        merged.first,
-        base.has_clock,
-        _unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
-        base.sampling,
-        None if base.lost_behind is None else base.lost_behind[kept][: len(merged.time_s) - 1],
-        None if base.timestamps_s is None else base.timestamps_s[kept],
-        (*accelerometer.findings, *extra, *merged.findings),
-        accelerometer.rows_in_file + gyroscope.rows_in_file,
-        accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,
+        offset=merged.first,
+        gyroscope_unit=_unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
+        lost_behind=None if base.lost_behind is None else base.lost_behind[kept][: len(merged.time_s) - 1],
+        timestamps_s=None if base.timestamps_s is None else base.timestamps_s[kept],
+        findings=(*accelerometer.findings, *extra, *merged.findings),
+        rows_in_file=accelerometer.rows_in_file + gyroscope.rows_in_file,
+        rows_read=accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,
     )
 
 
@@ -100,7 +93,6 @@ class Merged:
     gyroscope: FloatArray
     base: str
     first: int
-    stop: int
     findings: tuple[Finding, ...]
     rows_left_out: int = 0
 
@@ -162,63 +154,40 @@ def merge(
         )
     if len(acc_t) == len(gyr_t) and np.array_equal(acc_t, gyr_t):
         note = Finding.of(FindingCode.CLOCKS_MERGED, "same-timestamps")
-        return Merged(
-            accelerometer_s, accelerometer_start_s, accelerometer, gyroscope, "accelerometer", 0, len(acc_t), (note,)
-        )
-    acc_rate, gyr_rate = mean_rate_hz(acc_t), mean_rate_hz(gyr_t)
-    base = "gyroscope" if gyr_rate > FASTER * acc_rate else "accelerometer"
-    base_t, other_t = (acc_t, gyr_t) if base == "accelerometer" else (gyr_t, acc_t)
-    base_v, other_v = (accelerometer, gyroscope) if base == "accelerometer" else (gyroscope, accelerometer)
-    other_rate = gyr_rate if base == "accelerometer" else acc_rate
-    tolerance = SAME_TICK / other_rate
-    first = int(np.searchsorted(base_t, other_t[0] - tolerance))
-    stop = int(np.searchsorted(base_t, other_t[-1] + tolerance, side="right"))
+        return Merged(accelerometer_s, accelerometer_start_s, accelerometer, gyroscope, "accelerometer", 0, (note,))
+    rates = {"accelerometer": mean_rate_hz(acc_t), "gyroscope": mean_rate_hz(gyr_t)}
+    sensors = {"accelerometer": (acc_t, accelerometer), "gyroscope": (gyr_t, gyroscope)}
+    acc_rate, gyr_rate = rates.values()
+    base, other = ("gyroscope", "accelerometer") if gyr_rate > FASTER * acc_rate else ("accelerometer", "gyroscope")
+    (base_t, base_v), (other_t, other_v), step = sensors[base], sensors[other], 1.0 / rates[other]
+    first = int(np.searchsorted(base_t, other_t[0] - SAME_TICK * step))
+    stop = int(np.searchsorted(base_t, other_t[-1] + SAME_TICK * step, side="right"))
     if stop - first < 2:
         raise ReadError(
             f"{where}: the two clocks overlap in fewer than two samples; log both sensors at the same time."
         )
     kept_t, kept_v = base_t[first:stop], base_v[first:stop]
-    brought, factor = resample(other_t, kept_t, other_v, 1.0 / other_rate)
-    lost = ~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1)
-    n_cut = len(base_t) - len(kept_t)
-    step = 1.0 / other_rate
-    n_beyond = int(np.count_nonzero((other_t < kept_t[0] - step) | (other_t > kept_t[-1] + step)))
-    finding = _statement(base, acc_t, gyr_t, acc_rate, gyr_rate, factor, n_cut, n_beyond, int(lost.sum()))
-    acc, gyr = (kept_v, brought) if base == "accelerometer" else (brought, kept_v)
-    start_s = float(kept_t[0])
-    return Merged(kept_t - start_s, start_s, acc, gyr, base, first, stop, (finding,), n_cut + n_beyond)
-
-
-def _statement(
-    base: str,
-    acc_t: FloatArray,
-    gyr_t: FloatArray,
-    acc_rate: float,
-    gyr_rate: float,
-    factor: FloatArray,
-    n_cut: int,
-    n_beyond: int,
-    n_lost: int,
-) -> Finding:
-    other = "gyro" if base == "accelerometer" else "accelerometer"
-    same = float(np.mean(factor == 1.0))
+    brought, factor = resample(other_t, kept_t, other_v, step)
     variance = float(np.nanmean(factor))
-    own, brought_rate = (acc_rate, gyr_rate) if base == "accelerometer" else (gyr_rate, acc_rate)
-    coloured = variance < FAITHFUL or brought_rate < own / FASTER
-    return Finding.of(
+    n_cut = len(base_t) - len(kept_t)
+    n_beyond = int(np.count_nonzero((other_t < kept_t[0] - step) | (other_t > kept_t[-1] + step)))
+    finding = Finding.of(
         FindingCode.CLOCKS_MERGED,
         severity=Severity.WARNING if base == "gyroscope" or variance < QUIETER else Severity.NOTE,
         accelerometer_rate_hz=acc_rate,
         gyroscope_rate_hz=gyr_rate,
         offset_s=gyr_t[0] - acc_t[0],
         base=base.replace("gyroscope", "gyro"),
-        other=other,
-        same_tick_fraction=same,
+        other=other.replace("gyroscope", "gyro"),
+        same_tick_fraction=float(np.mean(factor == 1.0)),
         variance_factor=variance,
         cut_rows=n_cut,
         beyond_rows=n_beyond,
-        lost_rows=n_lost,
-        is_coloured=coloured,
+        lost_rows=int(np.sum(~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1))),
+        is_coloured=variance < FAITHFUL or rates[other] < rates[base] / FASTER,
         rate_ratio=gyr_rate / acc_rate,
         rows_left_out=n_cut + n_beyond,
     )
+    acc, gyr = (kept_v, brought) if base == "accelerometer" else (brought, kept_v)
+    start_s = float(kept_t[0])
+    return Merged(kept_t - start_s, start_s, acc, gyr, base, first, (finding,), n_cut + n_beyond)

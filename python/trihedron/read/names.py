@@ -42,25 +42,9 @@ _COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
 """Words for counts; mg/LSB is the LSB, not a unit of the readings."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
 """Names of angular rates in aeronautics, and their axes."""
-_TIME_WORDS = {
-    "t",
-    "time",
-    "epoc",
-    "chiptime",
-    "timestamp",
-    "timestamps",
-    "ts",
-    "stamp",
-    "elapsed",
-    "epoch",
-    "clock",
-    "when",
-    "datetime",
-    "uptime",
-    # The clock of GNSS receivers.
-    "tow",
-    "itow",
-}
+# The last two are the clock of GNSS receivers.
+_TIME_WORDS = {"t", "time", "epoc", "chiptime", "timestamp", "timestamps", "ts", "stamp", "elapsed", "epoch", "clock"}
+_TIME_WORDS |= {"when", "datetime", "uptime", "tow", "itow"}
 _TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
 """Words for a counter of ticks whose frequency is not stated."""
 _TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
@@ -71,17 +55,16 @@ _OF_RATES = {"sampling", "sample", "sensor", "output", "data", "update", "log", 
 """Words that may accompany the word for a rate; others mean another rate, such as a baud rate or an i2c frequency."""
 _OF_CLOCKS = {"1", "unit", "units", "resolution", "size", "period", "frequency"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
-_TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
+_TEMPERATURE = re.compile(r"temp\w{0,4}|temperature\w*")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
-_TIME_UNITS = {
-    "s": ["s", "sec", "secs", "second", "seconds", "stime"],
-    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime", "cts"],
-    "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond", "ustime"],
-    "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec", "nstime"],
-}
-_TIME_UNIT_OF = {word: unit for unit, words in _TIME_UNITS.items() for word in words}
 _UNITS = {
+    "time": {
+        "s": "s sec secs second seconds stime",
+        "ms": "ms msec msecs millis milliseconds millisecond mstime cts",
+        "us": "us µs usec micros microseconds microsecond ustime",
+        "ns": "ns nsec nanos nanoseconds nanosecond nanosec nstime",
+    },
     "accelerometer": {
         "m/s^2": "si ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
         "g": "g g0 gn gs gee gees",
@@ -104,6 +87,13 @@ _UNITS = {
 _UNIT_OF = {
     sensor: {word: unit for unit, words in table.items() for word in words.split()} for sensor, table in _UNITS.items()
 }
+_TIME_UNIT_OF = _UNIT_OF.pop("time")
+_RANKS = (
+    ({"measured", "raw", "uncalibrated", "uncalib", "uncal", "unbiased"}, 2),
+    ({"unfilt", "unfiltered"}, 1),
+    ({"user", "free", "linear", "linacc", "filtered", "lp", "smooth", "output"}, -2),
+)
+"""Words by which one of several triads is preferred: uncorrected readings, and those with gravity."""
 
 
 @dataclass(frozen=True)
@@ -278,13 +268,7 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
             return ColumnName("bare" if not rest else "", axis, key, words=tuple(unit_words))
         return ColumnName("bare", axis, key, words=tuple(rest + unit_words)) if _unit_words_only(rest) else ColumnName()
     unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
-    rank = 0
-    if any(w in {"measured", "raw", "uncalibrated", "uncalib", "uncal", "unbiased"} for w in rest):
-        rank += 2
-    if "unfilt" in rest or "unfiltered" in rest:
-        rank += 1
-    if any(w in {"user", "free", "linear", "linacc", "filtered", "lp", "smooth", "output"} for w in rest):
-        rank -= 2
+    rank = sum(points for known, points in _RANKS if not known.isdisjoint(rest))
     return ColumnName(sensor, axis, key, unit, rank=rank, words=tuple(left + unit_words))
 
 
@@ -313,11 +297,8 @@ def _sensor(words: list[str]) -> str:
 
 def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     joined = "".join(words)
-    if words[0] in {"temp", "temperature", "tempc"} or any(
-        _TEMPERATURE.fullmatch(w) and w not in _TIME_WORDS for w in words
-    ):
-        return ColumnName("temperature", words=tuple(words))
-    if words == ["t"] and set(unit_words) & {"°", "c", "°c", "degc", "k"}:
+    is_warmth = words == ["t"] and set(unit_words) & {"°", "c", "°c", "degc", "k"}
+    if is_warmth or any(_TEMPERATURE.fullmatch(w) for w in words):
         return ColumnName("temperature", words=tuple(words))
     if any(w in _SUPPLY for w in words):
         if "mv" in unit_words:
@@ -334,13 +315,13 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
         words[-1] in _COUNTER_WORDS and len(words) <= 2
     ):
         return ColumnName("counter")
-    is_time = words[0] in _TIME_WORDS or (len(words) == 1 and words[0] in _TIME_UNIT_OF)
-    is_time = is_time or (words[-1] == "t" and all(_DEVICE_WORD.match(word) for word in words[:-1]))
-    is_time = is_time or any(
-        w in {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"} for w in words
+    is_time = (
+        words[0] in _TIME_WORDS
+        or (words[-1] == "t" and all(_DEVICE_WORD.match(word) for word in words[:-1]))
+        or not {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"}.isdisjoint(words)
+        or all(w in _TIME_WORDS or w in _TIME_UNIT_OF for w in words)
     )
-    is_time = is_time or all(w in _TIME_WORDS or w in _TIME_UNIT_OF for w in words)
-    if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
+    if is_time and {"x", "y", "z", "zone", "offset", "valid"}.isdisjoint(words):
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1
         if not units and {*words, joined} & _TICK_WORDS:

@@ -9,7 +9,7 @@ import polars as pl
 
 from trihedron.arrays import FloatArray
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error, panics_unprinted, refuse_after_fork
+from trihedron.read.errors import ReadError, errors_of_polars, refuse_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -18,21 +18,10 @@ from trihedron.records import Finding, FindingCode
 def read_parquet(path: Path) -> Table:
     """Numeric and time columns of a Parquet file; other columns are excluded with a finding."""
     refuse_after_fork(path)
-    try:
-        with panics_unprinted():
-            n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
-            schema = pl.read_parquet_schema(path)
-            check_memory(path, n_rows, len(schema))
-            frame = pl.read_parquet(path)
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except pl.exceptions.PanicException:
-        raise ReadError(f"{path}: this Parquet file's description of itself is damaged; write it again.") from None
-    except (pl.exceptions.PolarsError, ValueError) as error:
-        if isinstance(error, ReadError):
-            raise
-        first = str(error).strip().split("\n")[0][:160]
-        raise ReadError(f"{path}: this Parquet file is damaged or cut off ({first}); write it again.") from None
+    with errors_of_polars(path, "this Parquet file is damaged or cut off", "; write it again"):
+        n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
+        check_memory(path, n_rows, len(pl.read_parquet_schema(path)))
+        frame = pl.read_parquet(path)
     names: list[str] = []
     columns: list[FloatArray] = []
     findings: list[Finding] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +21,8 @@ from trihedron.read.audit.seam import audit_seam
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
-from trihedron.read.columns import Sensor
+from trihedron.read.columns import Sensor, Triad, mapping_of
 from trihedron.read.devices import Choice, by_sensor, one_beside
-from trihedron.read.digest import LateSha256, hexdigest
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
@@ -32,7 +32,6 @@ from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.read.turning import PARTS, turning_of
-from trihedron.read.unnamed_gyro import unnamed_gyro
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
@@ -78,13 +77,13 @@ def read_recording(
         else:
             sensors = of_tables(by_sensor(table_of(path)), None, options)
             source = "memory"
-        sha256: str | LateSha256 = sensors.table.sha256
+        sha256 = sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
         accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
         gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)
         sensors = merge_sensors(accelerometer, gyroscope)
         source = f"{accelerometer_path} + {gyroscope_path}"
-        sha256 = hexdigest(accelerometer.table.sha256, gyroscope.table.sha256)
+        sha256 = hashlib.sha256((accelerometer.table.sha256 + gyroscope.table.sha256).encode()).hexdigest()
     elif accelerometer_path is not None or gyroscope_path is not None:
         only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
         one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
@@ -137,7 +136,7 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
 def audited(
     sensors: Sensors,
     source: str,
-    sha256: str | LateSha256,
+    sha256: str,
     accelerometer_unit: str | AccelerationUnit | None,
     gyroscope_unit: str | RateUnit | None,
     progress: Progress | None,
@@ -146,7 +145,7 @@ def audited(
     sensors = settled(sensors)
     findings = list(sensors.findings)
     _accounted(sensors, findings)
-    time_s, table, n = sensors.time_s, sensors.table, len(sensors.time_s)
+    time_s = sensors.time_s
     rate = _rate_hz(sensors)
     present = {
         name: triad
@@ -161,27 +160,24 @@ def audited(
             sensors.accelerometer, windows, sensors.columns.accelerometer_unit, accelerometer_unit
         )
         acc_unit = AccelerationUnit(judged.unit)
-        findings += [*judged.findings, *unnamed_gyro(sensors, rate)]
+        findings += [*judged.findings, *_unnamed_gyro(sensors, rate)]
     if sensors.gyroscope is not None:
         judged = _judged_gyro(sensors, rate, windows, gyroscope_unit, extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     if sensors.has_clock:
-        findings += audit_timing(
-            time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.timestamps_s
-        )
-        findings += audit_pace(time_s if sensors.timestamps_s is None else sensors.timestamps_s, sensors)
+        findings += audit_timing(sensors, rate) + audit_pace(sensors)
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:
-        findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
+        findings += audit_counter(sensors.column(counter), sensors.table.label(counter), sensors.place)
     for done, (name, triad) in enumerate(present.items()):
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
         findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
         findings += audit_steps(name, facts.of(name), windows, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
-        progress(1.0, f"read {n} samples")
+        progress(1.0, f"read {len(time_s)} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
     for array in (time_s, *present.values()):
         array.setflags(write=False)
@@ -194,14 +190,14 @@ def audited(
         rate_hz=rate,
         accelerometer_unit=acc_unit,
         gyroscope_unit=gyr_unit,
-        temperature_degc=None if temperature is None else _kept(sensors, temperature, n),
-        supply_v=None if supply is None else _kept(sensors, supply, n),
+        temperature_degc=None if temperature is None else sensors.column(temperature),
+        supply_v=None if supply is None else sensors.column(supply),
         start_epoch_s=sensors.start_s,
         source=source,
-        sha256=hexdigest(sha256),
+        sha256=sha256,
         findings=tuple(findings),
         sampling=sensors.sampling,
-        auxiliary=MappingProxyType(_auxiliary(sensors, n)),
+        auxiliary=MappingProxyType(_auxiliary(sensors)),
         onboard=sensors.table.onboard,
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
@@ -255,14 +251,7 @@ def _rate_hz(sensors: Sensors) -> float:
     return mean_rate_hz(sensors.time_s)
 
 
-def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
-    values = sensors.table.columns[column]
-    if sensors.rows is not None:
-        values = values[sensors.rows]
-    return values[sensors.offset : sensors.offset + n]
-
-
-def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
+def _auxiliary(sensors: Sensors) -> dict[str, FloatArray]:
     used = sensors.columns.used()
     table = sensors.table
     out: dict[str, FloatArray] = {}
@@ -271,11 +260,50 @@ def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
             continue
         name = table.names[i] if table.names and table.names[i] else f"column {i + 1}"
         key = name if name not in out else f"{name} ({i + 1})"
-        kept = np.array(_kept(sensors, i, n))
-        kept.setflags(write=False)
-        out[key] = kept
+        out[key] = np.array(sensors.column(i))
     if sensors.timestamps_s is not None:
-        timestamps = np.array(sensors.timestamps_s)
-        timestamps.setflags(write=False)
-        out[TIMESTAMPS] = timestamps
+        out[TIMESTAMPS] = np.array(sensors.timestamps_s)
+    for values in out.values():
+        values.setflags(write=False)
+    return out
+
+
+# Columns without a role whose readings rotate as gravity does: a gyro with an unknown name.
+
+CLEAR_CORRELATION = 0.5
+"""Correlation of gravity's change with that predicted from three columns as rates: a gyro's is higher (0.74 for a hand
+that also accelerates), that of angles, fields and velocities below 0.1 (tests/test_read_unusual.py)."""
+FEWEST_PAIRS = 50
+"""Smallest number of blocks in motion, for which 0.5 is three and a half standard errors of a correlation."""
+
+
+def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
+    """A warning for each triad of columns with unknown names whose readings rotate as the accelerometer's gravity does.
+
+    Only where no gyro is recognised; gravity's change in blocks is compared with ``-ω × a`` (``turning_of``).
+    """
+    accelerometer, table, columns = sensors.accelerometer, sensors.table, sensors.columns
+    if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
+        return ()
+    found = []
+    for triad in _triads_of(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
+        rates = np.stack([sensors.column(column) for column in triad], axis=1)
+        turning = turning_of(accelerometer, rates, rate_hz)
+        if turning is None or turning.correlation <= CLEAR_CORRELATION or turning.n < FEWEST_PAIRS:
+            continue
+        mapping = mapping_of(columns, triad)
+        listed = " ".join(table.label(column) for column in triad)
+        found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
+    return tuple(found)
+
+
+def _triads_of(names: tuple[str, ...], taken: set[int]) -> list[Triad]:
+    """Triads of columns whose names differ only in one letter: x, y, z."""
+    left = {name.strip().lower(): i for i, name in enumerate(names) if i not in taken}
+    out: list[Triad] = []
+    for name, i in left.items():
+        for k in (k for k, letter in enumerate(name) if letter == "x"):
+            others = [left.get(f"{name[:k]}{axis}{name[k + 1 :]}") for axis in "yz"]
+            if others[0] is not None and others[1] is not None:
+                out.append((i, others[0], others[1]))
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, first_line
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding
 from trihedron.records.progress import Progress
@@ -90,11 +90,6 @@ def missing_extra(path: Path, what: str, package: str, extra: str) -> ReadError:
     return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install 'trihedron[{extra}]'.")
 
 
-def first_line(error: BaseException) -> str:
-    """The first line of a library's error message, at most 160 characters."""
-    return (str(error).strip().split("\n")[0] or type(error).__name__)[:160]
-
-
 _IMU = "sensor_msgs/msg/Imu"
 _NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))
 _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "received")
@@ -110,6 +105,7 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
     """
     try:
         from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise missing_extra(path, "a ROS bag or MCAP file", "rosbags", "ros") from None
     # rosbags recognises the format by the ending of the name, which may be another one.
@@ -119,7 +115,7 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
             named = Path(folder) / f"bag{suffix}"
             named.symlink_to(path.absolute())
         try:
-            with AnyReader([named], default_typestore=_typestore()) as reader:
+            with AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader:
                 return _tables(path, reader, choice, progress)
         except ReadError:
             raise
@@ -128,12 +124,6 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
             raise ReadError(
                 f"{path}: rosbags cannot read this bag ({first_line(error)}); reindex or copy it again."
             ) from None
-
-
-def _typestore() -> Any:
-    from rosbags.typesys import Stores, get_typestore
-
-    return get_typestore(Stores.LATEST)
 
 
 def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:
@@ -153,7 +143,7 @@ def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) 
     pair = _pair(streams) if choice.topic is None else None
     if pair is not None:
         acc, gyr = (_table(path, reader, s, streams, sha256, progress) for s in pair)
-        return _only(acc, "accelerometer", (5, 6, 7)), _only(gyr, "gyroscope", (2, 3, 4))
+        return _without(acc, "accelerometer", "angular"), _without(gyr, "gyroscope", "linear")
     return (_table(path, reader, pick(path, streams, choice, "this bag"), streams, sha256, progress),)
 
 
@@ -164,14 +154,11 @@ def _pair(streams: list[Stream]) -> tuple[Stream, Stream] | None:
     return (acc[0], gyr[0]) if len(acc) == len(gyr) == 1 and len([s for s in streams if s.count]) == 2 else None
 
 
-def _only(table: Table, sensor: Any, drop: tuple[int, ...]) -> Table:
-    from dataclasses import replace
-
-    keep = [i for i in range(len(table.columns)) if i not in drop]
-    names = table.names or ()
-    return replace(
-        table, sensor=sensor, names=tuple(names[i] for i in keep), columns=tuple(table.columns[i] for i in keep)
-    )
+def _without(table: Table, sensor: Any, dropped: str) -> Table:
+    """The table of one sensor, without the columns of the other."""
+    pairs = zip(table.names or (), table.columns, strict=True)
+    names, columns = zip(*(pair for pair in pairs if not pair[0].startswith(dropped)), strict=True)
+    return replace(table, sensor=sensor, names=names, columns=columns)
 
 
 def _table(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,10 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
-from trihedron.read.clock.rate import mean_rate_hz, steps_of
+from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
-from trihedron.read.clock.unit import TICKS, Witness, counts_rows
-from trihedron.read.column_statement import mapping_of, statement
-from trihedron.read.columns import Columns, Sensor, find_columns
+from trihedron.read.clock.unit import TICKS, counts_rows
+from trihedron.read.columns import Columns, Sensor, find_columns, mapping_of, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
@@ -76,6 +74,12 @@ class Sensors:
         at = sample + self.offset
         return int(self.rows[at]) if self.rows is not None else at
 
+    def column(self, number: int) -> FloatArray:
+        """(n,) one column of the table in the order of the samples; empty for words."""
+        values = self.table.columns[number]
+        values = values if self.rows is None or not len(values) else values[self.rows]
+        return values[self.offset : self.offset + len(self.time_s)]
+
     def place(self, sample: int) -> Words:
         """A sample's number, file line and time, for messages."""
         return words("sample", sample=sample, row=self.table.place(self.row(sample)), time_s=self.time_s[sample])
@@ -115,40 +119,22 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     """
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
-    table = (
-        table
-        if table.is_chosen
-        else one_device(
-            table,
-            options.choice,
-            chosen.used(),
-            chosen.device,
-            (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())),
-            chosen.time,
-        )
-    )
+    if not table.is_chosen:
+        table = one_device(table, options.choice, chosen)
     if table.n_rows < 2:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [
-        *table.findings,
-        *chosen.findings,
-        *(
-            Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
-            for i, example in table.words.items()
-        ),
-    ]
+    findings = [*table.findings, *chosen.findings]
+    for i, example in table.words.items():
+        left_out = Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
+        findings.append(left_out)
     if chosen.time is None:
         refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
     clock = _without_copies(table, chosen, clock, findings)
-    accelerometer = _triad(table, chosen.accelerometer, clock.rows)
-    gyroscope = _triad(table, chosen.gyroscope, clock.rows)
-    if sensor == "accelerometer":
-        gyroscope = None
-    elif sensor == "gyroscope":
-        accelerometer = None
+    accelerometer = None if sensor == "gyroscope" else _triad(table, chosen.accelerometer, clock.rows)
+    gyroscope = None if sensor == "accelerometer" else _triad(table, chosen.gyroscope, clock.rows)
     if accelerometer is None and gyroscope is None:
         raise ReadError(f"{path}: the {sensor} is not among its columns; the other sensor is: swap the two files.")
     if chosen.positional and accelerometer is not None and gyroscope is not None:
@@ -185,7 +171,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
 def _without_used(table: Table, chosen: Columns) -> Table:
     """The table without the columns that were copied to the time base, to save memory for a long log."""
     kept = {chosen.temperature, chosen.supply, chosen.counter}
-    done = {chosen.time, *(chosen.accelerometer or ()), *(chosen.gyroscope or ())} - kept
+    done = {chosen.time, *chosen.readings} - kept
     columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
     return replace(table, columns=columns, rows_in_file=table.n_in_file)
 
@@ -195,8 +181,7 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
     if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
-    used = (*(chosen.accelerometer or ()), *(chosen.gyroscope or ()))
-    drop = copied_rows([table.columns[column] for column in used], clock.time_s, rows)
+    drop = copied_rows([table.columns[column] for column in chosen.readings], clock.time_s, rows)
     if not len(drop) or len(clock.time_s) - len(drop) < FEWEST_ROWS:
         return clock
     findings.append(
@@ -212,27 +197,13 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
 
 
-def _witness(table: Table, chosen: Columns) -> Witness:
-    """Readings that limit the time between rows, in file order (the first part of a long log)."""
-    triad, temperature = chosen.accelerometer, chosen.temperature
-    if triad is None or any(len(table.columns[c]) == 0 for c in triad):
-        readings = None
-    else:
-        readings = np.stack([table.columns[c][:WITNESS_ROWS] for c in triad], axis=1)
-    return Witness(readings, None if temperature is None else table.columns[temperature])
-
-
 def settled(sensors: Sensors) -> Sensors:
     """The sensors on the clock that timestamps, counter and motion determine; unchanged if that is done already."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
     triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
-    n, counter = len(sensors.time_s), sensors.columns.counter
-    numbers = None
-    if counter is not None:
-        numbers = sensors.table.columns[counter]
-        numbers = numbers if sensors.rows is None else numbers[sensors.rows]
-        numbers = numbers[sensors.offset : sensors.offset + n] if len(numbers) else None
+    counter = sensors.columns.counter
+    numbers = None if counter is None else sensors.column(counter)
     found = settle_clock(sensors.time_s, sensors.start_s, triads, numbers)
     return replace(
         sensors,
@@ -257,53 +228,37 @@ def _stated_rate(table: Table) -> float | None:
 
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
+    is_given = options.rate_hz is not None
+    told = options.rate_hz if is_given else _stated_rate(table)
     if chosen.time is not None:
         named, given = chosen.time_unit, options.time_unit
-        told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
         if told is not None and given is None and named in {"", TICKS} and counts_rows(table.columns[chosen.time]):
             # A counter of samples named as time: as a clock with one tick per sample it also shows losses.
             given = f"{told!r} Hz"
-            findings.append(_rate_stated(told, is_given=options.rate_hz is not None))
+            findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given))
         if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
+        axes = [table.columns[c][:WITNESS_ROWS] for c in chosen.accelerometer or ()]
         clock = build_clock(
             with_arrivals(table, chosen.time),
             chosen.time,
             named,
             given,
             chosen.nanoseconds,
-            _witness(table, chosen),
+            np.stack(axes, axis=1) if axes and all(map(len, axes)) else None,
             table.is_private,
         )
-        findings += _with_rows_left_out(clock, table.n_rows)
+        findings += clock.findings
         rate = mean_rate_hz(clock.time_s)
         if told is not None and abs(rate / told - 1.0) > 0.01:
             findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
         return clock, rate
-    stated = _stated_rate(table)
-    if options.rate_hz is not None:
-        rate = float(options.rate_hz)
-        findings.append(_rate_stated(rate, is_given=True))
-    elif stated is not None:
-        rate = stated
-        findings.append(_rate_stated(rate, is_given=False))
+    rate = ASSUMED_RATE_HZ if told is None else float(told)
+    if told is not None:
+        findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=rate, is_given=is_given))
     else:
-        rate = ASSUMED_RATE_HZ
-        findings.append(
-            Finding.of(FindingCode.RATE_ASSUMED, "gyro" if chosen.gyroscope is not None else "", rate_hz=rate)
-        )
+        findings.append(Finding.of(FindingCode.RATE_ASSUMED, "" if chosen.gyroscope is None else "gyro", rate_hz=rate))
     return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
-
-
-def _with_rows_left_out(clock: Clock, n_rows: int) -> tuple[Finding, ...]:
-    """The clock's findings; the one about rows without a time states how many are excluded."""
-    left = n_rows - len(clock.time_s)
-    out = []
-    for finding in clock.findings:
-        if finding.code is FindingCode.NON_FINITE and left and "rows_left_out" not in finding.numbers:
-            finding = replace(finding, numbers=MappingProxyType({**finding.numbers, "rows_left_out": float(left)}))
-        out.append(finding)
-    return tuple(out)
 
 
 def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str:
@@ -312,19 +267,7 @@ def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str
     A DOT sends at most 120 samples a second (8333 µs apart), an MTi at least one (10 000 steps of 100 µs); its usual
     rates are far above 2 Hz (5000 steps), so the step identifies the unit, which a finding states.
     """
-    step = np.diff(table.columns[column])
-    positive = step[step > 0]
-    usual = float(np.median(positive)) if len(positive) else 0.0
+    usual = usual_step(table.columns[column])
     unit = "us" if usual >= LONGEST_MTI_STEP else "100us"
-    findings.append(
-        Finding.of(
-            FindingCode.TIME_UNIT_DETECTED,
-            "sample-time-100us" if unit == "100us" else "sample-time-us",
-            step=usual,
-        )
-    )
+    findings.append(Finding.of(FindingCode.TIME_UNIT_DETECTED, f"sample-time-{unit}", step=usual))
     return unit
-
-
-def _rate_stated(rate: float, *, is_given: bool) -> Finding:
-    return Finding.of(FindingCode.RATE_STATED, rate_hz=rate, is_given=is_given)

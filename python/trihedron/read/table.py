@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.digest import LateSha256
 from trihedron.records import Finding, Onboard
 from trihedron.records.words import Words, words
 
@@ -44,7 +43,7 @@ class Table:
     path: Path
     names: tuple[str, ...] | None
     columns: tuple[FloatArray, ...]
-    sha256: str | LateSha256 = ""
+    sha256: str = ""
     metadata: dict[str, str] = field(default_factory=dict)
     first_line: int = 0
     line_of_row: npt.NDArray[np.int64] | None = None
@@ -80,6 +79,16 @@ class Table:
             findings=(*self.findings, *findings),
             rows_in_file=n_in_file,
         )
+
+    def by_sensor(
+        self, accelerometer: npt.NDArray[np.int64], gyroscope: npt.NDArray[np.int64], n_left_out: int, note: Finding
+    ) -> tuple[Table, Table]:
+        """The tables of the accelerometer's and the gyro's rows; ``n_left_out`` rows, stated in ``note``, are in
+        neither."""
+        reported = self.n_in_file - self.n_rows
+        first = self.take(accelerometer, len(accelerometer) + n_left_out + reported, note)
+        second = self.take(gyroscope, len(gyroscope))
+        return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope", findings=())
 
     @property
     def n_rows(self) -> int:

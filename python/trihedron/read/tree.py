@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
+import pickle
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.columns import find_columns
+from trihedron.read.columns import columns_or_none
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.matlab import DamagedError, check_matlab, read_objects
+from trihedron.read.errors import ReadError, first_line
+from trihedron.read.matlab import read_objects
 from trihedron.read.memory import columns_table
-from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_extra, pick
 from trihedron.read.table import Table
 
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
@@ -52,9 +54,18 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     # For damaged files h5py raises errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
-    if has_objects and not _hold_a_log(path, groups):
+    if has_objects and not _tables(path, groups):
         return read_objects(path, choice)
     return (_of_groups(path, groups, choice, "this HDF5 file"),)
+
+
+_LOAD = """
+import pickle, sys
+sys.path = [folder for folder in sys.path if folder]
+from scipy.io import loadmat
+pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protocol=5)
+"""
+"""Program that reads a file: SciPy trusts the sizes in it, and a wrong one ends the process in which it is read."""
 
 
 def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
@@ -65,25 +76,15 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     ReadError
         When the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to read.
     """
-    from scipy.io import loadmat
-
+    child = subprocess.run([sys.executable, "-c", _LOAD, str(path)], capture_output=True, check=False)
     try:
-        check_matlab(path.read_bytes())
-    except DamagedError as error:
-        raise ReadError(f"{path}: this MATLAB file is damaged ({error}); save it again.") from None
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    try:
-        with warnings.catch_warnings():
-            # SciPy warns that it finds only internal data of objects.
-            warnings.simplefilter("ignore")
-            content = loadmat(str(path), simplify_cells=True)
-    # For damaged files SciPy raises errors of several kinds.
+        content = pickle.loads(child.stdout)
     except Exception as error:
-        raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({first_line(error)}); save it again.") from None
+        said = child.stderr.decode(errors="replace").strip().split("\n")[-1][:160] or first_line(error)
+        raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({said}); save it again.") from None
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
-    if "__function_workspace__" in content and not _hold_a_log(path, groups):
+    if "__function_workspace__" in content and not _tables(path, groups):
         return read_objects(path, choice)
     if not groups:
         raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
@@ -100,24 +101,10 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
             groups.setdefault(name, {})[key] = np.array(value)
 
 
-def _hold_a_log(path: Path, groups: Groups) -> bool:
-    """Whether arrays outside the MATLAB objects have names of a sensor."""
-    return bool(_tables(path, groups))
-
-
 def _tables(path: Path, groups: Groups) -> dict[str, Table]:
     """Groups with an accelerometer or a gyro, by name."""
-    tables: dict[str, Table] = {}
-    for name, arrays in groups.items():
-        table = _table(path, arrays)
-        if table is None:
-            continue
-        try:
-            find_columns(table, None, None)
-        except ReadError:
-            continue
-        tables[name or "/"] = table
-    return tables
+    tables = {name or "/": _table(path, arrays) for name, arrays in groups.items()}
+    return {name: table for name, table in tables.items() if table is not None and columns_or_none(table) is not None}
 
 
 def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:

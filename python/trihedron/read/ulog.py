@@ -21,9 +21,9 @@ import numpy.typing as npt
 from trihedron.arrays import AXES
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, first_line
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_extra, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.records.onboard import Stage
@@ -55,7 +55,8 @@ _COMBINED = "sensor_combined"
 _GYRO = "sensor_gyro"
 _TOPICS = [_RAW, _GYRO, _RAW + SUFFIX, _GYRO + SUFFIX, _COMBINED, "sensor_selection"]
 _PARAMETERS = re.compile(r"(CAL|TC)_(ACC|GYRO|A|G)(\d|_)|SENS_BOARD_|SENS_EN_THERMAL")
-_UNITS = {"sensor_accel": "m/s^2", "sensor_gyro": "rad/s"}
+_SENSORS: dict[str, Any] = {_RAW: ("accelerometer", "acc", "m/s^2"), _GYRO: ("gyroscope", "gyr", "rad/s")}
+"""Topic → sensor, and word and unit in the names of its columns."""
 _SKIP = {"timestamp", "timestamp_sample"}
 
 
@@ -156,14 +157,12 @@ def _table(
     # The timestamp of the sample if the log has it; `timestamp` is that of publishing the message.
     timestamp = _timestamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[timestamp], dtype=np.float64)]
+    sensor, word, unit = _SENSORS.get(topic, (None, "", ""))
     for name, values in data.items():
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
-            word = {"sensor_accel": "acc", "sensor_gyro": "gyr"}.get(topic, "")
-            names.append(f"{word}_{name} [{_UNITS[topic]}]" if topic and name in ("x", "y", "z") else name)
+            names.append(f"{word}_{name} [{unit}]" if sensor and name in AXES else name)
             columns.append(np.asarray(values, dtype=np.float64))
-    sensors: dict[str, Any] = {"sensor_accel": "accelerometer", "sensor_gyro": "gyroscope"}
     clock = StatedClock(time=0, unit="us")
-    sensor = sensors.get(topic)
     return Table(
         path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard
     )
@@ -198,13 +197,8 @@ def _timestamp(data: dict[str, Any]) -> str:
 
 
 def _losses(log: Any) -> tuple[Finding, ...]:
-    damaged: tuple[Finding, ...] = ()
-    if log.file_corruption:
-        damaged = (Finding.of(FindingCode.SAMPLES_LOST, "damaged"),)
-    if not log.dropouts:
-        return damaged
-    lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
-    return (
-        *damaged,
-        Finding.of(FindingCode.SAMPLES_LOST, "dropouts", count=len(log.dropouts), lost_s=lost_s),
-    )
+    out = [Finding.of(FindingCode.SAMPLES_LOST, "damaged")] if log.file_corruption else []
+    if log.dropouts:
+        lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
+        out.append(Finding.of(FindingCode.SAMPLES_LOST, "dropouts", count=len(log.dropouts), lost_s=lost_s))
+    return tuple(out)

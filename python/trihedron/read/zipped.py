@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import ReadError, first_line, from_os_error
 from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -57,8 +57,8 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError) as error:
         if isinstance(error, ReadError):
             raise
-        first = (str(error).strip().split("\n")[0] or type(error).__name__)[:120]
-        raise ReadError(f"{path}: this zip archive is damaged or locked ({first}); export it again.") from None
+        why = first_line(error)
+        raise ReadError(f"{path}: this zip archive is damaged or locked ({why}); export it again.") from None
     others = [name for name in names if name not in picked]
     if others:
         note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)

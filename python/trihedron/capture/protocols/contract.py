@@ -24,8 +24,9 @@ class Decoder(Protocol):
 
     ``columns`` names the values; it is empty until they are known. ``counter_modulus`` and ``clock_modulus`` are the
     values at which counter and clock wrap (0: they do not), ``tick_s`` is one tick of the clock in seconds (0: no
-    clock). ``corrupt`` counts pieces that look like the beginning of a frame but are none; ``skipped_bytes`` counts
-    bytes outside frames.
+    clock). ``learned`` names the attributes that the first frames determine, and that a decoder of the same device
+    takes over after a reconnection. ``corrupt`` counts pieces that look like the beginning of a frame but are none;
+    ``skipped_bytes`` counts bytes outside frames.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Decoder(Protocol):
     counter_modulus: int
     clock_modulus: int
     tick_s: float
+    learned: tuple[str, ...]
     corrupt: int
     skipped_bytes: int
 

@@ -82,6 +82,7 @@ class FramedDecoder(ABC):
     counter_modulus = 0
     clock_modulus = 0
     tick_s = 0.0
+    learned: tuple[str, ...] = ()
     length = 0
     """Length of every frame in bytes, where it is constant."""
 
@@ -192,8 +193,11 @@ def _begun(buffer: bytearray, sync: bytes, at: int) -> int:
 class LineFedDecoder(ABC):
     """One message per line, with at most one frame in each; a subclass decodes the line."""
 
+    columns: tuple[str, ...] = ()
     clock_modulus = 0
     counter_modulus = 0
+    tick_s = 0.0
+    learned: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self.corrupt = 0
@@ -212,7 +216,15 @@ class LineFedDecoder(ABC):
         if len(rest) > LONGEST_LINE:
             self.skipped_bytes += len(rest)
             self._buffer = bytearray()
+        return self._take(lines)
+
+    def _take(self, lines: list[bytearray]) -> list[Frame]:
         return [frame for line in lines if (frame := self.frame_of(bytes(line))) is not None]
+
+    def reject(self, line: bytes | str, *, is_corrupt: bool = True) -> None:
+        """Count a line without its line feed as skipped, and as corrupt unless it is a message of another kind."""
+        self.corrupt += is_corrupt
+        self.skipped_bytes += len(line) + 1
 
     def finish(self) -> list[Frame]:
         """No frames: an incomplete last line is discarded."""

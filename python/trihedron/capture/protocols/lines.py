@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from trihedron.capture.protocols.contract import Frame, printed_numbers
+from trihedron.capture.protocols.framing import LineFedDecoder
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""
 
-_LONGEST = 4096
 _LONGEST_LINE = 600
 """Characters, enough for thirty labelled numbers; longer lines are binary."""
 
@@ -51,7 +51,7 @@ def name_by_position(names: tuple[str, ...] | None, rows: list[list[str]]) -> Li
     return LineColumns(names, time, unit)
 
 
-class LinesDecoder:
+class LinesDecoder(LineFedDecoder):
     """Learns the layout from the first lines, then decodes every line of that layout.
 
     A line with another number of fields, or with a field that is not a number, is counted as corrupt; lines without
@@ -59,19 +59,14 @@ class LinesDecoder:
     """
 
     name = "lines"
-    counter_modulus = 0
+    learned = ("columns", "clock_modulus", "tick_s", "_separator", "_n", "_time", "_counter", "_keep", "_per_unit")
+    learned += ("_monitor", "_pattern")
 
     def __init__(self, name_columns: NameColumns = name_by_position) -> None:
-        self.columns: tuple[str, ...] = ()
-        self.clock_modulus = 0
-        self.tick_s = 0.0
-        self.corrupt = 0
-        self.skipped_bytes = 0
+        super().__init__()
         self._name_columns = name_columns
-        self._buffer = bytearray()
         self._first: list[str] = []
         self._n_first = 0
-        self._labels: tuple[str, ...] | None = None
         self._separator: str | None = ","
         self._n = 0
         self._time: int | None = None
@@ -82,32 +77,15 @@ class LinesDecoder:
         self._pattern: re.Pattern[str] | None = None
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Frames of the lines that are complete with these bytes."""
-        self._buffer += data
-        if b"\n" not in data:
-            if b"\r" in data and b"\n" not in self._buffer:
-                self._buffer = self._buffer.replace(b"\r", b"\n")
-            elif len(self._buffer) > _LONGEST:
-                self.skipped_bytes += len(self._buffer)
-                self._buffer.clear()
-                return []
-        *lines, rest = self._buffer.split(b"\n")
-        self._buffer = rest
-        return self._take(lines)
+        """Frames of the lines that are complete with these bytes; a single carriage return also ends a line."""
+        if b"\r" in data and b"\n" not in data:
+            data, self._buffer = bytes(self._buffer + data).replace(b"\r", b"\n"), bytearray()
+        return super().feed(data)
 
     def finish(self) -> list[Frame]:
         """Frames of the first lines if the layout is not learned yet; an incomplete last line is discarded."""
-        self.skipped_bytes += len(self._buffer)
-        self._buffer.clear()
+        super().finish()
         return self._learn() if self._n == 0 and self._first else []
-
-    def adopt(self, other: LinesDecoder) -> None:
-        """Take over the layout of another decoder, of the same device before it reconnected."""
-        for name in (
-            *("columns", "clock_modulus", "tick_s", "_labels", "_separator", "_n", "_time", "_counter", "_keep"),
-            *("_per_unit", "_monitor", "_pattern"),
-        ):
-            setattr(self, name, getattr(other, name))
 
     def _take(self, lines: list[bytearray]) -> list[Frame]:
         out: list[Frame] = []
@@ -117,33 +95,25 @@ class LinesDecoder:
             except UnicodeDecodeError:
                 line = raw.decode("utf-8", "replace").strip("\r\x00 ")
             if len(line) > _LONGEST_LINE:
-                self.corrupt += self._n > 0
-                self.skipped_bytes += len(raw) + 1
-                continue
-            if self._n == 0:
-                if line:
-                    self._first.append(line)
-                    self._n_first += line.replace("\t", " ").isprintable() and _fields_of_numbers(_unprefixed(line)) > 0
-                    if self._n_first >= LEARN_LINES:
-                        out += self._learn()
-                    elif len(self._first) > 50 * LEARN_LINES:
-                        self.skipped_bytes += sum(len(text) + 1 for text in self._first)
-                        self._first.clear()
-                        self._n_first = 0
-                continue
-            frame = self._frame(line)
-            if frame is not None:
+                self.reject(raw, is_corrupt=self._n > 0)
+            elif self._n == 0:
+                out += self._first_line(line) if line else []
+            elif (frame := self.frame_of(line)) is not None:
                 out.append(frame)
             elif line:
-                self._reject(line)
+                self.reject(line, is_corrupt=_is_damaged(line))
         return out
 
-    def _reject(self, line: str) -> None:
-        if not any(c.isdigit() for c in line) or line.startswith("#"):
-            self.skipped_bytes += len(line) + 1
-        else:
-            self.corrupt += 1
-            self.skipped_bytes += len(line) + 1
+    def _first_line(self, line: str) -> list[Frame]:
+        self._first.append(line)
+        self._n_first += line.replace("\t", " ").isprintable() and _fields_of_numbers(_unprefixed(line)) > 0
+        if self._n_first >= LEARN_LINES:
+            return self._learn()
+        if len(self._first) > 50 * LEARN_LINES:
+            self.skipped_bytes += sum(len(text) + 1 for text in self._first)
+            self._first.clear()
+            self._n_first = 0
+        return []
 
     def _learn(self) -> list[Frame]:
         lines, self._first, self._n_first = self._first, [], 0
@@ -151,14 +121,13 @@ class LinesDecoder:
         counts = Counter(n for line in plain if (n := _fields_of_numbers(line)) > 1)
         if not counts:
             for line in lines:
-                self._reject(line)
+                self.reject(line, is_corrupt=_is_damaged(line))
             return []
         n = counts.most_common(1)[0][0]
         usual = [line for line in plain if _fields_of_numbers(line) == n]
         labels = Counter(tuple(label for label, _ in _LABELLED.findall(line)) for line in usual).most_common(1)[0][0]
         names: tuple[str, ...] | None = None
         if len(labels) == n:
-            self._labels = labels
             self._pattern = re.compile(
                 r".*?"
                 + r".*?".join(rf"(?<![A-Za-z]){re.escape(label)}\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)" for label in labels)
@@ -173,14 +142,12 @@ class LinesDecoder:
         self._settle(self._name_columns(names, [row for row in rows if len(row) == n]), n, rows)
         out: list[Frame] = []
         for line in lines:
-            frame = self._frame(line)
+            frame = self.frame_of(line)
             if frame is not None:
                 out.append(frame)
-            elif out:
-                self._reject(line)
             else:
                 # Before the first frame: an incomplete first line, a start-up message, or the names.
-                self.skipped_bytes += len(line) + 1
+                self.reject(line, is_corrupt=bool(out) and _is_damaged(line))
         return out
 
     def _settle(self, columns: LineColumns, n: int, rows: list[list[str]]) -> None:
@@ -209,7 +176,8 @@ class LinesDecoder:
                 return tuple(fields)
         return None
 
-    def _frame(self, line: str) -> Frame | None:
+    def frame_of(self, line: str) -> Frame | None:  # type: ignore[override]
+        """The frame of a line of the learned layout, or None."""
         ticks: int | None = None
         if self._monitor:
             found = _MONITOR.match(line)
@@ -239,6 +207,11 @@ class LinesDecoder:
             return Frame(counter, ticks, tuple(numbers), ",".join(tokens).replace(" ", "").replace("\t", ""))
         text = ",".join([tokens[i].strip() for i in keep])
         return Frame(counter, ticks, tuple([numbers[i] for i in keep]), text)
+
+
+def _is_damaged(line: str) -> bool:
+    """Whether a line is no message of the device: it has digits and is no remark."""
+    return any(c.isdigit() for c in line) and not line.startswith("#")
 
 
 def _unprefixed(line: str) -> str:

@@ -53,14 +53,11 @@ class Mtdata2Decoder(FramedDecoder):
     """Decodes the inertial packets that the device is configured to send; the first message sets the columns."""
 
     name = "xsens-mtdata2"
+    learned = ("columns", "_wanted")
 
     def __init__(self) -> None:
         super().__init__(_SYNC)
         self._wanted: dict[int, int] = {}
-
-    def adopt(self, other: Mtdata2Decoder) -> None:
-        """Take over the columns of the previous connection."""
-        self.columns, self._wanted = other.columns, other._wanted
 
     def length_at(self, data: bytearray, at: int) -> int:
         """Length from the length byte, or from the two bytes after it where it is 255."""

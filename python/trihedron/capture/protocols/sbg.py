@@ -35,14 +35,11 @@ class SbgDecoder(FramedDecoder):
     columns: tuple[str, ...] = _COLUMNS
     tick_s = 1e-6
     clock_modulus = 1 << 32
+    learned = ("_kind",)
 
     def __init__(self) -> None:
         super().__init__(b"\xff\x5a")
         self._kind: int | None = None
-
-    def adopt(self, other: SbgDecoder) -> None:
-        """Take over the kind of message of the previous connection."""
-        self._kind = other._kind
 
     def length_at(self, data: bytearray, at: int) -> int:
         """Length from the length field of the content."""

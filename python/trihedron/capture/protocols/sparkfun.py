@@ -63,8 +63,7 @@ class SixDofTextDecoder(LinesDecoder):
             if len(fields) == 9 and fields[0] == b"A" and fields[-1] == b"Z":
                 inner.append(bytearray(b"\t".join(fields[1:-1])))
             elif line.strip():
-                self.corrupt += 1
-                self.skipped_bytes += len(line) + 1
+                self.reject(line)
         return super()._take(inner)
 
 
@@ -72,17 +71,12 @@ class RazorDecoder(LineFedDecoder):
     """Decodes tagged lines of a sample: A (acceleration), M (magnetometer, optional), G (rates); R raw, C corrected."""
 
     name = "razor"
-    tick_s = 0.0
+    learned = ("columns", "_order")
 
     def __init__(self) -> None:
         super().__init__()
-        self.columns: tuple[str, ...] = ()
         self._parts: dict[str, list[str]] = {}
         self._order: tuple[str, ...] = ()
-
-    def adopt(self, other: RazorDecoder) -> None:
-        """Take over the columns of the previous connection."""
-        self.columns, self._order = other.columns, other._order
 
     def frame_of(self, line: bytes) -> Frame | None:
         """The sample that this line completes, or None."""
@@ -100,11 +94,8 @@ class RazorDecoder(LineFedDecoder):
         if sensor == "A" and self._parts:
             self.corrupt += 1
             self._parts = {}
-        try:
-            texts = [field.decode("ascii").strip() for field in fields]
-        except UnicodeDecodeError:
-            texts = []
-        if not texts or printed_numbers(texts) is None:
+        texts = [field.decode("ascii", "replace").strip() for field in fields]
+        if printed_numbers(texts) is None:
             self.corrupt += 1
             self._parts = {}
             return None

@@ -27,23 +27,18 @@ class VectorNavDecoder(LineFedDecoder):
 
     name = "vectornav"
     columns: tuple[str, ...] = _COLUMNS
-    tick_s = 0.0
+    learned = ("_kind",)
 
     def __init__(self) -> None:
         super().__init__()
         self._kind = b""
-
-    def adopt(self, other: VectorNavDecoder) -> None:
-        """Take over the kind of line of the previous connection."""
-        self._kind = other._kind
 
     def frame_of(self, line: bytes) -> Frame | None:
         """The readings of a complete line."""
         start, mark, check = line.rstrip(b"\r").partition(b"*")
         kind, *fields = start[1:].split(b",")
         if not (start.startswith(b"$VN") and mark and _checks(start[1:], check)):
-            self.corrupt += line.startswith(b"$")
-            self.skipped_bytes += len(line) + 1
+            self.reject(line, is_corrupt=line.startswith(b"$"))
             return None
         if kind not in _BEFORE or (self._kind and kind != self._kind):
             return None
@@ -51,8 +46,7 @@ class VectorNavDecoder(LineFedDecoder):
         texts = [field.decode("ascii", "replace") for field in fields[first : first + len(_COLUMNS)]]
         values = printed_numbers(texts)
         if values is None or len(values) != len(_COLUMNS):
-            self.corrupt += 1
-            self.skipped_bytes += len(line) + 1
+            self.reject(line)
             return None
         self._kind = kind
         return Frame(None, None, tuple(values), ",".join(texts))

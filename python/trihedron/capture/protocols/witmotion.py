@@ -30,16 +30,13 @@ class WitMotionDecoder(FramedDecoder):
     name = "witmotion"
     length = 11
     columns: tuple[str, ...] = _COLUMNS
+    learned = ("_has_clock", "tick_s", "clock_modulus")
 
     def __init__(self) -> None:
         super().__init__(b"\x55")
         self._parts: dict[int, tuple[int, ...]] = {}
         self._held: Frame | None = None
         self._has_clock: bool | None = None
-
-    def adopt(self, other: WitMotionDecoder) -> None:
-        """Take over the clock of the previous connection."""
-        self._has_clock, self.tick_s, self.clock_modulus = other._has_clock, other.tick_s, other.clock_modulus
 
     def is_sound(self, data: bytearray, at: int, length: int) -> bool:
         """Whether the kind exists and the checksum is right."""

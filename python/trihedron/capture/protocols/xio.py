@@ -43,12 +43,10 @@ class XioDecoder(LineFedDecoder):
         else:
             # Other kinds begin with a letter (or 0x80 plus a letter); anything else is a damaged message.
             if not 0x41 <= first & 0x7F <= 0x5A:
-                self.corrupt += 1
-                self.skipped_bytes += len(line) + 1
+                self.reject(line)
             return None
         if frame is None:
-            self.corrupt += 1
-            self.skipped_bytes += len(line) + 1
+            self.reject(line)
         return frame
 
     def _binary(self, message: bytes) -> Frame | None:

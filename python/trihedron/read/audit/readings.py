@@ -192,22 +192,12 @@ def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Fin
     """A finding where the LSB is more than twice the noise."""
     if windows is None:
         return []
-    noise = windows.quiet_noise(sensor)
-    found = []
-    for k in range(3):
-        step = float(steps[k])
-        if step > 2.0 * noise[k]:
-            found.append((k, step, float(noise[k])))
-    if not found:
+    all_axes = zip(AXES, steps.tolist(), windows.quiet_noise(sensor).tolist(), strict=True)
+    axes = [(name, step, sigma) for name, step, sigma in all_axes if step > 2.0 * sigma]
+    if not axes:
         return []
-    return [
-        Finding.of(
-            FindingCode.COARSE_RESOLUTION,
-            sensor=short(sensor),
-            axes=[(AXES[k], step, sigma) for k, step, sigma in found],
-            numbers={f"{AXES[k]}_step": step for k, step, _ in found},
-        )
-    ]
+    numbers = {f"{name}_step": step for name, step, _ in axes}
+    return [Finding.of(FindingCode.COARSE_RESOLUTION, sensor=short(sensor), axes=axes, numbers=numbers)]
 
 
 # Readings that equal the previous one: their number, the longest run, and the longest run expected by chance.
@@ -235,8 +225,7 @@ class Repeats:
 
     def chance(self, k: int) -> float:
         """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows)."""
-        rate = quantile(self.rates[:, k], 0.9)
-        return float(rate)
+        return float(quantile(self.rates[:, k], 0.9))
 
 
 def longest_by_chance(n: int, probability: float) -> float:

@@ -10,11 +10,13 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.read.clock.rate import steps_of, usual_step
+from trihedron.read.clock.rate import steps_of, steps_of_counter, usual_step
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
-from trihedron.records import Finding, FindingCode, Sampling, Severity, TimestampKind
-from trihedron.records.sampling import UNJUDGED
+from trihedron.records import Finding, FindingCode, Severity, TimestampKind
+from trihedron.records.words import Words
+
+Place = Callable[[int], Words]
 
 _PARTS = 40
 _FEWEST_ROWS = 50
@@ -26,9 +28,10 @@ _SURE, _SCALES_DIFFER = 4.0, 0.01
 """Standard deviations of the test, and the scatter of an uncalibrated gyro's scale because its axes' scales differ."""
 
 
-def audit_pace(time_s: FloatArray, sensors: Sensors) -> list[Finding]:
-    """A finding where the rate of timestamps (n,) changes at a row, unless the rotation of gravity confirms the
+def audit_pace(sensors: Sensors) -> list[Finding]:
+    """A finding where the rate of the timestamps changes at a row, unless the rotation of gravity confirms the
     change."""
+    time_s = sensors.time_s if sensors.timestamps_s is None else sensors.timestamps_s
     accelerometer, gyroscope = sensors.accelerometer, sensors.gyroscope
     if gyroscope is None:
         return []
@@ -92,8 +95,6 @@ def _jump(time_s: FloatArray) -> tuple[int, float] | None:
     return (k - 1) * n + int(np.argmax(np.abs(sums))) + 1, ratio
 
 
-Place = Callable[[int], str]
-
 GAP_STEPS = 1.5
 """A step longer than this multiple of the usual one is a gap."""
 JITTER_STEPS = 0.03
@@ -103,51 +104,30 @@ MUCH_JITTER = 0.2
 """Jitter, in steps, above which it is a warning: it affects a short rotation as much as a reading's noise does."""
 
 
-def audit_timing(
-    time_s: FloatArray,
-    rate_hz: float,
-    place: Place,
-    sampling: Sampling = UNJUDGED,
-    lost_behind: npt.NDArray[np.int64] | None = None,
-    timestamps_s: FloatArray | None = None,
-) -> list[Finding]:
-    """Findings on the timestamps of a log. ``place(i)`` names sample i in messages.
+def audit_timing(sensors: Sensors, rate_hz: float) -> list[Finding]:
+    """Findings on the timestamps of a log.
 
-    ``lost_behind`` (n - 1,) are the samples lost after each, where the clock shows them; else long steps are gaps.
-    ``timestamps_s`` (n,) are the logged timestamps where an even clock replaced them.
+    Long steps are gaps; the clock counts the samples lost in them, if it can.
     """
-    if len(time_s) < 3:
-        return []
-    usual = usual_step(time_s)
-    if not usual > 0:
+    time_s, place = sensors.time_s, sensors.place
+    logged_s = time_s if sensors.timestamps_s is None else sensors.timestamps_s
+    if len(time_s) < 3 or not usual_step(time_s) > 0:
         return []
     findings: list[Finding] = []
-    if steps_of(time_s if timestamps_s is None else timestamps_s).same:
-        findings += _duplicates(
-            np.diff(time_s if timestamps_s is None else timestamps_s), place, is_mended=timestamps_s is not None
-        )
-    if lost_behind is not None:
-        findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
-    elif sampling.kind in (TimestampKind.LATE, TimestampKind.SCATTERED):
-        pass  # a late timestamp looks like a loss: the number of lost samples is unknown
-    else:
-        batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
-        gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)
-        if len(gaps):
-            step = np.diff(time_s)
-            lost = np.zeros(len(step), dtype=np.int64)
-            lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
-            findings += _gap(step, gaps, lost, place)
-    timestamps = time_s
-    if timestamps_s is not None:
-        usual, timestamps = usual_step(timestamps_s), timestamps_s
-    count, total, jitter, least, most = _core.inside_steps(timestamps, 0.0, GAP_STEPS * usual)
+    if steps_of(logged_s).same:
+        findings += _duplicates(np.diff(logged_s), place, is_mended=logged_s is not time_s)
+    lost = _lost_behind(sensors)
+    if lost is not None and lost.any():
+        findings.append(_gap(np.diff(time_s), lost, place))
+    usual = usual_step(logged_s)
+    count, total, jitter, least, most = _core.inside_steps(logged_s, 0.0, GAP_STEPS * usual)
     mean = total / count
     if jitter > JITTER_STEPS * mean:
+        is_note = jitter < MUCH_JITTER * mean or logged_s is not time_s
         findings.append(
             Finding.of(
                 FindingCode.TIME_JITTER,
-                severity=Severity.NOTE if jitter < MUCH_JITTER * mean or timestamps_s is not None else Severity.WARNING,
+                severity=Severity.NOTE if is_note else Severity.WARNING,
                 jitter_s=jitter,
                 median_step_s=usual,
                 median_rate_hz=1 / usual,
@@ -156,15 +136,26 @@ def audit_timing(
                 least_s=least,
                 largest_s=most,
                 rate_hz=rate_hz,
-                is_irregular=sampling.kind is TimestampKind.IRREGULAR,
+                is_irregular=sensors.sampling.kind is TimestampKind.IRREGULAR,
             )
         )
     return findings
 
 
-def _lost(step: FloatArray, lost: npt.NDArray[np.int64], place: Place) -> list[Finding]:
-    gaps = np.flatnonzero(lost > 0)
-    return _gap(step, gaps, lost, place) if len(gaps) else []
+def _lost_behind(sensors: Sensors) -> npt.NDArray[np.int64] | None:
+    """(n - 1,) samples lost after each: those that the clock counts, else those of long steps; None if unknown."""
+    if sensors.lost_behind is not None:
+        return sensors.lost_behind
+    if sensors.sampling.kind in (TimestampKind.LATE, TimestampKind.SCATTERED):
+        return None  # a late timestamp looks like a loss
+    time_s, usual = sensors.time_s, usual_step(sensors.time_s)
+    is_batched = steps_of(time_s).same > 0.2 * (len(time_s) - 1)
+    gaps = _core.steps_above(time_s, (5.0 if is_batched else GAP_STEPS) * usual)
+    if not len(gaps):
+        return None
+    lost = np.zeros(len(time_s) - 1, dtype=np.int64)
+    lost[gaps] = np.maximum(np.rint((time_s[gaps + 1] - time_s[gaps]) / usual) - 1, 0)
+    return lost
 
 
 def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Finding]:
@@ -184,36 +175,30 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
     ]
 
 
-def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], lost: npt.NDArray[np.int64], place: Place) -> list[Finding]:
+def _gap(step: FloatArray, lost: npt.NDArray[np.int64], place: Place) -> Finding:
+    gaps = np.flatnonzero(lost > 0)
     longest = int(gaps[np.argmax(step[gaps])])
     total = int(lost.sum())
     fraction = total / (len(step) + 1 + total)
-    worst = sorted((int(g) for g in gaps[np.argsort(step[gaps])[::-1][:3]]), key=int)
-    return [
-        Finding.of(
-            FindingCode.TIME_GAP,
-            severity=Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
-            count=len(gaps),
-            lost_samples=total,
-            fraction=fraction,
-            longest_s=step[longest],
-            worst=[(step[g], place(g + 1)) for g in worst],
-            has_more=len(gaps) > len(worst),
-            sample=longest + 1,
-        )
-    ]
+    worst = sorted(gaps[np.argsort(step[gaps])[::-1][:3]].tolist())
+    return Finding.of(
+        FindingCode.TIME_GAP,
+        severity=Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+        count=len(gaps),
+        lost_samples=total,
+        fraction=fraction,
+        longest_s=step[longest],
+        worst=[(step[g], place(g + 1)) for g in worst],
+        has_more=len(gaps) > len(worst),
+        sample=longest + 1,
+    )
 
 
 def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding]:
     """Packets that are missing by the log's counter; a counter that wraps is continued."""
     if len(counter) < 3 or not np.all(np.isfinite(counter)):
         return []
-    step = np.diff(counter)
-    back = step < 0
-    for modulus in (2.0**8, 2.0**16, 2.0**32):
-        if counter.max() < modulus and counter.min() >= 0:
-            step = np.where(back, step + modulus, step)
-            break
+    step = steps_of_counter(counter)
     if np.any(step < 0):
         return []
     # The upper quartile, because a counter of the sensor's internal rate may step by 3 and 4 in turn without a loss.
@@ -230,7 +215,7 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
             column=label,
             count=len(lost),
             lost_samples=missing,
-            wraps=bool(back.any()),
+            wraps=bool(np.any(np.diff(counter) < 0)),
             where=place(int(lost[0]) + 1),
             sample=lost[0] + 1,
         )

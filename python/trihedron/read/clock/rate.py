@@ -25,6 +25,13 @@ def steps_of(time_s: FloatArray) -> Steps:
     return Steps(*_core.timestamp_steps(np.asarray(time_s, dtype=np.float64)))
 
 
+def steps_of_counter(counter: FloatArray) -> FloatArray:
+    """Steps (n - 1,) of a counter of 8, 16 or 32 bits, continued where it wraps."""
+    step = np.diff(counter)
+    bits = next((bits for bits in (8, 16, 32) if counter.max() < 2.0**bits), 0) if counter.min() >= 0 else 0
+    return np.where(step < 0, step + 2.0**bits, step) if bits else step
+
+
 def usual_step(time_s: FloatArray) -> float:
     """Median of the positive steps of timestamps (n,); NaN where there is none."""
     return _core.usual_step(np.asarray(time_s, dtype=np.float64))

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
-from trihedron.read.clock.rate import steps_of
+from trihedron.read.clock.rate import steps_of, steps_of_counter
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, TimestampKind
 
@@ -155,8 +155,7 @@ def settle_clock(
     is_even = False
     if clock.timestamp_error_s > _worth(clock.kind) * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
-        follows = share - STANDARD_ERRORS * sigma > SYSTEMATIC
-        ignores = share + STANDARD_ERRORS * sigma < 1.0 - SYSTEMATIC
+        follows, ignores = _decided(share, sigma)
         by_itself = shared > SHARED or clock.kind is TimestampKind.ROUNDED
         is_even = not follows and (ignores or by_itself)
     sampling = Sampling(
@@ -175,6 +174,12 @@ def settle_clock(
     return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
 
 
+def _decided(share: float, sigma: float) -> tuple[bool, bool]:
+    """Whether the motion follows the timestamps' scatter at all, and whether it follows less than all of it."""
+    reach = STANDARD_ERRORS * sigma
+    return share - reach > SYSTEMATIC, share + reach < 1.0 - SYSTEMATIC
+
+
 def _worth(kind: TimestampKind) -> float:
     # Rounding is an error of the file, not of the sensor: even small rounding would otherwise be found as jitter.
     return EXACT if kind is TimestampKind.ROUNDED else WORTH
@@ -184,12 +189,7 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
     """(n,) numbers of samples from 0 on, from a sample counter (continued where it wraps); ``None`` for others."""
     if len(counter) < 3 or not np.all(np.isfinite(counter)) or not np.all(counter == np.rint(counter)):
         return None
-    step = np.diff(counter)
-    if counter.min() >= 0:
-        for modulus in (2.0**8, 2.0**16, 2.0**32):
-            if counter.max() < modulus:
-                step = np.where(step < 0, step + modulus, step)
-                break
+    step = steps_of_counter(counter)
     if np.any(step <= 0):
         return None
     values, counts = np.unique(step, return_counts=True)
@@ -202,15 +202,11 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
 def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
     if sampling.timestamp_error_s <= _worth(sampling.kind) * sampling.period_s:
         return ()
-    follows = sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC
-    follows_wholly = follows and sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC
+    follows, ignores = _decided(sampling.followed, sampling.sigma_followed)
+    kept = FindingCode.TIMESTAMPS_KEPT if follows and not ignores else FindingCode.CLOCK_UNDECIDED
     return (
         Finding.of(
-            FindingCode.EVEN_CLOCK
-            if sampling.is_even
-            else FindingCode.TIMESTAMPS_KEPT
-            if follows_wholly
-            else FindingCode.CLOCK_UNDECIDED,
+            FindingCode.EVEN_CLOCK if sampling.is_even else kept,
             period_s=sampling.period_s,
             sigma_period_s=sampling.sigma_period_s,
             rate_hz=1.0 / sampling.period_s,

@@ -16,7 +16,6 @@ from trihedron.arrays import FloatArray
 from trihedron.read.clock.base import build_clock
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.devices import Choice
-from trihedron.read.digest import hexdigest
 from trihedron.read.errors import ReadError
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
@@ -227,7 +226,7 @@ def _settled(
         is_stepwise=stepwise,
         start_epoch_s=start_s,
         source=str(table.path),
-        sha256=hexdigest(table.sha256),
+        sha256=table.sha256,
     )
     said = tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings)
     return replace(motion, findings=said)

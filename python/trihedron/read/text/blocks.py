@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import hashlib
 import io
 import lzma
 import re
 import zlib
 from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import check_ratio
@@ -20,16 +25,24 @@ BLOCK_BYTES = 1 << 23
 """Bytes parsed at a time: enough for polars to use every core, and little memory (parsing takes about twelve times the
 size of a block)."""
 
+Bytes = npt.NDArray[np.uint8]
+
+_ROOM = 1 << 16
+"""Bytes before a block for the incomplete last line of the previous one; a longer line is copied."""
+_TAIL = 1 << 12
+"""Bytes at the end of a block that nearly always contain a line end."""
 _PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
 
 
 @dataclass
 class Cursor:
-    """Position of the reader in the file: lines read so far, and whether this block is the last."""
+    """Position of the reader in the file: lines read so far, and whether this block is the last; ``sha256`` of a plain
+    file after that."""
 
     lines: int = 0
     is_last: bool = False
+    sha256: str = ""
 
 
 def compression_of(magic: bytes) -> str | None:
@@ -50,39 +63,55 @@ def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
 
 def blocks(
     path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None
-) -> Generator[bytes, None, None]:
-    """Blocks that end with a complete line; ``content`` are the file's bytes if they are unpacked already.
+) -> Generator[Bytes, None, None]:
+    """Blocks (k,) that end with a complete line, each read while the previous one is parsed, and valid until the next
+    one is requested; ``content`` are the file's bytes if they are unpacked already.
 
     Raises
     ------
     ReadError
-        When the file is damaged, or has no line ends.
+        When the file cannot be read, is damaged, or has no line ends.
     """
-    rest, lines, unpacked = b"", 0, 0
+    most, digest, lines, unpacked = BLOCK_BYTES, hashlib.sha256(), 0, 0
     try:
-        with open_binary(path, compression) if content is None else io.BytesIO(content) as stream:
-            while True:
-                pieces = [rest]
-                size = 0
+        with (
+            open_binary(path, compression) if content is None else io.BytesIO(content) as stream,
+            ThreadPoolExecutor(1) as reader,
+        ):
+
+            def fill(buffer: Bytes) -> int:
+                nonlocal lines, unpacked
+                view, size = buffer.data[_ROOM:], 0
                 # In pieces, so that the line at which a damaged archive breaks off is known.
-                while size < BLOCK_BYTES and (piece := stream.read1(_PIECE_BYTES)):
-                    pieces.append(piece)
-                    size += len(piece)
-                    unpacked += len(piece)
-                    lines += piece.count(b"\n") if compression else 0
+                while size < most and (count := stream.readinto1(view[size : min(size + _PIECE_BYTES, most)])):
+                    lines += bytes(view[size : size + count]).count(b"\n") if compression else 0
+                    size += count
+                unpacked += size
                 if compression is not None:
                     check_ratio(path, path.stat().st_size, unpacked)
-                data = b"".join(pieces)
-                cursor.is_last = size < BLOCK_BYTES
+                elif content is None:
+                    digest.update(view[:size])
+                return size
+
+            buffers = [np.empty(_ROOM + most, dtype=np.uint8) for _ in range(2)]
+            filling = reader.submit(fill, buffers[0])
+            rest = np.empty(0, dtype=np.uint8)
+            while True:
+                size, buffer = filling.result(), buffers[0]
+                block = _joined(rest, buffer, size)
+                cursor.is_last = size < most
                 if cursor.is_last:
-                    if data:
-                        yield data
+                    cursor.sha256 = digest.hexdigest() if compression is None and content is None else ""
+                    if len(block):
+                        yield block
                     return
-                cut = data.rfind(b"\n") + 1
+                cut = _behind_last_line(block)
                 if cut == 0:
-                    raise ReadError(f"{path}: no line end in {len(data) / 1e6:.0f} MB: this is not a text log.")
-                rest = data[cut:]
-                yield data[:cut]
+                    raise ReadError(f"{path}: no line end in {len(block) / 1e6:.0f} MB: this is not a text log.")
+                rest = block[cut:].copy()
+                buffers.reverse()
+                filling = reader.submit(fill, buffers[0])
+                yield block[:cut]
     except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
         raise ReadError(
             f"{path}: the {compression} data is damaged or ends too early, after about {lines} lines "
@@ -92,6 +121,21 @@ def blocks(
         if compression is not None and error.errno is None:
             raise ReadError(f"{path}: the {compression} data is damaged ({error}); copy the file again.") from None
         raise from_os_error(path, error) from None
+
+
+def _joined(rest: Bytes, buffer: Bytes, size: int) -> Bytes:
+    if len(rest) > _ROOM:
+        return np.concatenate([rest, buffer[_ROOM : _ROOM + size]])
+    start = _ROOM - len(rest)
+    buffer[start:_ROOM] = rest
+    return buffer[start : _ROOM + size]
+
+
+def _behind_last_line(block: Bytes) -> int:
+    """Index after the last line end; 0 where there is none."""
+    near = max(len(block) - _TAIL, 0)
+    found = block[near:].tobytes().rfind(b"\n")
+    return near + found + 1 if found >= 0 else block.tobytes().rfind(b"\n") + 1
 
 
 def beginning(path: Path, compression: str | None, n: int, content: bytes | None = None) -> bytes:
@@ -110,7 +154,7 @@ def beginning(path: Path, compression: str | None, n: int, content: bytes | None
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
         # Raises the error with the line after which the damage is.
         with closing(blocks(path, compression, Cursor())) as parts:
-            return next(parts, b"")[:n]
+            return next(parts, np.empty(0, dtype=np.uint8)).tobytes()[:n]
 
 
 _MINUS = "\u2212".encode()

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.errors import ReadError, panics_unprinted
+from trihedron.read.errors import ReadError, errors_of_polars
 from trihedron.read.names import parse_name
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
@@ -84,26 +84,18 @@ def parse(
     """
     import polars as pl
 
-    try:
-        with panics_unprinted():
-            return pl.read_csv(
-                io.BytesIO(data),
-                has_header=False,
-                separator=layout.separator,
-                schema=schema,
-                ignore_errors=True,
-                truncate_ragged_lines=True,
-                quote_char='"' if b'"' in data else None,
-                decimal_comma=layout.decimal_comma,
-                encoding="utf8-lossy",
-            )
-    except pl.exceptions.PanicException:
-        raise ReadError(f"{path}: the text from line {first_line} on cannot be read as a table.") from None
-    except pl.exceptions.PolarsError as error:
-        first = str(error).strip().split("\n")[0]
-        raise ReadError(
-            f"{path}: the text from line {first_line} on cannot be read as a table ({first[:160]})."
-        ) from None
+    with errors_of_polars(path, f"the text from line {first_line} on cannot be read as a table"):
+        return pl.read_csv(
+            io.BytesIO(data),
+            has_header=False,
+            separator=layout.separator,
+            schema=schema,
+            ignore_errors=True,
+            truncate_ragged_lines=True,
+            quote_char='"' if b'"' in data else None,
+            decimal_comma=layout.decimal_comma,
+            encoding="utf8-lossy",
+        )
 
 
 def refuse_words(

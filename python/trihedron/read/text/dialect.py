@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,10 +51,20 @@ class Rewritten:
     text: bytes
     lines: npt.NDArray[np.int64]
 
+    @classmethod
+    def of(cls, rows: Sequence[str], numbers: Sequence[int]) -> Rewritten:
+        """Rows, and the line in the file of each."""
+        return cls(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines of a text with any line ends."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
 
 def rewrite(text: str) -> Rewritten | None:
     """The text as a table; None where it has no known dialect."""
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = lines_of(text)
     prefix = _prefix_of(lines)
     timestamps: list[str] | None = None
     name = "arrival time"
@@ -73,7 +84,7 @@ def rewrite(text: str) -> Rewritten | None:
                 f"{timestamps[i - 1]},{row}" if timestamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)
             ]
         first = [numbers[0]] * (len(preamble) + 1)
-        return _joined([*preamble, ",".join(names), *rows], [*first, *numbers])
+        return Rewritten.of([*preamble, ",".join(names), *rows], [*first, *numbers])
     if timestamps is None:
         return None
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
@@ -85,11 +96,7 @@ def rewrite(text: str) -> Rewritten | None:
             rows.append(f"{timestamp if is_row else name}{glue}{rest}")
         else:
             rows.append(rest)
-    return _joined(rows, list(range(1, len(rows) + 1)))
-
-
-def _joined(rows: list[str], numbers: list[int]) -> Rewritten:
-    return Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
+    return Rewritten.of(rows, range(1, len(rows) + 1))
 
 
 def _prefix_of(lines: list[str]) -> re.Pattern[str] | None:

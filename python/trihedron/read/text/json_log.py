@@ -12,8 +12,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from trihedron.arrays import AXES
 from trihedron.read.errors import ReadError
 from trihedron.read.text.dialect import Rewritten
@@ -53,10 +51,7 @@ def of_json(path: Path, text: str) -> Rewritten:
     body = [",".join(_cell(row.get(name)) for name in names) for row in rows]
     numbers = list(range(1, len(rows) + 1)) if lines is None else lines
     head = ",".join(name.replace(",", " ") for name in names)
-    return Rewritten(
-        ("\n".join([head, *body]) + "\n").encode(),
-        np.array([numbers[0], *numbers, numbers[-1] + 1], dtype=np.int64),
-    )
+    return Rewritten.of([head, *body], [numbers[0], *numbers])
 
 
 Row = dict[str, Any]
@@ -88,11 +83,7 @@ def _of_value(value: Any) -> list[Row]:
     """Rows of a JSON document that is one value."""
     if isinstance(value, Mapping):
         inner = value.get("payload", value)
-        if (
-            isinstance(inner, Mapping)
-            and isinstance(inner.get("sensors"), list)
-            and isinstance(inner.get("values"), list)
-        ):
+        if isinstance(inner, Mapping) and all(isinstance(inner.get(key), list) for key in ("sensors", "values")):
             return _edge_impulse(inner)
         columns = {k: v for k, v in _flat(value).items() if isinstance(v, list) and v}
         tables = [v for v in columns.values() if isinstance(v[0], Mapping)]

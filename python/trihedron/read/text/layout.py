@@ -163,9 +163,8 @@ def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[
     if first != 0 or len(lines) < 4:
         return first, {}
     start, rate = (split(line, separator) for line in lines[:2])
-    if len(set(start)) != 1 or len(set(rate)) != 1 or len(start) < 3 or len(start) != len(rate):
-        return first, {}
-    if not (is_number(start[0], False) and is_number(rate[0], False)):
+    is_repeated = len(set(start)) == len(set(rate)) == 1 and len(start) == len(rate) >= 3
+    if not (is_repeated and is_number(start[0], False) and is_number(rate[0], False)):
         return first, {}
     if not (1e9 <= float(start[0]) <= 4e9 and 0.0 < float(rate[0]) <= 1e4):
         return first, {}
@@ -174,14 +173,10 @@ def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[
 
 def _looks_like_row(line: str, decimal_comma: bool, at_least: int = 3) -> bool:
     """Whether a line has ``at_least`` numbers, with any separator, and at most as many other fields."""
-    for separator in (",", "\t", ";", " "):
-        fields = split(line, separator)
-        if (
-            sum(is_number(f, decimal_comma) for f in fields) >= at_least
-            and _numeric_fraction(fields, decimal_comma) >= 0.5
-        ):
-            return True
-    return False
+    return any(
+        sum(is_number(f, decimal_comma) for f in fields) >= at_least and _numeric_fraction(fields, decimal_comma) >= 0.5
+        for fields in (split(line, separator) for separator in (",", "\t", ";", " "))
+    )
 
 
 def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int, ...]:

@@ -1,15 +1,18 @@
-"""Lines of a block normalised, counted and separated into rows and remarks, without a Python loop over rows."""
+"""Lines of a block normalised, counted and separated into rows and remarks."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.text.layout import Layout
+from trihedron.read.text.layout import COMMENT_STARTS, Layout
 
 Counts = npt.NDArray[np.int64]
+_COMMENTS = tuple(mark.encode() for mark in COMMENT_STARTS)
+_QUOTED = re.compile(rb'"[^"]*"')
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,50 +82,20 @@ def offset_of_line(data: bytes, line: int) -> int:
 
 def data_lines(data: bytes, layout: Layout, lines_before: int) -> Lines:
     """The rows of a block without blank lines and comments; separators inside quotes do not count."""
-    raw = np.frombuffer(data, dtype=np.uint8)
-    ends = np.flatnonzero(raw == 10)
-    starts = np.concatenate([np.zeros(1, dtype=ends.dtype), ends[:-1] + 1])
-    numbers = np.arange(lines_before + 1, lines_before + 1 + len(starts), dtype=np.int64)
-    first = raw[starts]
-    is_blank = first == 10
-    # A comment mark of two letters needs both: a single '/' is not a comment.
-    second = raw[np.minimum(starts + 1, len(raw) - 1)]
-    is_comment = (first == ord("#")) | (first == ord("%")) | ((first == ord("/")) & (second == ord("/")))
-    is_separator = raw == ord(layout.separator)
-    unclosed = 0
-    if b'"' in data:
-        inside = _quoted(raw, starts, ends)
-        is_separator &= ~inside
-        unclosed = int(numbers[np.argmax(inside[ends])]) if inside[ends].any() else 0
-    counts = _fields_per_line(is_separator, starts, ends, layout.n_fields)
-    keep = ~(is_blank | is_comment)
-    comments = numbers[is_comment]
-    last = int(numbers[-1])
-    if keep.all():
-        return Lines(numbers, counts, data, comments, last, unclosed)
-    if not keep.any():
-        return Lines(numbers[:0], counts[:0], b"", comments, last, unclosed)
-    kept = raw[np.repeat(keep, ends - starts + 1)].tobytes()
-    return Lines(numbers[keep], counts[keep], kept, comments, last, unclosed)
-
-
-def _quoted(
-    raw: npt.NDArray[np.uint8], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp]
-) -> npt.NDArray[np.bool_]:
-    """Mask of the bytes inside quotes; every line starts outside, so that an unclosed quote affects only its line."""
-    opened = np.cumsum(raw == ord('"'))
-    before = np.concatenate([np.zeros(1, dtype=opened.dtype), opened[starts[1:] - 1]])
-    return np.asarray((opened - np.repeat(before, ends - starts + 1)) % 2 == 1)
-
-
-def _fields_per_line(
-    is_separator: npt.NDArray[np.bool_], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp], expected: int
-) -> Counts:
-    """Number of fields of each line; four times faster in the usual case that all have the expected number."""
-    if expected > 1:
-        at = np.flatnonzero(is_separator)
-        if len(at) == len(starts) * (expected - 1):
-            grid = at.reshape(len(starts), expected - 1)
-            if np.all(grid[:, 0] >= starts) and np.all(grid[:, -1] < ends):
-                return np.full(len(starts), expected, dtype=np.int64)
-    return np.add.reduceat(is_separator.view(np.int8), starts, dtype=np.int64) + 1
+    lines = data.split(b"\n")[:-1]
+    comments = [i for i, line in enumerate(lines) if line.startswith(_COMMENTS)]
+    is_comment = set(comments)
+    number = [i for i, line in enumerate(lines) if line and i not in is_comment]
+    rows = [lines[i] for i in number] if len(number) < len(lines) else lines
+    bare = [_QUOTED.sub(b"", row) for row in rows] if b'"' in data else rows
+    separator = layout.separator.encode()
+    open_quotes = (i for i, row in zip(number, bare, strict=True) if b'"' in row)
+    unclosed = next((i + lines_before + 1 for i in open_quotes), 0) if bare is not rows else 0
+    return Lines(
+        np.array(number, dtype=np.int64) + lines_before + 1,
+        np.array([row.count(separator) + 1 for row in bare], dtype=np.int64),
+        b"\n".join([*rows, b""]) if len(number) < len(lines) else data,
+        np.array(comments, dtype=np.int64) + lines_before + 1,
+        lines_before + len(lines),
+        unclosed,
+    )

@@ -65,7 +65,7 @@ def _whole(path: Path, compression: str | None, size: int, content: bytes | None
     check_memory(path, size // 2, 1)
     cursor = Cursor()
     with closing(blocks(path, compression, cursor, content)) as parts:
-        return b"".join(as_utf8(path, part, 1) for part in parts).decode("utf-8", errors="replace")
+        return b"".join(as_utf8(path, part.tobytes(), 1) for part in parts).decode("utf-8", errors="replace")
 
 
 def _of_rewritten(path: Path, size: int, progress: Progress | None, rewritten: Rewritten, sha256: str | None) -> Table:
@@ -91,13 +91,5 @@ def _of_records(
         kinds=sorted(counts.items(), key=lambda kv: -kv[1])[:12],
         rows_left_out=left,
     )
-    accelerometer = tables["accelerometer"]
-    return (
-        replace(
-            accelerometer,
-            sensor="accelerometer",
-            rows_in_file=accelerometer.n_in_file + left,
-            findings=(*accelerometer.findings, note),
-        ),
-        replace(tables["gyroscope"], sensor="gyroscope"),
-    )
+    first, second = (replace(table, sensor=kind) for kind, table in tables.items())
+    return replace(first, rows_in_file=first.n_in_file + left, findings=(*first.findings, note)), second

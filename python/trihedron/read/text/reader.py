@@ -12,14 +12,13 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.read.columns import find_columns
-from trihedron.read.digest import LateSha256, file_sha256, kept_open
+from trihedron.read.columns import columns_or_none
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
 from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
-from trihedron.read.text.ahead import Bytes, blocks_ahead
-from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
+from trihedron.read.text.blocks import Bytes, Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import (
     MAX_WORDS,
     TextColumn,
@@ -60,7 +59,7 @@ class TextReader:
     ) -> None:
         self.path, self.compression, self.size, self.progress = path, compression, size, progress
         self.content, self.true_lines = content, lines
-        self.sha256: str | LateSha256 | None = sha256
+        self.sha256 = sha256
         self.cursor = Cursor()
         self.store = Store(0)
         self.lines = RowLines()
@@ -76,21 +75,15 @@ class TextReader:
     def read(self) -> Table:
         """The whole file as a table."""
         # Closed even after an exception, so that the file does not stay open until the next garbage collection.
-        if self.content is None and self.compression is None:
-            with kept_open(self.path) as stream, closing(blocks_ahead(self.path, stream, self.cursor)) as ahead:
-                layout = self._read(ahead)
-            self.sha256 = LateSha256(self.path, stream, self.n_bytes)
-        else:
-            with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
-                layout = self._read(parts)
-        return self._table(layout)
+        with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
+            return self._table(self._read(parts))
 
-    def _read(self, parts: Iterable[bytes] | Iterable[Bytes]) -> Layout:
+    def _read(self, parts: Iterable[Bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
             # Nearly all blocks after the first contain only rows of numbers and need no further checks.
             if layout is None or self.semicolons or not self._plain(part, layout):
-                layout = self._odd_part(part if isinstance(part, bytes) else part.tobytes(), layout)
+                layout = self._odd_part(part.tobytes(), layout)
             self.n_bytes += len(part)
             if self.progress is not None:
                 done = min(self.n_bytes / self.size, 1.0) if self.compression is None else 0.5
@@ -199,18 +192,18 @@ class TextReader:
         if len(lines):
             self._parse(text, lines, layout)
 
-    def _plain(self, data: bytes | Bytes, layout: Layout) -> bool:
+    def _plain(self, text: Bytes, layout: Layout) -> bool:
         """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
         if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
-        text, separator = np.frombuffer(data, dtype=np.uint8), ord(layout.separator)
+        separator = ord(layout.separator)
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
         places, room = self.store.lend(0, 0)
         rows, is_read = _core.plain_table_into(text, separator, places, room)
         if not rows:
             return False
-        expected = self._expected(rows, len(data), layout)
+        expected = self._expected(rows, len(text), layout)
         if rows > len(room[0]):  # there was no room: the lines were counted but not read
             rows, is_read = _core.plain_table_into(text, separator, *self.store.lend(rows, expected))
         if is_read:
@@ -291,13 +284,10 @@ class TextReader:
     def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
         """Columns of each sensor, to be stored as one array (n, 3); a wrong guess only costs memory."""
         head = Table(self.path, layout.names, tuple(column[:1000] for column in columns), first_line=1)
-        try:
-            chosen = find_columns(head, None, None)
-        except ReadError:
+        chosen = columns_or_none(head)
+        if chosen is None or len(set(chosen.readings)) < len(chosen.readings):
             return ()
-        found = [triad for triad in (chosen.accelerometer, chosen.gyroscope) if triad is not None]
-        taken = [column for triad in found for column in triad]
-        return tuple(found) if len(set(taken)) == len(taken) else ()
+        return tuple(triad for triad in (chosen.accelerometer, chosen.gyroscope) if triad is not None)
 
     def _table(self, layout: Layout) -> Table:
         if self.n_rows == 0:
@@ -338,7 +328,7 @@ class TextReader:
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
-            sha256=file_sha256(self.path) if self.sha256 is None else self.sha256,
+            sha256=self.sha256 or self.cursor.sha256 or file_sha256(self.path),
             metadata=layout.metadata,
             first_line=self.lines.first,
             line_of_row=self.lines.all(),

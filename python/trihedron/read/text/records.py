@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-import numpy as np
-
 from trihedron.read.devices import pick_kind
-from trihedron.read.text.dialect import Rewritten
+from trihedron.read.text.dialect import Rewritten, lines_of
 from trihedron.read.text.layout import is_number, split
 
 _SAMPLE_LINES = 4000
@@ -20,7 +18,7 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None
 
     None where the first words do not identify both sensors.
     """
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = lines_of(text)
     separator = _separator(lines[:_SAMPLE_LINES])
     if separator is None:
         return None
@@ -39,7 +37,7 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None
         if header is not None:
             rows.insert(0, re.sub(r"^[#%/\s]*", "", lines[header - 1]))
             numbers.insert(0, header)
-        out[kind] = Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
+        out[kind] = Rewritten.of(rows, numbers)
     return out, counts
 
 

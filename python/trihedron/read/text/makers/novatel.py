@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
-from trihedron.read.text.dialect import Rewritten
+from trihedron.read.text.dialect import Rewritten, lines_of
 
 _COUNTS = r"(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+)"
 _MESSAGE = re.compile(
@@ -25,7 +23,7 @@ def rewritten(text: str) -> Rewritten | None:
     """
     if "RAWIMU" not in text[:100_000]:
         return None
-    lines = text.replace("\r\n", "\n").split("\n")
+    lines = lines_of(text)
     rows, numbers, n_messages = [_HEADER], [1], 0
     for number, line in enumerate(lines, start=1):
         if not line.strip():
@@ -42,4 +40,4 @@ def rewritten(text: str) -> Rewritten | None:
         numbers.append(number)
     if not n_messages:
         return None
-    return Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
+    return Rewritten.of(rows, numbers)

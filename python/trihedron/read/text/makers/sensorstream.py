@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
-from trihedron.read.text.dialect import NEARLY_ALL, Rewritten
+from trihedron.read.text.dialect import NEARLY_ALL, Rewritten, lines_of
 
 _NUMBER = r"\s*[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?\s*"
 _LINE = re.compile(rf"{_NUMBER}(?:,\s*\d{{1,2}}\s*(?:,{_NUMBER}){{3}})+,?\s*")
@@ -17,7 +15,7 @@ _JUDGED = 200
 
 def rewritten(text: str) -> Rewritten | None:
     """A table of time, accelerometer [m/s²], gyro [rad/s] and magnetometer [µT]; None for another format."""
-    lines = text.replace("\r\n", "\n").split("\n")
+    lines = lines_of(text)
     sample = [line for line in lines[:_JUDGED] if line.strip()]
     if not sample or not _LINE.fullmatch(sample[0]) or "3" not in {s.strip() for s in sample[0].split(",")[1::4]}:
         return None
@@ -34,4 +32,4 @@ def rewritten(text: str) -> Rewritten | None:
         # A damaged line is unchanged, so that the reader of tables reports it.
         rows.append(",".join([fields[0], *cells]) if is_one else line)
         numbers.append(number)
-    return Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
+    return Rewritten.of(rows, numbers)
