@@ -45,10 +45,7 @@ def beside(
 ) -> DiagnosisResult:
     """The ordinary diagnosis with the fit to the reference added, or that fit alone where the log has too few poses.
 
-    Raises
-    ------
-    ValueError
-        As :func:`trihedron.api.referring.held_against`.
+    Refused as :func:`trihedron.api.referring.held_against`.
     """
     said: tuple[Finding, ...] = ()
     if given is not None and place == (None, None, None):
@@ -97,10 +94,7 @@ def beside(
 def in_si(log: Recording, gravity: float | None) -> Recording:
     """The log itself where its gyro is in rad/s or deg/s; a log in counts by its own calibration.
 
-    Raises
-    ------
-    ValueError
-        When it is in counts and its poses do not determine a calibration.
+    Refused when it is in counts and its poses do not determine a calibration.
     """
     if rate_to_si(log.gyroscope_unit) is not None:
         return log

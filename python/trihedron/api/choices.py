@@ -13,10 +13,7 @@ def settle_gravity(
 ) -> tuple[float, str, tuple[Finding, ...]]:
     """|g| [m/s²], its source, and findings about it.
 
-    Raises
-    ------
-    ValueError
-        When two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
+    Refused when two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:

@@ -44,10 +44,7 @@ def driven(
 
     ``own`` is the recording's own calibration, by which its motion is computed from its readings.
 
-    Raises
-    ------
-    ValueError
-        When the recording lacks a sensor or has no static pose.
+    Refused when the recording lacks a sensor or has no static pose.
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_scenario(recording, resegment(recording, segments), own).motion

@@ -143,10 +143,7 @@ def noise_of_file(
     disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
     continues from it with bit-identical results, and the end removes it.
 
-    Raises
-    ------
-    ValueError
-        When file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
+    Refused when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
     factor, names, units = [], [], []
@@ -220,10 +217,7 @@ def noise_of_curve(
     ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
     whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
 
-    Raises
-    ------
-    ValueError
-        When the table is not recognised, too short, or does not state the log's rate and length.
+    Refused when the table is not recognised, too short, or does not state the log's rate and length.
     """
     table = read_allan_table(Path(path))
     rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
@@ -249,10 +243,7 @@ def noise_of_curve(
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
     """Recording time [s] for a relative uncertainty ``relative`` of each term present, by axis; None beyond a month.
 
-    Raises
-    ------
-    ValueError
-        When ``relative`` is no positive fraction.
+    Refused when ``relative`` is no positive fraction.
     """
     return {
         axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}

@@ -60,10 +60,7 @@ def improve(
     Only entries that differ are replaced, with their comment; all else stays. Effects that only the scenario has are
     removed. ``stage`` stops after the parameters, or after noise and sampling.
 
-    Raises
-    ------
-    ValueError
-        When the file is no scenario, or the diagnosis was not made against one.
+    Refused when the file is no scenario, or the diagnosis was not made against one.
     """
     given = read_scenario(scenario)
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}

@@ -80,13 +80,7 @@ def guide(
 
 
 def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: Tell | None = None) -> Replay:
-    """Run the guide on a log, block by block, as in a live session.
-
-    Raises
-    ------
-    ValueError
-        When the log has no accelerometer.
-    """
+    """Run the guide on a log, block by block, as in a live session. Refused when the log has no accelerometer."""
     readings = readings_of(recording)
     now_s = 0.0
 

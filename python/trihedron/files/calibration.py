@@ -100,10 +100,7 @@ def calibration_text(calibration: Calibration) -> str:
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """A calibration as plain JSON types.
 
-    Raises
-    ------
-    ValueError
-        When a sensor's covariance differs from its block of the full one: the file stores each number once.
+    Refused when a sensor's covariance differs from its block of the full one: the file stores each number once.
     """
     sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
     for k, (name, sensor) in enumerate(sensors.items()):
@@ -137,10 +134,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
 def calibration_from_document(document: object, source: str = "document") -> Calibration:
     """The calibration in a document; ``source`` is its name in error messages.
 
-    Raises
-    ------
-    CalibrationFileError
-        When it does not follow the schema or its content is invalid.
+    Refused when it does not follow the schema or its content is invalid.
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(

@@ -30,10 +30,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 
     ``-`` is CSV on stdout.
 
-    Raises
-    ------
-    OutputError
-        When the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
+    Refused when the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
     """
     if str(path) != "-":
         check_suffix(path)

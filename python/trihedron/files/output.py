@@ -60,10 +60,7 @@ class Temporary:
     def put_in_place(self, mode: int | None, *, overwrite: bool = False) -> None:
         """Rename to the target, which replaces a file of permissions ``mode``, or is new where ``mode`` is None.
 
-        Raises
-        ------
-        FileExistsError
-            When ``mode`` is None and a file has appeared, without ``overwrite``.
+        Raises FileExistsError when ``mode`` is None and a file has appeared, without ``overwrite``.
         """
         # The file was created private; it gets the permissions of the file it replaces, or those of any new file.
         if mode is None:
@@ -141,10 +138,7 @@ class OutputError(RefusedError):
 def check_report(path: Path) -> None:
     """Refuse a report whose ending is not that of a format.
 
-    Raises
-    ------
-    OutputError
-        When the ending is unknown; the message lists the valid ones.
+    Refused when the ending is unknown; the message lists the valid ones.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
         raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
@@ -157,11 +151,8 @@ def check_free(
 
     ``inputs`` are the files that the outputs are made from: none of them is overwritten, even with ``overwrite``.
 
-    Raises
-    ------
-    OutputError
-        When a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable, or
-        one name is given twice.
+    Refused when a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable,
+    or one name is given twice.
     """
     read = {identity: Path(path) for path in inputs if path is not None and (identity := _identity(path))}
     seen: set[str] = set()
@@ -229,10 +220,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
 
     A link is followed. Temporary files of killed processes in the folder are deleted.
 
-    Raises
-    ------
-    OutputError
-        As :func:`check_free`, or when the system refuses.
+    Refused as :func:`check_free`, or when the system refuses.
     """
     target = Path(path)
     check_free([target], overwrite=overwrite)
@@ -274,10 +262,7 @@ def is_stream(path: Path, found: os.stat_result | None) -> bool:
 def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
     """Write all of ``data`` to a device, pipe or socket.
 
-    Raises
-    ------
-    OSError
-        When a pipe has no reader, or the system refuses.
+    Raises OSError when a pipe has no reader, or the system refuses.
     """
     if found is not None and stat.S_ISSOCK(found.st_mode):
         with socket.socket(socket.AF_UNIX) as connection:

@@ -51,10 +51,7 @@ def check_truth_suffix(path: Path) -> None:
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the truth; ``.npz`` contains everything, ``.json`` all but the arrays per sample.
 
-    Raises
-    ------
-    OutputError
-        When the ending is another one, or the file exists and may not be replaced.
+    Refused when the ending is another one, or the file exists and may not be replaced.
     """
     target = Path(path)
     check_truth_suffix(target)
@@ -69,13 +66,7 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
 
 
 def read_truth(path: str | os.PathLike[str]) -> Truth:
-    """Read a truth file that :func:`write_truth` wrote as ``.npz``.
-
-    Raises
-    ------
-    ValueError
-        When the file is not such a file.
-    """
+    """Read a truth file that :func:`write_truth` wrote as ``.npz``. Refused when the file is not such a file."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             header = json.loads(str(archive["header"]))

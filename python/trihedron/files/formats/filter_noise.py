@@ -113,10 +113,7 @@ TARGETS: dict[str, _Target] = {
 def filter_noise_text(found: FilterNoise, target: str) -> str:
     """The noise of both sensors in the format of ``target``.
 
-    Raises
-    ------
-    ValueError
-        When the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
+    Refused when the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
     """
     one = TARGETS.get(target)
     if one is None:

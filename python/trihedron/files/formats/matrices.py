@@ -28,10 +28,7 @@ def noise_alone(
 ) -> tuple[Calibration, Figures, list[str]]:
     """The calibration of readings in SI, the noise figures that the target requires, and comments for its file.
 
-    Raises
-    ------
-    ValueError
-        When noise or rate are not given: the target reads a missing key as 0.
+    Refused when noise or rate are not given: the target reads a missing key as 0.
     """
     known = of_si_readings(calibration, target, options)
     figures = required(known, options, target)

@@ -21,13 +21,7 @@ class Figures:
 
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
-    """The noise and rate that the target's reader requires.
-
-    Raises
-    ------
-    ValueError
-        When noise or rate are not given.
-    """
+    """The noise and rate that the target's reader requires. Refused when noise or rate are not given."""
     accel, gyro = options.accelerometer_noise, options.gyroscope_noise
     if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
         raise RefusedError(
