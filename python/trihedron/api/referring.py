@@ -209,8 +209,8 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
 
 def diagnosis_by(
     found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
-) -> dict[str, Any]:
-    """Fields of a diagnosis by the reference alone, for a log with too few poses."""
+) -> Diagnosis:
+    """A diagnosis by the reference alone, for a log with too few poses."""
     effects = effects_of(found)
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
     test = _rate(found)
@@ -221,7 +221,7 @@ def diagnosis_by(
     if effects:
         verdict = "missing-physics"
     linear = _linear(found, recording)
-    base = Diagnosis(
+    return Diagnosis(
         verdict=verdict,
         domains=(test,),
         effects=effects,
@@ -239,7 +239,6 @@ def diagnosis_by(
         recording_sha256=recording.sha256,
         parameters=parameters,
     )
-    return dict(vars(base))
 
 
 def _rate(found: AgainstReference) -> DomainTest:

@@ -73,9 +73,9 @@ def guide(
     --------
     >>> calibrated, checked = trihedron.guide("session.csv", "accel 0.1 %, gyro 0.2 %")  # doctest: +SKIP
     """
-    said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
-    wanted, gravity = Accuracy.parse(accuracy), settle_gravity(**said)[0]
+    wanted, gravity = Accuracy.parse(accuracy), settle_gravity(gravity_m_s2, latitude_deg, height_m)[0]
     done = replay(recording_of(recording), wanted, gravity_m_s2=gravity, on_pose=on_pose)
+    said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
     return conclude(done.recording, done.cut_s, **said)
 
 

@@ -1,7 +1,7 @@
 """Calibrations in the file formats of other programs: written with their equation stated, and in most cases read.
 
 Programs differ in the direction of the matrices: some store raw → true, some true → raw, some subtract the bias before
-the matrix and some after it. Each module contains one format (``FORMAT``) and is found automatically. Writers are
+the matrix and some after it. The ``FORMATS`` of every module are found automatically. Writers are
 tested by evaluating the target's equation, readers as the inverse of their writers.
 """
 
@@ -46,7 +46,7 @@ __all__ = [
 @cache
 def formats() -> dict[str, Format]:
     """Every format by name."""
-    found = [module.FORMAT for module in modules_of(__name__, __path__) if hasattr(module, "FORMAT")]
+    found = [one for module in modules_of(__name__, __path__) for one in getattr(module, "FORMATS", ())]
     return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 

@@ -37,4 +37,4 @@ def to_airsim(calibration: Calibration, options: ExportOptions) -> str:
     return json.dumps({"Sensors": {"Imu": imu}, "written_by_trihedron": said}, indent=2) + "\n"
 
 
-FORMAT = Format("airsim", to_airsim, in_si=True)
+FORMATS = (Format("airsim", to_airsim, in_si=True),)

@@ -172,4 +172,4 @@ def _about(board: Onboard) -> list[str]:
     ]
 
 
-FORMAT = Format("ardupilot", to_ardupilot, from_ardupilot, in_si=True)
+FORMATS = (Format("ardupilot", to_ardupilot, from_ardupilot, in_si=True),)

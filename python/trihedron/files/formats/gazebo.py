@@ -45,4 +45,4 @@ def to_gazebo(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, "  </imu>", "</sensor>", ""])
 
 
-FORMAT = Format("gazebo", to_gazebo, in_si=True)
+FORMATS = (Format("gazebo", to_gazebo, in_si=True),)

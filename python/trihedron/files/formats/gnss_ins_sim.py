@@ -42,4 +42,4 @@ def to_gnss_ins_sim(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-FORMAT = Format("gnss-ins-sim", to_gnss_ins_sim, in_si=True)
+FORMATS = (Format("gnss-ins-sim", to_gnss_ins_sim, in_si=True),)

@@ -34,4 +34,4 @@ def to_imusensor(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, ""])
 
 
-FORMAT = Format("imusensor", to_imusensor, in_si=True)
+FORMATS = (Format("imusensor", to_imusensor, in_si=True),)

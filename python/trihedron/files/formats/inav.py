@@ -74,4 +74,4 @@ def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
     return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(XYZ, whole, strict=True)]
 
 
-FORMAT = Format("inav", to_inav, in_si=True)
+FORMATS = (Format("inav", to_inav, in_si=True),)

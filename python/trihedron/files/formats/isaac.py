@@ -56,4 +56,4 @@ def _lost_walks(figures: Figures) -> tuple[str, ...]:
     )
 
 
-FORMAT = Format("isaac", to_isaac, in_si=True)
+FORMATS = (Format("isaac", to_isaac, in_si=True),)

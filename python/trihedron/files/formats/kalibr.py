@@ -20,17 +20,10 @@ from trihedron.files.formats.contract import (
     row,
 )
 from trihedron.files.formats.matrices import in_lower, lower_orthogonal
-from trihedron.files.formats.noise_keys import required, si_rows
+from trihedron.files.formats.noise_keys import KEYS, required, si_rows
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
-
-KEYS = (
-    "accelerometer_noise_density",
-    "accelerometer_random_walk",
-    "gyroscope_noise_density",
-    "gyroscope_random_walk",
-)
 
 
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
@@ -42,7 +35,7 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     figures = required(lower, options, "Kalibr")
     equation = "a_m = M a + b;  w_m = M C_gyro_i w + A C_gyro_i a + b: true to measured."
     lines = [f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",))]
-    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS)]
+    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS["kalibr"])]
     lines += [f"rostopic: {options.topic}", f"update_rate: {number(figures.rate_hz)}"]
     lines += ["# Intrinsics, named as in Kalibr's own results:", "model: scale-misalignment", "accelerometers:", "  M:"]
     lines += matrix_rows(M_a, 2)
@@ -69,7 +62,7 @@ def from_kalibr(text: str) -> Calibration | None:
     if isinstance(camera, dict) and "T_cam_imu" in camera and "imu0" not in document:
         raise without_readings("Kalibr's camchain-imucam.yaml")
     document = document.get("imu0", document)
-    if not isinstance(document, dict) or not {KEYS[0], KEYS[2]} <= document.keys():
+    if not isinstance(document, dict) or not {KEYS["kalibr"][0], KEYS["kalibr"][2]} <= document.keys():
         return None
     accel, gyro = document.get("accelerometers") or {}, document.get("gyroscopes") or {}
     M_a = array_of(accel.get("M"), (3, 3), np.eye(3))
@@ -90,4 +83,4 @@ def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dt
     return np.array([[values.get(f"G_{i}{j}", 0.0) for j in AXES] for i in AXES])
 
 
-FORMAT = Format("kalibr", to_kalibr, from_kalibr, in_si=True)
+FORMATS = (Format("kalibr", to_kalibr, from_kalibr, in_si=True),)

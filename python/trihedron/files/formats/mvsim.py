@@ -30,4 +30,4 @@ def to_mvsim(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, "</sensor>", ""])
 
 
-FORMAT = Format("mvsim", to_mvsim, in_si=True)
+FORMATS = (Format("mvsim", to_mvsim, in_si=True),)

@@ -170,4 +170,4 @@ def _about(board: Onboard) -> list[str]:
     ]
 
 
-FORMAT = Format("px4", to_px4, from_px4, in_si=True)
+FORMATS = (Format("px4", to_px4, from_px4, in_si=True),)

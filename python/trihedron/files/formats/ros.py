@@ -31,4 +31,4 @@ def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, f"orientation_covariance: [{row(unknown)}]", ""])
 
 
-FORMAT = Format("ros", to_ros, in_si=True)
+FORMATS = (Format("ros", to_ros, in_si=True),)
