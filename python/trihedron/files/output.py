@@ -1,14 +1,13 @@
 """Output files: written completely or not at all, over an existing file only on request, and never over an input.
 
 A regular file is written under a temporary name in the same folder and renamed in one step. Other outputs (a device, a
-pipe, a socket) are written to directly and never replaced.
+pipe) are written to directly and never replaced.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import socket
 import stat
 import sys
 import time
@@ -241,7 +240,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
         raise OutputError(f"{target}: the system cannot write this file ({error.strerror or error}).") from None
 
 
-# Outputs that are not regular files: terminals, pipes, sockets, devices. They are written to directly.
+# Outputs that are not regular files: terminals, pipes, devices. They are written to directly.
 
 _READER_WAIT_S = 5.0
 """Time to wait for the reader of a pipe [s]: enough for two commands started together, but not forever."""
@@ -260,15 +259,10 @@ def is_stream(path: Path, found: os.stat_result | None) -> bool:
 
 
 def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
-    """Write all of ``data`` to a device, pipe or socket.
+    """Write all of ``data`` to a device or pipe.
 
     Raises OSError when a pipe has no reader, or the system refuses.
     """
-    if found is not None and stat.S_ISSOCK(found.st_mode):
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(path))
-            connection.sendall(data)
-        return
     with os.fdopen(_opened(path, found), "wb", buffering=0) as stream:
         left = memoryview(data)
         while left:
