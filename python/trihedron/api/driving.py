@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -53,15 +53,10 @@ def driven(
 
 
 def _sensed(scenario: Scenario, seed: int) -> Recording:
-    """The simulated log, with timestamps as after reading from a file where they scatter."""
+    """The simulated log; where its timestamps scatter written and read back, so that they are judged as in a file."""
     simulated, _ = simulate(scenario, seed)
-    if scenario.clock.timestamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
-        return _as_read(simulated)
-    return simulated
-
-
-def _as_read(simulated: Recording) -> Recording:
-    """A simulated log written and read back, so that its timestamps are judged as the recording's were."""
+    if scenario.clock.timestamp_jitter_s == 0.0 and scenario.clock.jitter_s == 0.0:
+        return simulated
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "simulated.csv"
         write_recording(simulated, path)
@@ -79,12 +74,12 @@ class MovedAlike:
         cut = resegment(recording, segments)
         self._motion = twin_scenario(recording, cut, own).motion
         self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
-        carried = tilt_errors_of(own, recording, cut)
+        angle_rad, duration_s = tilt_errors_of(own, recording, cut)
         self.poses = _of_poses(own)
-        self.moves = _of_moves(carried)
+        self.moves = _of_moves(angle_rad)
         # The worst move, which is excluded, is often the longest.
-        worst = [int(np.argmax(carried.angle_rad))] if len(carried.angle_rad) else []
-        self.duration_s = np.delete(carried.duration_s, worst)
+        worst = [int(np.argmax(angle_rad))] if len(angle_rad) else []
+        self.duration_s = np.delete(duration_s, worst)
 
     def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
         """Mean square pose error [(m/s²)²] and move error [rad²] over ``N_SEEDS`` simulations, each calibrated."""
@@ -105,8 +100,8 @@ class MovedAlike:
             return None, None
         if result.calibration.gyroscope is None:
             return _of_poses(result.calibration), None
-        carried = tilt_errors_of(result.calibration, log, resegment(log, result.segments))
-        return _of_poses(result.calibration), _of_moves(carried)
+        angle_rad, _ = tilt_errors_of(result.calibration, log, resegment(log, result.segments))
+        return _of_poses(result.calibration), _of_moves(angle_rad)
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
@@ -224,9 +219,9 @@ def _of_poses(calibration: Calibration) -> float | None:
     return _mean_square_without_worst(quality.residual) * len(quality.residual) / quality.dof
 
 
-def _of_moves(carried: TiltErrors) -> float | None:
+def _of_moves(angle_rad: FloatArray) -> float | None:
     """Mean square of the tilt errors after rotations [rad²], without the worst."""
-    return _mean_square_without_worst(carried.angle_rad) if len(carried.angle_rad) >= FEWEST_MOVES else None
+    return _mean_square_without_worst(angle_rad) if len(angle_rad) >= FEWEST_MOVES else None
 
 
 def _mean_square_without_worst(misses: FloatArray) -> float:
@@ -234,23 +229,15 @@ def _mean_square_without_worst(misses: FloatArray) -> float:
     return float(np.mean(np.sort(misses**2)[:-1]))
 
 
-@dataclass(frozen=True, eq=False)
-class TiltErrors:
-    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and the rotations' duration.
+def tilt_errors_of(own: Calibration, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray]:
+    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and its duration (m,) [s].
 
     Without rotations beyond the gyro's range: clipping is no bias error.
     """
-
-    angle_rad: FloatArray
-    duration_s: FloatArray
-
-
-def tilt_errors_of(own: Calibration, recording: Recording, segments: Segments) -> TiltErrors:
-    """Tilt errors after rotations by a recording's own calibration."""
     checked = verify_calibration(own, recording, segments, own.gravity_m_s2, own.gravity_source)
     t = recording.time_s
     cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
     sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.poses)], dtype=np.bool_)
     lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.poses)]
     used = sound[checked.moves]
-    return TiltErrors(radians_from_degrees(1.0) * checked.angle_deg[used], np.array(lasts)[checked.moves][used])
+    return radians_from_degrees(1.0) * checked.angle_deg[used], np.array(lasts)[checked.moves][used]

@@ -19,28 +19,16 @@ from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
-from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise, given
-from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
+from trihedron.files.formats.contract import ExportOptions as ExportOptions
+from trihedron.files.formats.contract import Format, given
+from trihedron.files.formats.contract import NoiseFigure as NoiseFigure
+from trihedron.files.formats.contract import SensorNoise as SensorNoise
+from trihedron.files.formats.matrices import lower_orthogonal as lower_orthogonal
+from trihedron.files.formats.matrices import upper_frame as upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.folders import modules_of
 from trihedron.records import Calibration
 from trihedron.sanitise import printable
-
-__all__ = [
-    "ExportOptions",
-    "Format",
-    "NoiseFigure",
-    "SensorNoise",
-    "any_calibration",
-    "export_calibration",
-    "export_files",
-    "formats",
-    "is_calibration",
-    "lower_orthogonal",
-    "needs",
-    "targets",
-    "upper_frame",
-]
 
 
 @cache
