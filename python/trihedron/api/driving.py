@@ -37,9 +37,7 @@ SEED, N_SEEDS = 20, 8
 the rms error of twenty poses is a fifth for one simulation, a fifteenth for eight."""
 
 
-def driven(
-    scenario: Scenario, recording: Recording, segments: Segments, own: Calibration, seed: int = SEED
-) -> Recording:
+def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Calibration) -> Recording:
     """The scenario's instrument simulated with the recording's poses and moves and the scenario's own clock.
 
     ``own`` is the recording's own calibration, by which its motion is computed from its readings.
@@ -48,7 +46,7 @@ def driven(
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_scenario(recording, resegment(recording, segments), own).motion
-    simulated = _sensed(replace(scenario, motion=motion), seed)
+    simulated = _sensed(replace(scenario, motion=motion), SEED)
     return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
 
 

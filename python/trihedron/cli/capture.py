@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -76,7 +76,7 @@ def capture(
         raise typer.BadParameter("name what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("name the log to write: -o LOG")
-    from trihedron.api.capturing import open_device
+    from trihedron.api.capturing import open_device, stopped_by
     from trihedron.files.output import check_free
 
     check_free([output, calibration], overwrite=force, inputs=[Path(port)])
@@ -97,8 +97,7 @@ def capture(
     from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
 
-    stop_on_signals(recorder)
-    with full_disk_is_status_2():
+    with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         made = run_guided(
             recorder,
             output,
@@ -115,9 +114,10 @@ def capture(
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
     """Run a recorder to its end and report what was saved; status 2 where the recording is incomplete."""
-    stop_on_signals(recorder)
+    from trihedron.api.capturing import stopped_by
+
     progress = Progress()
-    with full_disk_is_status_2():
+    with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         for block in recorder:
             progress.show(recorder, block)
             if seconds is not None and progress.elapsed_s >= seconds:
@@ -150,17 +150,6 @@ def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = 
     if count.lost > LOSSES_NOT_TRUSTED * (n + count.lost):
         _say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
         raise typer.Exit(2)
-
-
-def stop_on_signals(recorder: Recorder) -> None:
-    """Ctrl-C ends the recording in order; a second one ends the program."""
-
-    def end(number: int, _frame: Any) -> None:
-        recorder.stop()
-        signal.signal(number, signal.default_int_handler)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
 
 
 class Progress:
