@@ -48,107 +48,56 @@ from trihedron.answers import answered_by
 from trihedron.threads import cap_threads
 
 if TYPE_CHECKING:
-    from trihedron.api.applying import apply, write_calibration
-    from trihedron.api.calibrating import calibrate
-    from trihedron.api.capturing import capture, ports
-    from trihedron.api.checking import check
-    from trihedron.api.converting import convert
-    from trihedron.api.demonstrating import demo
-    from trihedron.api.diagnosing import diagnose
-    from trihedron.api.diagnosing_sessions import diagnose_sessions
-    from trihedron.api.exporting import export
-    from trihedron.api.extending import extend
-    from trihedron.api.filter_noising import filter_noise
-    from trihedron.api.filtering import kalman
-    from trihedron.api.identifying import allan
-    from trihedron.api.planning import plan
-    from trihedron.api.ranking import rank
-    from trihedron.api.reading import read, segment
-    from trihedron.api.references import calibrate_references
-    from trihedron.api.replaying import guide
-    from trihedron.api.sessions import calibrate_sessions
-    from trihedron.api.simulating import simulate, twin
-    from trihedron.api.verifying import verify
-    from trihedron.errors import RefusedError
-    from trihedron.estimate.attitude import integrate_rate
-    from trihedron.estimate.noise.allan import allan_deviation
-    from trihedron.estimate.noise.identify import identify_noise
-    from trihedron.files.calibration import read_calibration
-    from trihedron.fleet import fleet
-    from trihedron.records import (
-        AllanCurve,
-        Calibration,
-        Finding,
-        Noise,
-        Recording,
-        Segments,
-        SensorCalibration,
-    )
-    from trihedron.records.diagnosis import Diagnosis
-    from trihedron.records.results import (
-        CalibrationResult,
-        CheckResult,
-        DiagnosisResult,
-        KalmanResult,
-        SessionsResult,
-        VerificationResult,
-    )
-    from trihedron.records.truth import Truth
-    from trihedron.report.presenting import plot, report
+    from trihedron.api.applying import apply as apply
+    from trihedron.api.applying import write_calibration as write_calibration
+    from trihedron.api.calibrating import calibrate as calibrate
+    from trihedron.api.capturing import capture as capture
+    from trihedron.api.capturing import ports as ports
+    from trihedron.api.checking import check as check
+    from trihedron.api.converting import convert as convert
+    from trihedron.api.demonstrating import demo as demo
+    from trihedron.api.diagnosing import diagnose as diagnose
+    from trihedron.api.diagnosing_sessions import diagnose_sessions as diagnose_sessions
+    from trihedron.api.exporting import export as export
+    from trihedron.api.extending import extend as extend
+    from trihedron.api.filter_noising import filter_noise as filter_noise
+    from trihedron.api.filtering import kalman as kalman
+    from trihedron.api.identifying import allan as allan
+    from trihedron.api.planning import plan as plan
+    from trihedron.api.ranking import rank as rank
+    from trihedron.api.reading import read as read
+    from trihedron.api.reading import segment as segment
+    from trihedron.api.references import calibrate_references as calibrate_references
+    from trihedron.api.replaying import guide as guide
+    from trihedron.api.sessions import calibrate_sessions as calibrate_sessions
+    from trihedron.api.simulating import simulate as simulate
+    from trihedron.api.simulating import twin as twin
+    from trihedron.api.verifying import verify as verify
+    from trihedron.errors import RefusedError as RefusedError
+    from trihedron.estimate.attitude import integrate_rate as integrate_rate
+    from trihedron.estimate.noise.allan import allan_deviation as allan_deviation
+    from trihedron.estimate.noise.identify import identify_noise as identify_noise
+    from trihedron.files.calibration import read_calibration as read_calibration
+    from trihedron.fleet import fleet as fleet
+    from trihedron.records import AllanCurve as AllanCurve
+    from trihedron.records import Calibration as Calibration
+    from trihedron.records import Finding as Finding
+    from trihedron.records import Noise as Noise
+    from trihedron.records import Recording as Recording
+    from trihedron.records import Segments as Segments
+    from trihedron.records import SensorCalibration as SensorCalibration
+    from trihedron.records.diagnosis import Diagnosis as Diagnosis
+    from trihedron.records.results import CalibrationResult as CalibrationResult
+    from trihedron.records.results import CheckResult as CheckResult
+    from trihedron.records.results import DiagnosisResult as DiagnosisResult
+    from trihedron.records.results import KalmanResult as KalmanResult
+    from trihedron.records.results import SessionsResult as SessionsResult
+    from trihedron.records.results import VerificationResult as VerificationResult
+    from trihedron.records.truth import Truth as Truth
+    from trihedron.report.presenting import plot as plot
+    from trihedron.report.presenting import report as report
 
     __version__: str
-
-__all__ = [
-    "AllanCurve",
-    "Calibration",
-    "CalibrationResult",
-    "CheckResult",
-    "Diagnosis",
-    "DiagnosisResult",
-    "Finding",
-    "KalmanResult",
-    "Noise",
-    "Recording",
-    "RefusedError",
-    "Segments",
-    "SensorCalibration",
-    "SessionsResult",
-    "Truth",
-    "VerificationResult",
-    "__version__",
-    "allan",
-    "allan_deviation",
-    "apply",
-    "calibrate",
-    "calibrate_references",
-    "calibrate_sessions",
-    "capture",
-    "check",
-    "convert",
-    "demo",
-    "diagnose",
-    "diagnose_sessions",
-    "export",
-    "extend",
-    "filter_noise",
-    "fleet",
-    "guide",
-    "identify_noise",
-    "integrate_rate",
-    "kalman",
-    "plan",
-    "plot",
-    "ports",
-    "rank",
-    "read",
-    "read_calibration",
-    "report",
-    "segment",
-    "simulate",
-    "twin",
-    "verify",
-    "write_calibration",
-]
 
 _PUBLIC = {
     "api.applying": "apply write_calibration",
@@ -186,6 +135,7 @@ _PUBLIC = {
 }
 _HOME = {name: f"trihedron.{module}" for module, names in _PUBLIC.items() for name in names.split()}
 """The module of each public name."""
+__all__ = sorted([*_HOME, "__version__"])
 
 
 class _Front(ModuleType):

@@ -19,11 +19,5 @@ def answered_by(modules: Mapping[str, str]) -> None:
 
 
 def ask(question: str, /, *values: Any, **named: Any) -> Any:
-    """Call the registered function of that name.
-
-    Raises
-    ------
-    KeyError
-        When no module is registered for it.
-    """
+    """Call the registered function of that name. Raises KeyError when no module is registered for it."""
     return getattr(import_module(_MODULES[question]), question)(*values, **named)

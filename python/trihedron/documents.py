@@ -33,10 +33,7 @@ class DocumentError(RefusedError):
 def read_text(path: str | os.PathLike[str], what: str) -> str:
     """The text of a plain file of limited size; ``what`` it should be ("calibration file") is for error messages.
 
-    Raises
-    ------
-    DocumentError
-        When there is no such file, it is no plain file, too large, unreadable, or not text.
+    Refused when there is no such file, it is no plain file, too large, unreadable, or not text.
     """
     try:
         # Non-blocking: opening a pipe without a writer would block.
@@ -69,10 +66,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
 def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type[RefusedError]) -> Any:
     """The JSON of a file that should be ``what``; ``meant`` describes the expected file in the error message.
 
-    Raises
-    ------
-    refusal
-        In place of the errors of :func:`read_text` and :func:`parse_json`.
+    Raises ``refusal`` in place of the errors of :func:`read_text` and :func:`parse_json`.
     """
     try:
         text = read_text(path, what)
@@ -87,10 +81,7 @@ def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type
 def parse_json(text: str) -> Any:
     """JSON with finite numbers, limited depth and unique keys.
 
-    Raises
-    ------
-    DocumentError
-        When it is not; the message gives the line of a syntax error.
+    Refused when it is not; the message gives the line of a syntax error.
     """
     try:
         document = json.loads(
@@ -109,10 +100,7 @@ def parse_json(text: str) -> Any:
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML of limited depth, with numbers that fit into a float.
 
-    Raises
-    ------
-    DocumentError
-        When it is not; the message gives the line of a syntax error.
+    Refused when it is not; the message gives the line of a syntax error.
     """
     try:
         table = tomllib.loads(text)
@@ -128,10 +116,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 def check_values(document: Any) -> None:
     """Check the values of a parsed document, of any notation.
 
-    Raises
-    ------
-    DocumentError
-        For nesting that is too deep, and integers that do not fit into a float.
+    Refused for nesting that is too deep, and integers that do not fit into a float.
     """
     level = [document]
     for _ in range(MOST_DEPTH):

@@ -7,6 +7,7 @@ vector n. Scales, biases along each axis and angles between axes are then the sa
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -70,17 +71,10 @@ def rotation_vector(R: FloatArray) -> FloatArray:
 
 def jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
     """(9, 12) derivative of :meth:`Invariants.vector` by S (row by row) and b, by central differences."""
-    out = np.zeros((9, 12))
-    theta = np.concatenate([S.ravel(), b])
     size = np.concatenate([np.full(9, np.abs(S).max()), np.full(3, max(float(np.abs(b).max()), 1e-3))])
-    for k in range(12):
-        step = np.zeros(12)
-        step[k] = STEP * size[k]
-        high, low = theta + step, theta - step
-        difference = invariants(high[:9].reshape(3, 3), high[9:]).vector()
-        difference = difference - invariants(low[:9].reshape(3, 3), low[9:]).vector()
-        out[:, k] = difference / (2.0 * step[k])
-    return out
+    return _derivative(
+        lambda at: invariants(at[:9].reshape(3, 3), at[9:]).vector(), np.concatenate([S.ravel(), b]), STEP * size
+    )
 
 
 def triad_jacobian(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
@@ -88,18 +82,22 @@ def triad_jacobian(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
     out = np.zeros((3, 24))
     zero = np.zeros(3)
     here = triad_rotation(invariants(S_a, zero), invariants(S_g, zero))
-    for sensor, (S, first) in enumerate(((S_a, 0), (S_g, 12))):
-        for k in range(9):
-            step = np.zeros(9)
-            step[k] = STEP * np.abs(S).max()
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = S + sign * step.reshape(3, 3)
-                pair = (moved, S_g) if sensor == 0 else (S_a, moved)
-                there = triad_rotation(invariants(pair[0], zero), invariants(pair[1], zero))
-                ends.append(rotation_vector(there @ here.T))
-            out[:, first + k] = (ends[0] - ends[1]) / (2.0 * step[k])
+
+    def turned(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
+        return rotation_vector(triad_rotation(invariants(S_a, zero), invariants(S_g, zero)) @ here.T)
+
+    def size(S: FloatArray) -> FloatArray:
+        return np.full(9, STEP * np.abs(S).max())
+
+    out[:, :9] = _derivative(lambda at: turned(at.reshape(3, 3), S_g), S_a.ravel(), size(S_a))
+    out[:, 12:21] = _derivative(lambda at: turned(S_a, at.reshape(3, 3)), S_g.ravel(), size(S_g))
     return out
+
+
+def _derivative(of: Callable[[FloatArray], FloatArray], at: FloatArray, step: FloatArray) -> FloatArray:
+    """(m, n) derivative of a function (m,) at a point (n,), by central differences."""
+    steps = np.diag(step)
+    return np.column_stack([(of(at + one) - of(at - one)) / (2.0 * h) for one, h in zip(steps, step, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,13 +177,7 @@ def model_vector(numbers: FloatArray, anchor: Anchor) -> FloatArray:
 
 def model_jacobian(numbers: FloatArray, anchor: Anchor) -> FloatArray:
     """(12, 9) or (24, 21) derivative of :func:`model_vector`, by central differences."""
-    columns = []
-    for k in range(len(numbers)):
-        step = np.zeros(len(numbers))
-        step[k] = STEP * max(abs(float(numbers[k])), 1.0)
-        ends = model_vector(numbers + step, anchor) - model_vector(numbers - step, anchor)
-        columns.append(ends / (2.0 * step[k]))
-    return np.column_stack(columns)
+    return _derivative(lambda at: model_vector(at, anchor), numbers, STEP * np.maximum(np.abs(numbers), 1.0))
 
 
 def _direct(bias: FloatArray, log_scale: FloatArray, axes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -34,13 +34,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def check_tables() -> None:
-    """Raise where polars would block for ever.
-
-    Raises
-    ------
-    ValueError
-        In a forked child in which polars does not respond.
-    """
+    """Refuse to go on in a forked child in which polars would block for ever."""
     global _is_doubtful
     if not _is_doubtful:
         return

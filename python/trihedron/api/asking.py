@@ -50,12 +50,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
     """The argument in the plain type of its annotation (numbers of any library become Python's).
 
-    Raises
-    ------
-    WrongTypeError
-        (a ``TypeError`` and a ``ValueError``) when it is of another type.
-    ValueError
-        When a number is not finite, or outside the range of its quantity.
+    Refused when it is of another type, not finite, or outside the range of its quantity.
     """
     kinds = set(_alternatives(annotation))
     for alias in kinds & set(_ALIASES):
@@ -224,10 +219,7 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 def asked_in_python(verb: Verb) -> Verb:
     """The verb with its plain arguments checked and its error messages in terms of Python parameters.
 
-    Raises
-    ------
-    WrongTypeError
-        (a ``TypeError`` and a ``ValueError``) when a number, a text or a switch is of another type.
+    Refused when a number, a text or a switch is of another type.
     """
     signature = inspect.signature(verb)
 

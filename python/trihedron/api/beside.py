@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.choices import settle_gravity
+from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import read, segment
 from trihedron.api.referring import (
     AnyReference,
@@ -45,16 +45,9 @@ def beside(
 ) -> DiagnosisResult:
     """The ordinary diagnosis with the fit to the reference added, or that fit alone where the log has too few poses.
 
-    Raises
-    ------
-    ValueError
-        As :func:`trihedron.api.referring.held_against`.
+    Refused as :func:`trihedron.api.referring.held_against`.
     """
-    said: tuple[Finding, ...] = ()
-    if given is not None and place == (None, None, None):
-        gravity, source = given.gravity_m_s2, "that of the calibration"
-    else:
-        gravity, source, said = settle_gravity(*place)
+    gravity, source, said = settle_gravity(*place, gravity_of(given))
     found = held_against(recording, reference, gravity, columns=columns, given=given)
     segments = segment(recording)
     try:
@@ -66,13 +59,13 @@ def beside(
         if found.kind == ANOTHER_UNIT:
             # A difference between two gyros may be of either unit: without poses its origin is unknown.
             found = replace(found, findings=(*found.findings, _shared(found)))
-        values = diagnosis_by(found, recording, gravity, given, alpha)
+        by_reference = diagnosis_by(found, recording, gravity, given, alpha)
         calibration = (
             calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
         )
         why = Finding.of(FindingCode.REFERENCE_ONLY, why=words("because", sentence=error))  # fmt: skip
         return DiagnosisResult(
-            **values,
+            **vars(by_reference),
             findings=(*said, *recording.findings, *found.findings, why),
             gravity_source=source,
             model_is_given=given is not None,
@@ -97,10 +90,7 @@ def beside(
 def in_si(log: Recording, gravity: float | None) -> Recording:
     """The log itself where its gyro is in rad/s or deg/s; a log in counts by its own calibration.
 
-    Raises
-    ------
-    ValueError
-        When it is in counts and its poses do not determine a calibration.
+    Refused when it is in counts and its poses do not determine a calibration.
     """
     if rate_to_si(log.gyroscope_unit) is not None:
         return log

@@ -54,20 +54,16 @@ def open_device(
     baud: int | None = None,
     columns: str | None = None,
     time_unit: str | None = None,
-    silence_s: float = 5.0,
 ) -> tuple[Source, Found]:
     """Open a source and detect its protocol.
 
-    Raises
-    ------
-    CaptureError
-        When it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
+    Refused when it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
     """
     wanted = protocol_of(protocol)
     namer = column_namer(columns, time_unit)
     source = open_source(where, baud)
     try:
-        return source, find_protocol(source, protocol=wanted, baud=baud, name_columns=namer, silence_s=silence_s)
+        return source, find_protocol(source, protocol=wanted, baud=baud, name_columns=namer)
     except BaseException:
         source.close()
         raise
@@ -136,7 +132,7 @@ def capture(
         first_bytes=found.first_bytes,
     )
     began_s = time.monotonic()
-    with stopped_by_interrupt(recorder):
+    with stopped_by(recorder, signal.SIGINT):
         for block in recorder:
             is_wanted = on_block is None or on_block(block) is not False
             if not is_wanted or (seconds is not None and time.monotonic() - began_s >= seconds):
@@ -145,21 +141,22 @@ def capture(
 
 
 @contextmanager
-def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
-    """Ctrl-C ends the recording in order, a second one ends the program; outside the main thread it has no effect."""
+def stopped_by(recorder: Recorder, *numbers: int) -> Iterator[None]:
+    """These signals end the recording in order, a second one the program; outside the main thread without effect."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def end(_number: int, _frame: Any) -> None:
+    def end(number: int, _frame: Any) -> None:
         recorder.stop()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(number, signal.default_int_handler)
 
-    before = signal.signal(signal.SIGINT, end)
+    before = {number: signal.signal(number, end) for number in numbers}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def ports() -> list[Port]:
@@ -204,10 +201,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
 def sensor_columns(columns: tuple[str, ...]) -> list[int]:
     """Indices of the accelerometer's columns, then the gyro's, among the columns of a stream.
 
-    Raises
-    ------
-    ValueError
-        When there is no accelerometer.
+    Refused when there is no accelerometer.
     """
     empty = tuple(np.zeros(1) for _ in columns)
     found = find_columns(Table(Path("the stream"), columns, empty), None, None)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from trihedron.errors import RefusedError
 from trihedron.gravity import normal_gravity
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Calibration, Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
 def settle_gravity(
-    gravity_m_s2: float | None = None, latitude_deg: float | None = None, height_m: float | None = None
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    known: tuple[float, str] | None = None,
 ) -> tuple[float, str, tuple[Finding, ...]]:
-    """|g| [m/s²], its source, and findings about it.
+    """|g| [m/s²], its source, and findings about it; where nothing is given ``known``, else the standard value.
 
-    Raises
-    ------
-    ValueError
-        When two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
+    Refused when two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:
@@ -32,7 +32,14 @@ def settle_gravity(
         return value, f"WGS 84 normal gravity at latitude {latitude_deg:g}°, height {height:g} m", ()
     if height_m is not None:
         raise RefusedError("a height alone does not determine gravity: give --latitude with --height, or --gravity.")
+    if known is not None:
+        return *known, ()
     return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)
+
+
+def gravity_of(calibration: Calibration | None) -> tuple[float, str] | None:
+    """|g| [m/s²] of a calibration and the words for this source; ``None`` without one."""
+    return None if calibration is None else (calibration.gravity_m_s2, "that of the calibration")
 
 
 def _defaulted() -> Finding:

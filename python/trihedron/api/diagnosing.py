@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
-from trihedron.api.choices import settle_gravity
+from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
@@ -123,10 +122,7 @@ def _of_poses(
 ) -> DiagnosisResult:
     """The diagnosis by poses and moves, without a reference."""
     known = None if calibration is None else calibration_of(calibration)
-    if known is None or place != (None, None, None):
-        gravity, source, said = settle_gravity(*place)
-    else:
-        gravity, source, said = known.gravity_m_s2, "that of the calibration", ()
+    gravity, source, said = settle_gravity(*place, gravity_of(known))
     findings = [*said, *recording.findings]
     if known is not None:
         check_units(known, recording)
@@ -137,10 +133,12 @@ def _of_poses(
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
-    resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
+    resting = None if against is not None else at_rest(recording, segments, known, (gravity, source), calibrated)
     if resting is not None:
         tell(0.1, "looking at biases and spectral lines")
-        return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
+        return diagnosed_at_rest(
+            recording, segments, resting, (gravity, source), tuple(findings), alpha, is_given=known is not None
+        )
     simulated: _Free | None = None
     if against is not None:
         simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, tell)
@@ -152,7 +150,9 @@ def _of_poses(
     recording_used, segments_used = recording, segments
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
-        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
+        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
+            Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
+        ]
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
@@ -167,8 +167,9 @@ def _of_poses(
         given = replace(known, gravity_m_s2=gravity)
         noise: tuple[NoiseDifference, ...] = ()
         if simulated is not None:
-            frames = _frames((simulated.segments, simulated.calibration), (segments, used))
-            noise = (*simulated.frames, *frames, *_noise(simulated, found, recording_used, segments_used, alpha))
+            turned = sign_of_gravity((simulated.segments, simulated.calibration), (segments, used))
+            frames = (*simulated.frames, *(() if turned is None else (turned,)))
+            noise = (*frames, *_noise(simulated, found, recording_used, segments_used, alpha))
         free_simulation = None if simulated is None else _with_ranges(simulated, found, recording)
         fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
@@ -178,9 +179,8 @@ def _of_poses(
             if simulated.scenario is not None:
                 found = _beside_scenario(found, simulated.scenario, (recording_used, segments_used, used), alpha)
         updated, used = used, given
-    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
-        **values,
+        **vars(found),
         findings=tuple(findings),
         gravity_source=source,
         model_is_given=known is not None,
@@ -293,19 +293,9 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
 
 
-def _frames(
-    simulated: tuple[Segments, Calibration], recording: tuple[Segments, Calibration]
-) -> tuple[NoiseDifference, ...]:
-    turned = sign_of_gravity(simulated, recording)
-    return () if turned is None else (turned,)
-
-
 def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
     n, m = simulated.n_poses, segments.n_poses
-    if n == m:
-        return ()
-    finding = Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m)
-    return (finding,)
+    return () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
 
 
 def _both_sensors(
@@ -320,10 +310,6 @@ def _both_sensors(
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
     finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
     return logged, *_accelerometer_only(recording, segments), (finding,)
-
-
-def _gyroscope_left_out() -> Finding:
-    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
 
 
 def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:

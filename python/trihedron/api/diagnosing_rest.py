@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.rest.answer import diagnose_rest
 from trihedron.diagnose.session.starting_point import (
     TYPICAL_ANGLE,
     TYPICAL_BIAS_M_S2,
     TYPICAL_SCALE,
-    extended_sensor,
     is_open,
 )
 from trihedron.errors import REFUSALS
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, LinearModel
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -37,12 +35,16 @@ TURNED_RAD, MOST_TURNS = 0.7, 2
 
 
 def at_rest(
-    recording: Recording, segments: Segments, known: Calibration | None, gravity_m_s2: float, calibrated: Calibrated
-) -> LinearModel | None:
+    recording: Recording,
+    segments: Segments,
+    known: Calibration | None,
+    gravity: tuple[float, str],
+    calibrated: Calibrated,
+) -> Calibration | None:
     """The model that converts a log of one or two orientations to SI; ``None`` where the log is a session."""
     if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
         return None
-    return _nominal(recording, segments, gravity_m_s2) if known is None else _given(known)
+    return _nominal(recording, segments, gravity) if known is None else known
 
 
 def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
@@ -86,77 +88,57 @@ def _turns(recording: Recording, segments: Segments) -> int:
     return sum(angle > TURNED_RAD for angle in turned)
 
 
-def _nominal(recording: Recording, segments: Segments, gravity_m_s2: float) -> LinearModel:
+def _nominal(recording: Recording, segments: Segments, gravity: tuple[float, str]) -> Calibration:
     """An orthogonal triad of nominal scale (counts scaled by |g|), with the typical spread of parts as uncertainty."""
     assert recording.accelerometer is not None
     scale = acceleration_to_si(recording.accelerometer_unit)
     if scale is None:
         still = segments.accelerometer_mean
         typical = recording.accelerometer if still is None or not len(still) else still
-        scale = gravity_m_s2 / float(np.nanmedian(np.linalg.norm(typical, axis=1)))
+        scale = gravity[0] / float(np.nanmedian(np.linalg.norm(typical, axis=1)))
     off = np.where(np.eye(3, dtype=bool), TYPICAL_SCALE, TYPICAL_ANGLE)
-    accelerometer = {
-        "S": (scale * np.eye(3)).tolist(), "b": [0.0] * 3, "sigma_S": (scale * np.tril(off)).tolist(),
-        "sigma_b": [TYPICAL_BIAS_M_S2] * 3, "raw_unit": recording.accelerometer_unit.value,
-    }  # fmt: skip
-    if recording.gyroscope is None:
-        return LinearModel(MappingProxyType(accelerometer), None)
-    rate = rate_to_si(recording.gyroscope_unit) or 1.0
-    bias = -rate * np.nanmedian(recording.gyroscope, axis=0)
-    gyroscope = {
-        "S": (rate * np.eye(3)).tolist(), "b": bias.tolist(), "sigma_S": (rate * off).tolist(),
-        "sigma_b": np.abs(bias).tolist(), "raw_unit": recording.gyroscope_unit.value,
-    }  # fmt: skip
-    return LinearModel(MappingProxyType(accelerometer), MappingProxyType(gyroscope))
 
+    def sensor(scale: float, b: FloatArray, sigma_S: FloatArray, sigma_b: FloatArray, raw: str, si: str) -> Any:
+        covariance = np.diag(np.square([*sigma_S.ravel(), *sigma_b]))
+        return SensorCalibration(scale * np.eye(3), b, covariance, raw, si, "diagnosis")
 
-def _given(known: Calibration) -> LinearModel:
-    sides = [
-        None if s is None else MappingProxyType(
-            {"S": s.S.tolist(), "b": s.b.tolist(), "sigma_S": s.sigma_S.tolist(), "sigma_b": s.sigma_b.tolist(),
-             "raw_unit": s.raw_unit}
-        )
-        for s in (known.accelerometer, known.gyroscope)
-    ]  # fmt: skip
-    assert sides[0] is not None
-    return LinearModel(sides[0], sides[1])
+    accel_unit, spread = recording.accelerometer_unit.value, np.full(3, TYPICAL_BIAS_M_S2)
+    accelerometer = sensor(scale, np.zeros(3), scale * np.tril(off), spread, accel_unit, "m/s^2")
+    gyroscope = None
+    if recording.gyroscope is not None:
+        rate = rate_to_si(recording.gyroscope_unit) or 1.0
+        bias = -rate * np.nanmedian(recording.gyroscope, axis=0)
+        gyroscope = sensor(rate, bias, rate * off, np.abs(bias), recording.gyroscope_unit.value, "rad/s")
+    covariance = np.zeros((12 if gyroscope is None else 24,) * 2)
+    covariance[:12, :12] = accelerometer.covariance
+    if gyroscope is not None:
+        covariance[12:, 12:] = gyroscope.covariance
+    return Calibration(accelerometer, gyroscope, covariance, "lower", *gravity)
 
 
 def diagnosed_at_rest(
     recording: Recording,
     segments: Segments,
-    model: LinearModel,
+    model: Calibration,
     gravity: tuple[float, str],
     findings: tuple[Finding, ...],
     alpha: float,
-    known: Calibration | None,
+    *,
+    is_given: bool,
 ) -> DiagnosisResult:
     """The diagnosis of a log of one or two orientations."""
-    found = diagnose_rest(recording, model, gravity[0], alpha)
-    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
+    linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
+    found = diagnose_rest(recording, linear, gravity[0], alpha)
     return DiagnosisResult(
-        **values,
+        **vars(found),
         findings=(*findings, _too_few(recording, segments)),
         gravity_source=gravity[1],
-        model_is_given=known is not None,
-        calibration=_calibration(model, *gravity) if known is None else known,
+        model_is_given=is_given,
+        calibration=model,
         own_effects=found.effects,
         segments=segments,
         recording=recording,
     )
-
-
-def _calibration(model: LinearModel, gravity_m_s2: float, source: str) -> Calibration:
-    gyroscope = None if model.gyroscope is None else extended_sensor(model.gyroscope, "rad/s")
-    accelerometer = extended_sensor(model.accelerometer, "m/s^2")
-    covariance = np.zeros((12 if gyroscope is None else 24,) * 2)
-    covariance[:12, :12] = accelerometer.covariance
-    if gyroscope is not None:
-        covariance[12:, 12:] = gyroscope.covariance
-    return Calibration(
-        accelerometer=accelerometer, gyroscope=gyroscope, covariance=covariance, frame="lower",
-        gravity_m_s2=gravity_m_s2, gravity_source=source,
-    )  # fmt: skip
 
 
 def _too_few(recording: Recording, segments: Segments) -> Finding:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -37,34 +37,24 @@ SEED, N_SEEDS = 20, 8
 the rms error of twenty poses is a fifth for one simulation, a fifteenth for eight."""
 
 
-def driven(
-    scenario: Scenario, recording: Recording, segments: Segments, own: Calibration, seed: int = SEED
-) -> Recording:
+def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Calibration) -> Recording:
     """The scenario's instrument simulated with the recording's poses and moves and the scenario's own clock.
 
     ``own`` is the recording's own calibration, by which its motion is computed from its readings.
 
-    Raises
-    ------
-    ValueError
-        When the recording lacks a sensor or has no static pose.
+    Refused when the recording lacks a sensor or has no static pose.
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_scenario(recording, resegment(recording, segments), own).motion
-    simulated = _sensed(replace(scenario, motion=motion), seed)
+    simulated = _sensed(replace(scenario, motion=motion), SEED)
     return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
 
 
 def _sensed(scenario: Scenario, seed: int) -> Recording:
-    """The simulated log, with timestamps as after reading from a file where they scatter."""
+    """The simulated log; where its timestamps scatter written and read back, so that they are judged as in a file."""
     simulated, _ = simulate(scenario, seed)
-    if scenario.clock.timestamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
-        return _as_read(simulated)
-    return simulated
-
-
-def _as_read(simulated: Recording) -> Recording:
-    """A simulated log written and read back, so that its timestamps are judged as the recording's were."""
+    if scenario.clock.timestamp_jitter_s == 0.0 and scenario.clock.jitter_s == 0.0:
+        return simulated
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "simulated.csv"
         write_recording(simulated, path)
@@ -82,12 +72,12 @@ class MovedAlike:
         cut = resegment(recording, segments)
         self._motion = twin_scenario(recording, cut, own).motion
         self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
-        carried = tilt_errors_of(own, recording, cut)
+        angle_rad, duration_s = tilt_errors_of(own, recording, cut)
         self.poses = _of_poses(own)
-        self.moves = _of_moves(carried)
+        self.moves = _of_moves(angle_rad)
         # The worst move, which is excluded, is often the longest.
-        worst = [int(np.argmax(carried.angle_rad))] if len(carried.angle_rad) else []
-        self.duration_s = np.delete(carried.duration_s, worst)
+        worst = [int(np.argmax(angle_rad))] if len(angle_rad) else []
+        self.duration_s = np.delete(duration_s, worst)
 
     def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
         """Mean square pose error [(m/s²)²] and move error [rad²] over ``N_SEEDS`` simulations, each calibrated."""
@@ -108,8 +98,8 @@ class MovedAlike:
             return None, None
         if result.calibration.gyroscope is None:
             return _of_poses(result.calibration), None
-        carried = tilt_errors_of(result.calibration, log, resegment(log, result.segments))
-        return _of_poses(result.calibration), _of_moves(carried)
+        angle_rad, _ = tilt_errors_of(result.calibration, log, resegment(log, result.segments))
+        return _of_poses(result.calibration), _of_moves(angle_rad)
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
@@ -227,9 +217,9 @@ def _of_poses(calibration: Calibration) -> float | None:
     return _mean_square_without_worst(quality.residual) * len(quality.residual) / quality.dof
 
 
-def _of_moves(carried: TiltErrors) -> float | None:
+def _of_moves(angle_rad: FloatArray) -> float | None:
     """Mean square of the tilt errors after rotations [rad²], without the worst."""
-    return _mean_square_without_worst(carried.angle_rad) if len(carried.angle_rad) >= FEWEST_MOVES else None
+    return _mean_square_without_worst(angle_rad) if len(angle_rad) >= FEWEST_MOVES else None
 
 
 def _mean_square_without_worst(misses: FloatArray) -> float:
@@ -237,23 +227,15 @@ def _mean_square_without_worst(misses: FloatArray) -> float:
     return float(np.mean(np.sort(misses**2)[:-1]))
 
 
-@dataclass(frozen=True, eq=False)
-class TiltErrors:
-    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and the rotations' duration.
+def tilt_errors_of(own: Calibration, recording: Recording, segments: Segments) -> tuple[FloatArray, FloatArray]:
+    """Tilt error (m,) [rad] after each rotation by a recording's own calibration, and its duration (m,) [s].
 
     Without rotations beyond the gyro's range: clipping is no bias error.
     """
-
-    angle_rad: FloatArray
-    duration_s: FloatArray
-
-
-def tilt_errors_of(own: Calibration, recording: Recording, segments: Segments) -> TiltErrors:
-    """Tilt errors after rotations by a recording's own calibration."""
     checked = verify_calibration(own, recording, segments, own.gravity_m_s2, own.gravity_source)
     t = recording.time_s
     cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
     sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.poses)], dtype=np.bool_)
     lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.poses)]
     used = sound[checked.moves]
-    return TiltErrors(radians_from_degrees(1.0) * checked.angle_deg[used], np.array(lasts)[checked.moves][used])
+    return radians_from_degrees(1.0) * checked.angle_deg[used], np.array(lasts)[checked.moves][used]

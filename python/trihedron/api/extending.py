@@ -55,19 +55,13 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
             "use method joint or separate and leave the frame out."
         )
     diagnosis = diagnose(
-        result.recording,
-        gravity_m_s2=base.gravity_m_s2,
-        segments=result.segments,
-        alpha=alpha,
-        progress=progress,
+        result.recording, gravity_m_s2=base.gravity_m_s2, segments=result.segments, alpha=alpha, progress=progress
     )
-    finding = _modelled(diagnosis)
-    if not diagnosis.effects:
-        return replace(result, calibration=replace(base, findings=(*base.findings, finding)))
-    spoilt = _spoilt(diagnosis)
-    if spoilt is not None:
-        return replace(result, calibration=replace(base, findings=(*base.findings, _stays_linear(diagnosis, *spoilt))))
-    return replace(result, calibration=_extended(base, diagnosis, finding))
+    spoilt = _spoilt(diagnosis) if diagnosis.effects else None
+    if diagnosis.effects and spoilt is None:
+        return replace(result, calibration=_extended(base, diagnosis, _modelled(diagnosis)))
+    finding = _modelled(diagnosis) if spoilt is None else spoilt
+    return replace(result, calibration=replace(base, findings=(*base.findings, finding)))
 
 
 MAY_RISE = 1.25
@@ -76,27 +70,23 @@ CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 """Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
 
 
-def _spoilt(diagnosis: Diagnosis) -> tuple[str, float, float, str] | None:
-    """A domain whose cross-validated rms the effects raise: its name, rms before and after, unit; None without one."""
+def _spoilt(diagnosis: Diagnosis) -> Finding | None:
+    """A finding where the effects raise the cross-validated rms of a domain; None where none is raised."""
     stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
     before, after = stages.get("parameters", {}), stages.get("effects", {})
     for domain in CARRIED:
         if domain in before and domain in after and after[domain].rms > MAY_RISE * before[domain].rms:
-            return domain, before[domain].rms, after[domain].rms, before[domain].unit
+            return Finding.of(
+                FindingCode.EFFECTS_MODELLED,
+                "stays-linear",
+                effects=[effect.id for effect in diagnosis.effects],
+                n_effects=len(diagnosis.effects),
+                domain=domain,
+                rms_before=before[domain].rms,
+                rms_after=after[domain].rms,
+                unit=before[domain].unit,
+            )
     return None
-
-
-def _stays_linear(diagnosis: Diagnosis, domain: str, before: float, after: float, unit: str) -> Finding:
-    return Finding.of(
-        FindingCode.EFFECTS_MODELLED,
-        "stays-linear",
-        effects=[effect.id for effect in diagnosis.effects],
-        n_effects=len(diagnosis.effects),
-        domain=domain,
-        rms_before=before,
-        rms_after=after,
-        unit=unit,
-    )
 
 
 def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Calibration:
@@ -157,20 +147,16 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.nd
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    if not diagnosis.effects:
-        return Finding.of(
-            FindingCode.EFFECTS_MODELLED,
-            "none-but-disagree" if left else "none",
-            left=left,
-            n_effects=0,
-            n_domains_left=len(left),
-        )
+    found = diagnosis.effects
+    named = {
+        "effects": [effect.id for effect in found],
+        "statements": [words("because", sentence=effect.statement) for effect in found],
+    }
     return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        "fitted-but-disagree" if left else "fitted",
-        effects=[effect.id for effect in diagnosis.effects],
-        statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
+        ("fitted" if found else "none") + ("-but-disagree" if left else ""),
+        **(named if found else {}),
         left=left,
-        n_effects=len(diagnosis.effects),
+        n_effects=len(found),
         n_domains_left=len(left),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,6 +124,18 @@ def _in_si(recording: Recording, known: Calibration) -> Recording:
     )
 
 
+SENSORS: dict[str, tuple[str, type[AccelerationUnit | RateUnit], Callable[[str], float], str]] = {
+    "g": ("gyro", RateUnit, rate_lsb_to_si, "rad/s"),
+    "a": ("accel", AccelerationUnit, acceleration_lsb_to_si, "m/s^2"),
+}
+"""Name, units, size of a count in SI and SI unit of a sensor, by the first letter of its columns."""
+
+
+def _to_si(unit: AccelerationUnit | RateUnit) -> float | None:
+    """SI per unit of a sensor's readings; ``None`` for counts."""
+    return rate_to_si(unit) if isinstance(unit, RateUnit) else acceleration_to_si(unit)
+
+
 def noise_of_file(
     path: str | os.PathLike[str],
     *,
@@ -143,30 +155,20 @@ def noise_of_file(
     disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
     continues from it with bit-identical results, and the end removes it.
 
-    Raises
-    ------
-    ValueError
-        When file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
+    Refused when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
+    stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
     factor, names, units = [], [], []
     for role in log.roles:
-        if role[0] == "g":
-            rate_unit = RateUnit(gyroscope_unit or "counts")
-            scale = rate_to_si(rate_unit) if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb)
-            printed, si = rate_unit.value, "rad/s"
-            refuse_size_of_a_unit("gyro", printed, None if gyroscope_lsb is None else scale)
-        else:
-            force_unit = AccelerationUnit(accelerometer_unit or "counts")
-            scale = (
-                acceleration_to_si(force_unit)
-                if accelerometer_lsb is None
-                else acceleration_lsb_to_si(accelerometer_lsb)
-            )
-            printed, si = force_unit.value, "m/s^2"
-            refuse_size_of_a_unit("accel", printed, None if accelerometer_lsb is None else scale)
-        names.append(f"{'gyro' if role[0] == 'g' else 'accel'} {role[1]}")
-        units.append(printed if scale is None else si)
+        name, kind, lsb_to_si, si = SENSORS[role[0]]
+        unit, lsb = kind(stated[role[0]][0] or "counts"), stated[role[0]][1]
+        scale = _to_si(unit)
+        if lsb is not None:
+            scale = lsb_to_si(lsb)
+            refuse_size_of_a_unit(name, unit.value, scale)
+        names.append(f"{name} {role[1]}")
+        units.append(unit.value if scale is None else si)
         factor.append(1.0 if scale is None else scale)
     scales = np.array(factor)
     is_scaled = bool(np.any(scales != 1.0))
@@ -220,10 +222,7 @@ def noise_of_curve(
     ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
     whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
 
-    Raises
-    ------
-    ValueError
-        When the table is not recognised, too short, or does not state the log's rate and length.
+    Refused when the table is not recognised, too short, or does not state the log's rate and length.
     """
     table = read_allan_table(Path(path))
     rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
@@ -233,26 +232,24 @@ def noise_of_curve(
         )
         raise ReadError(f"{path}: the table does not state the log's {missing}; how certain a point is depends on it.")
     deviation, units = table.deviation.copy(), list(table.units)
+    given = {"g": gyroscope_unit, "a": accelerometer_unit}
     for c, name in enumerate(table.names):
-        scale: float | None = None
         first = name[:1].lower()
-        if first == "g" and (gyroscope_unit or units[c] in {unit.value for unit in RateUnit}):
-            scale, si = rate_to_si(RateUnit(gyroscope_unit or units[c])), "rad/s"
-        elif first == "a" and (accelerometer_unit or units[c] in {unit.value for unit in AccelerationUnit}):
-            scale, si = acceleration_to_si(AccelerationUnit(accelerometer_unit or units[c])), "m/s^2"
-        if scale is not None:
-            deviation[:, c] *= scale
-            units[c] = si
+        if first not in SENSORS:
+            continue
+        _, kind, _, si = SENSORS[first]
+        if given[first] or units[c] in {unit.value for unit in kind}:
+            scale = _to_si(kind(given[first] or units[c]))
+            if scale is not None:
+                deviation[:, c] *= scale
+                units[c] = si
     return identify_curve(table.tau_s, deviation, rate, length, names=table.names, units=tuple(units), source=str(path))
 
 
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
     """Recording time [s] for a relative uncertainty ``relative`` of each term present, by axis; None beyond a month.
 
-    Raises
-    ------
-    ValueError
-        When ``relative`` is no positive fraction.
+    Refused when ``relative`` is no positive fraction.
     """
     return {
         axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -52,28 +52,19 @@ class Improvement:
     unlike: Mapping[str, float] = field(default_factory=dict)
 
 
-def improve(
-    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["parameters", "noise", "effects"] = "effects"
-) -> Improvement:
+def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     """The user's scenario file with parameters, noise, sampling and effects of the recording.
 
     Only entries that differ are replaced, with their comment; all else stays. Effects that only the scenario has are
-    removed. ``stage`` stops after the parameters, or after noise and sampling.
+    removed.
 
-    Raises
-    ------
-    ValueError
-        When the file is no scenario, or the diagnosis was not made against one.
+    Refused when the file is no scenario, or the diagnosis was not made against one.
     """
     given = read_scenario(scenario)
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
     _numbers(tables, given, found)
     _gravity(tables, given, found)
-    if stage == "parameters":
-        return Improvement(improved_scenario(scenario, tables, [], []), {})
     _noise(tables, given, found)
-    if stage == "noise":
-        return Improvement(improved_scenario(scenario, tables, [], []), {})
     ranged = _ranges(tables, given, found)
     physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
     shared = {p.id for p in found.parameters if p.significant}

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import (
@@ -18,7 +19,15 @@ from trihedron.estimate.gyroscope.turn_design import (
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
-POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")
+_KINDS = np.count_nonzero(np.abs(CANDIDATES) > 1e-9, axis=1)
+POSE_SETS = {
+    "6 faces": CANDIDATES[_KINDS == 1],
+    "9 poses": CANDIDATES[[17, 23, 8, 9, 6, 1, 22, 10, 11]],
+    "12 edges": CANDIDATES[_KINDS == 2],
+    "18 poses: faces and edges": CANDIDATES[_KINDS <= 2],
+    "26 poses: faces, edges and corners": CANDIDATES,
+}
+"""Upward unit vectors (n, 3) by name. The nine minimise the largest standard error: no exchange of one improves it."""
 
 
 def plan(
@@ -91,21 +100,12 @@ def plan(
             scale_bias_first=float(first.scale.max()),
             bias_bias_first=first.bias,
         ),
-        poses=tuple(_poses(name, sigma, gravity_m_s2) for name in POSE_SETS),
+        poses=tuple(_poses(name, up, sigma, gravity_m_s2) for name, up in POSE_SETS.items()),
         moves=_moves(angle_noise),
     )
 
 
-def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
-    kinds = np.count_nonzero(np.abs(CANDIDATES) > 1e-9, axis=1)
-    if name.startswith("6"):
-        up = CANDIDATES[kinds == 1]
-    elif name.startswith("9"):
-        up = _best(9)
-    elif name.startswith("12"):
-        up = CANDIDATES[kinds == 2]
-    else:
-        up = CANDIDATES[kinds <= (2 if name.startswith("18") else 3)]
+def _poses(name: str, up: FloatArray, sigma: float, gravity_m_s2: float) -> PosePlan:
     sigmas = np.full(len(up), sigma)
     design = PoseDesign.of(up, sigmas)
     errors = np.sqrt(np.diag(design.covariance))
@@ -127,35 +127,6 @@ def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
         bias=float(errors[6:].max()) * gravity_m_s2,
         worth=tuple(worth),
     )
-
-
-_SOME_SIGMA = 1e-4
-"""Standard error of a pose [g], arbitrary: the best set of poses does not depend on it."""
-
-
-def _best(n: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """n of the 26 poses: added one after another, then exchanged as long as the largest standard error falls."""
-
-    def score(rows: list[int]) -> float:
-        design = PoseDesign.of(CANDIDATES[rows], np.full(len(rows), _SOME_SIGMA))
-        # Prior: 100 % relative error of every parameter. The sum of the variances breaks ties.
-        covariance = np.linalg.inv(design.information + np.eye(9))
-        return float(covariance.diagonal().max() + 1e-3 * np.trace(covariance))
-
-    rows: list[int] = []
-    for _ in range(n):
-        rows.append(min(range(len(CANDIDATES)), key=lambda k: score([*rows, k])))
-    best = score(rows)
-    improved = True
-    while improved:
-        improved = False
-        for k in range(n):
-            for other in range(len(CANDIDATES)):
-                trial = [*rows[:k], other, *rows[k + 1 :]]
-                value = score(trial)
-                if value < best * (1.0 - 1e-9):
-                    rows, best, improved = trial, value, True
-    return CANDIDATES[rows]
 
 
 def _moves(angle_noise: float) -> tuple[MovePlan, ...]:

@@ -70,10 +70,8 @@ def rank(
     recording = recording_of(recording)
     named = [(_name(given, k), _read(given)) for k, given in enumerate(calibrations)]
     stated = [known.gravity_m_s2 for _, known in named if "maker" not in known.extensions]
-    if gravity_m_s2 is None and latitude_deg is None and height_m is None and stated:
-        gravity, source = float(np.median(stated)), "that of the calibrations"
-    else:
-        gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    of_files = (float(np.median(stated)), "that of the calibrations") if stated else None
+    gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, of_files)
     segments = segments_of(segments, recording, progress)
     own = own_calibration(recording, segments, gravity)
     judged = []

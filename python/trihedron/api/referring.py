@@ -41,10 +41,7 @@ NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
 def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
     """A reference from a file of attitude, rate or pose, or from the log of another unit that moved along.
 
-    Raises
-    ------
-    ReadError
-        (a ``ValueError``) with the file and what to do.
+    Refused with the file and what to do.
     """
     if isinstance(reference, ReferenceMotion):
         return reference
@@ -73,10 +70,7 @@ def held_against(
 ) -> AgainstReference:
     """Fit a log to a reference; ``given`` is a calibration whose replay is added for comparison.
 
-    Raises
-    ------
-    ValueError
-        When the two share no time or motion, or the reference does not determine the sensors.
+    Refused when the two share no time or motion, or the reference does not determine the sensors.
     """
     is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
         recording.source
@@ -94,10 +88,7 @@ def calibration_by(
 ) -> Calibration:
     """Both sensors from the reference, in the lower-triangular frame, or (``case``) in the reference's body.
 
-    Raises
-    ------
-    ValueError
-        When the log has no accelerometer: a calibration file needs both.
+    Refused when the log has no accelerometer: a calibration file needs both.
     """
     if recording.accelerometer is None:
         raise RefusedError(
@@ -218,8 +209,8 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
 
 def diagnosis_by(
     found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
-) -> dict[str, Any]:
-    """Fields of a diagnosis by the reference alone, for a log with too few poses."""
+) -> Diagnosis:
+    """A diagnosis by the reference alone, for a log with too few poses."""
     effects = effects_of(found)
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
     test = _rate(found)
@@ -230,7 +221,7 @@ def diagnosis_by(
     if effects:
         verdict = "missing-physics"
     linear = _linear(found, recording)
-    base = Diagnosis(
+    return Diagnosis(
         verdict=verdict,
         domains=(test,),
         effects=effects,
@@ -248,7 +239,6 @@ def diagnosis_by(
         recording_sha256=recording.sha256,
         parameters=parameters,
     )
-    return dict(vars(base))
 
 
 def _rate(found: AgainstReference) -> DomainTest:

@@ -73,20 +73,14 @@ def guide(
     --------
     >>> calibrated, checked = trihedron.guide("session.csv", "accel 0.1 %, gyro 0.2 %")  # doctest: +SKIP
     """
-    said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
-    wanted, gravity = Accuracy.parse(accuracy), settle_gravity(**said)[0]
+    wanted, gravity = Accuracy.parse(accuracy), settle_gravity(gravity_m_s2, latitude_deg, height_m)[0]
     done = replay(recording_of(recording), wanted, gravity_m_s2=gravity, on_pose=on_pose)
+    said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
     return conclude(done.recording, done.cut_s, **said)
 
 
 def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: Tell | None = None) -> Replay:
-    """Run the guide on a log, block by block, as in a live session.
-
-    Raises
-    ------
-    ValueError
-        When the log has no accelerometer.
-    """
+    """Run the guide on a log, block by block, as in a live session. Refused when the log has no accelerometer."""
     readings = readings_of(recording)
     now_s = 0.0
 

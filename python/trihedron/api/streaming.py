@@ -105,10 +105,7 @@ def log_on_disk(
 ) -> LogOnDisk:
     """A .npy, Parquet or text log whose columns, rate and units are given, not detected.
 
-    Raises
-    ------
-    ValueError
-        When the file has another format, columns do not fit, or a sensor lacks an axis or the order x y z.
+    Refused when the file has another format, columns do not fit, or a sensor lacks an axis or the order x y z.
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
@@ -141,10 +138,7 @@ def segment_file(
     With ``checkpoint`` a file stores the state of the pass every half a minute; an interrupted run continues from it
     with bit-identical results, and the end removes it.
 
-    Raises
-    ------
-    ValueError
-        When ``checkpoint`` is a file of another kind.
+    Refused when ``checkpoint`` is a file of another kind.
     """
     tell = progress or (lambda _fraction, _text: None)
     # The segmentation only reads rows, which these types support.
@@ -269,11 +263,8 @@ def apply_file(
     An interrupted run continues where it stopped: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` has the number of rows
     and a hash of the inputs. Returns the number of rows written in this run.
 
-    Raises
-    ------
-    ValueError
-        When the calibration depends on temperature or has effects, which are not supported here; when units differ;
-        when the output exists.
+    Refused when the calibration depends on temperature or has effects, which are not supported here; when units differ;
+    when the output exists.
     """
     target = Path(output)
     known = calibration_of(calibration)

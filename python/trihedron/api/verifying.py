@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.api.calibrating import calibrate
-from trihedron.api.choices import settle_gravity
+from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.errors import REFUSALS
 from trihedron.estimate.verification import verify_calibration
@@ -69,10 +69,7 @@ def verify(
     if known.extensions.get("effects"):
         segments = None
     segments = segments_of(segments, recording, progress)
-    if gravity_m_s2 is None and latitude_deg is None and height_m is None:
-        gravity, source = known.gravity_m_s2, "that of the calibration"
-    else:
-        gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, gravity_of(known))
     own = own_calibration(recording, segments, gravity)
     judged = verify_calibration(known, recording, segments, gravity, source, own)
     accepted = {

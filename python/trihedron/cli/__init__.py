@@ -32,7 +32,7 @@ from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
 from trihedron.cli.noise import noise
-from trihedron.cli.output import silence_stdout
+from trihedron.cli.output import silence
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
 from trihedron.cli.provenance import begin
@@ -147,8 +147,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # Typer handled the Ctrl-C itself.
             _refuse(SENTENCE)
         return int(status or 0)
-    except _UsageError as error:
-        return _refuse(_usage_sentence(error, words))
     except (typer.Abort, Interrupted, KeyboardInterrupt) as error:
         _refuse(SENTENCE)
         return status_of(error)
@@ -157,31 +155,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # SystemExit.
         if isinstance(error, SystemExit):
             sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
-        silence_stdout()
+        silence(sys.stdout)
         return 0
+    except _UsageError as error:
+        return _refuse(_usage_sentence(error, words))
     except MemoryError:
         return _refuse(_memory_sentence())
-    except OSError as error:
-        if os.environ.get("TRIHEDRON_TRACEBACK"):
-            raise
-        if error.filename is None and error.errno in _OF_STDOUT:
-            silence_stdout()
-            return _refuse(f"standard output could not be written ({error.strerror}).")
-        return _refuse(str(error))
-    except RefusedError as error:
-        if os.environ.get("TRIHEDRON_TRACEBACK"):
-            raise
-        return _refuse(str(error))
-    except Exception as error:
-        # A defect of the program is reported as such, in one line.
-        if os.environ.get("TRIHEDRON_TRACEBACK"):
-            raise
-        return _refuse(_defect_sentence(error))
     except BaseException as error:
         # A panic in Rust raises PanicException, which does not derive from Exception.
-        if type(error).__name__ != "PanicException" or os.environ.get("TRIHEDRON_TRACEBACK"):
+        is_told = isinstance(error, Exception) or type(error).__name__ == "PanicException"
+        if not is_told or os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
-        return _refuse(_defect_sentence(error))
+        return _refuse(_sentence(error))
+
+
+def _sentence(error: BaseException) -> str:
+    """What is wrong with the input; a defect of the program is reported as such, in one line."""
+    if isinstance(error, OSError) and error.filename is None and error.errno in _OF_STDOUT:
+        silence(sys.stdout)
+        return f"standard output could not be written ({error.strerror})."
+    return str(error) if isinstance(error, OSError | RefusedError) else _defect_sentence(error)
 
 
 _OF_STDOUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)

@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from trihedron.cli.options import Force, Json, LogSource, with_options
+from trihedron.cli.options import LogSource, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_json
-from trihedron.cli.streamed import Stream, apply_stream
+from trihedron.cli.streamed import apply_stream
+
+OPTIONS = {
+    "calibration": typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON)."),
+    "output": ("FILE", "Where to write: .csv, .parquet, '-' (CSV on stdout); with --stream .npy.", "-o"),
+}
 
 
-@with_options(source=LogSource)
+@with_options(OPTIONS, source=LogSource)
 def apply(
-    calibration: Annotated[Path, typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON).")],
+    calibration: Path,
     source: LogSource,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Where to write: .csv, .parquet, '-' (CSV on stdout); with --stream .npy.",
-        ),
-    ] = Path("-"),
-    stream: Stream = False,
-    json: Json = None,
-    force: Force = False,
+    output: Path = Path("-"),
+    stream: bool = False,
+    json: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
     check_outputs(output, json, force=force, inputs=(*source.files, calibration))
@@ -37,9 +33,10 @@ def apply(
         apply_stream(calibration, source, output, force=force)
         return
     from trihedron.files.calibration import read_calibration
-    from trihedron.files.log import check_format, write_recording
+    from trihedron.files.log import check_suffix, write_recording
 
-    check_format(output)
+    if str(output) != "-":
+        check_suffix(output)
     known = read_calibration(calibration)
     recording = source.read()
     from trihedron.api import applying
@@ -52,5 +49,5 @@ def apply(
         is_even = any(finding.code is FindingCode.EVEN_CLOCK for finding in recording.findings)
         clock = f", timestamps of an even clock of {done.rate_hz:.6g} Hz" if is_even else ""
         say(f"{done.n_samples} samples{clock}: {output}")
-    write_json(recording_record(done), json, force=force)
+    write_json(lambda: recording_record(done), json, force=force)
     leave(done.findings)

@@ -6,28 +6,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress
-from trihedron.cli.output import Ending
+from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
+from trihedron.cli.output import FullResults
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
 
-By = Annotated[
-    str | None,
-    typer.Option(
-        "--by",
-        metavar="HOW",
-        help="Several logs: by session (each for itself), date, device (every device of an archive), or temperature.",
-    ),
-]
-Labels = Annotated[
-    str | None,
-    typer.Option("--labels", metavar="LIST", help="Several logs: day or device of each, with commas between."),
-]
 FIRST_SCREEN = 2
 
 
@@ -37,7 +25,8 @@ def calibrate_beside(
     columns: str | None,
     place: GravitySource,
     frame: Any,
-    ending: Ending,
+    output: Path | None,
+    results: FullResults,
 ) -> None:
     """Calibrate one unit from several logs with a reference each; print shared and individual parameters."""
     given = sources.each()
@@ -61,7 +50,8 @@ def calibrate_beside(
         record = calibration_document(result.calibration)
         return {**record, "references": [one.to_dict() for one in result.references]}
 
-    ending.tell(document, machine, result.calibration, 2, "Bias over time: --json FILE.")
+    more = "Bias over time: --json FILE."
+    results.tell_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
 
 
 def calibrate_many(
@@ -70,12 +60,11 @@ def calibrate_many(
     by: str | None,
     labels: str | None,
     frame: Any,
-    ending: Ending,
+    output: Path | None,
+    results: FullResults,
 ) -> None:
     """Calibrate every log; print common parameters and their repeatability."""
-    how = by or "session"
-    if how not in ("session", "date", "device", "temperature"):
-        raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
+    how = one_of("--by", by or "session", ("session", "date", "device", "temperature"))
     from trihedron.api import sessions
     from trihedron.report import sessions_report
     from trihedron.report.machine import sessions_record
@@ -97,7 +86,8 @@ def calibrate_many(
         )
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
-    ending.tell(document, partial(sessions_record, result.model), result.calibration, FIRST_SCREEN, more)
+    machine = partial(sessions_record, result.model)
+    results.tell_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
 
 
 def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:

@@ -8,12 +8,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from trihedron.cli.guide import DEFAULT_ACCURACY
-from trihedron.cli.options import Force, GravitySource, with_options
+from trihedron.cli.options import GravitySource, with_options
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Block, Recorder
@@ -23,60 +23,46 @@ LOSSES_NOT_TRUSTED = 0.05
 """Fraction of lost frames above which `read` makes a log's gaps a serious finding."""
 
 
-Port = Annotated[
-    str | None, typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin).")
-]
-Output = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it).")
-]
-Protocol = Annotated[
-    str, typer.Option("--protocol", metavar="NAME", help="Protocol, or a .toml that declares a frame; else found.")
-]
-Baud = Annotated[int | None, typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise.")]
-Seconds = Annotated[
-    float | None, typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time.")
-]
-Rate = Annotated[float | None, typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time.")]
-Columns = Annotated[
-    str | None, typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands.")
-]
-TimeUnit = Annotated[
-    str | None, typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns.")
-]
-Wait = Annotated[
-    float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
-]
-Guide = Annotated[bool, typer.Option("--guide", help="Lead through a calibration on a live screen.")]
-Browser = Annotated[bool, typer.Option("--browser", help="The guide as a page in the browser.")]
-NoOpen = Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")]
-Accuracy = Annotated[str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')]
-Calibration = Annotated[
-    Path | None, typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end.")
-]
-Bell = Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a pose is taken.")]
-ListThem = Annotated[bool, typer.Option("--list", help="List the protocols and stop.")]
+OPTIONS = {
+    "port": typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+    "output": ("LOG", "Log to write (text; every command reads it).", "-o"),
+    "protocol": ("NAME", "Protocol, or a .toml that declares a frame; else found."),
+    "baud": typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
+    "seconds": typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
+    "rate": ("HZ", "Rate of a board that sends no time."),
+    "columns": ("LIST", "Columns of text lines, as in the other commands."),
+    "time_unit": ("UNIT", "Unit of the board's time: s, ms, us or ns."),
+    "wait": typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged."),
+    "guide": "Lead through a calibration on a live screen.",
+    "browser": "The guide as a page in the browser.",
+    "no_open": "With --browser: print the link, open nothing.",
+    "accuracy": ("TEXT", 'Of the guide: "accel 0.05 %, gyro 0.1 %".'),
+    "calibration": ("FILE", "Of the guide: calibration to write at the end."),
+    "bell": "Of the guide: ring when a pose is taken.",
+    "list_them": typer.Option("--list", help="List the protocols and stop."),
+}
 
 
-@with_options(place=GravitySource)
+@with_options(OPTIONS, place=GravitySource)
 def capture(
     place: GravitySource,
-    port: Port = None,
-    output: Output = None,
-    protocol: Protocol = "auto",
-    baud: Baud = None,
-    seconds: Seconds = None,
-    rate: Rate = None,
-    columns: Columns = None,
-    time_unit: TimeUnit = None,
-    wait: Wait = 60.0,
-    guide: Guide = False,
-    browser: Browser = False,
-    no_open: NoOpen = False,
-    accuracy: Accuracy = DEFAULT_ACCURACY,
-    calibration: Calibration = None,
-    bell: Bell = False,
-    list_them: ListThem = False,
-    force: Force = False,
+    port: str | None = None,
+    output: Path | None = None,
+    protocol: str = "auto",
+    baud: int | None = None,
+    seconds: float | None = None,
+    rate: float | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    wait: float = 60.0,
+    guide: bool = False,
+    browser: bool = False,
+    no_open: bool = False,
+    accuracy: str = DEFAULT_ACCURACY,
+    calibration: Path | None = None,
+    bell: bool = False,
+    list_them: bool = False,
+    force: bool = False,
 ) -> None:
     """Record what a board sends into a log: nothing lost silently, on disk as it comes."""
     from trihedron.capture.protocols import PROTOCOLS
@@ -90,7 +76,7 @@ def capture(
         raise typer.BadParameter("name what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("name the log to write: -o LOG")
-    from trihedron.api.capturing import open_device
+    from trihedron.api.capturing import open_device, stopped_by
     from trihedron.files.output import check_free
 
     check_free([output, calibration], overwrite=force, inputs=[Path(port)])
@@ -111,8 +97,7 @@ def capture(
     from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
 
-    stop_on_signals(recorder)
-    with full_disk_is_status_2():
+    with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         made = run_guided(
             recorder,
             output,
@@ -129,9 +114,10 @@ def capture(
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
     """Run a recorder to its end and report what was saved; status 2 where the recording is incomplete."""
-    stop_on_signals(recorder)
+    from trihedron.api.capturing import stopped_by
+
     progress = Progress()
-    with full_disk_is_status_2():
+    with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         for block in recorder:
             progress.show(recorder, block)
             if seconds is not None and progress.elapsed_s >= seconds:
@@ -164,17 +150,6 @@ def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = 
     if count.lost > LOSSES_NOT_TRUSTED * (n + count.lost):
         _say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
         raise typer.Exit(2)
-
-
-def stop_on_signals(recorder: Recorder) -> None:
-    """Ctrl-C ends the recording in order; a second one ends the program."""
-
-    def end(number: int, _frame: Any) -> None:
-        recorder.stop()
-        signal.signal(number, signal.default_int_handler)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
 
 
 class Progress:

@@ -17,7 +17,6 @@ def check(source: LogSource, results: Results) -> None:
 
     with progress("checking") as tell:
         result = checking.check(recording, progress=tell)
-    document = check_report(recording, result.segments, result.calibration, result.findings)
-    machine = check_record(recording, result.segments, result.calibration, result.findings)
-    results.tell(document, machine)
+    shown = (recording, result.segments, result.calibration, result.findings)
+    results.tell(check_report(*shown), lambda: check_record(*shown))
     leave(result.findings)

@@ -5,28 +5,24 @@ from __future__ import annotations
 import secrets
 from itertools import count
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from trihedron.cli.options import Force
+from trihedron.cli.options import with_options
 from trihedron.cli.output import leave, put, step, style
 from trihedron.errors import RefusedError
 
 FOLDER = "trihedron-demo"
 
 
-def demo(
-    folder: Annotated[
-        Path | None,
-        typer.Argument(metavar="FOLDER", help=f"Where to write; default: {FOLDER}, or the next free name."),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", metavar="N", min=0, help="Unit and effect of the second example; default: random."),
-    ] = None,
-    force: Force = False,
-) -> None:
+OPTIONS = {
+    "folder": typer.Argument(metavar="FOLDER", help=f"Where to write; default: {FOLDER}, or the next free name."),
+    "seed": typer.Option("--seed", metavar="N", min=0, help="Unit and effect of the second example; default: random."),
+}
+
+
+@with_options(OPTIONS)
+def demo(folder: Path | None = None, seed: int | None = None, force: bool = False) -> None:
     """Two simulated examples: a calibration compared with the truth; a simulation that a log contradicts."""
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:

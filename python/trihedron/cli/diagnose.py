@@ -3,59 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from trihedron.cli.options import GravitySource, LogsSource, ReferenceColumns, progress, with_options
-from trihedron.cli.output import Results, leave, say
+from trihedron.cli.options import GravitySource, LogsSource, progress, with_options
+from trihedron.cli.output import FullResults, leave, say
 
 if TYPE_CHECKING:
     from trihedron.records.results import DiagnosisResult
 
-Calibration = Annotated[
-    Path | None,
-    typer.Option(
-        "--calibration", metavar="FILE", help="Calibration to compare with the log; otherwise one is fitted to it."
+OPTIONS = {
+    "calibration": ("FILE", "Calibration to compare with the log; otherwise one is fitted to it."),
+    "against": (
+        "SIM",
+        "Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one).",
     ),
-]
-Against = Annotated[
-    Path | None,
-    typer.Option(
-        "--against",
-        metavar="SIM",
-        help="Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one).",
-    ),
-]
-Reference = Annotated[
-    Path | None,
-    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
-]
-Improved = Annotated[
-    Path | None,
-    typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with the parameters of the log."),
-]
-Updated = Annotated[
-    Path | None, typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives.")
-]
-Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")]
-Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]
+    "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log."),
+    "improved": ("FILE.toml", "Write the scenario with the parameters of the log."),
+    "updated": ("FILE", "Write the calibration that this log itself gives."),
+    "alpha": ("P", "Chance that a healthy log is called anything but consistent."),
+    "full": "Print the whole report, with every candidate.",
+}
 
 
-@with_options(sources=LogsSource, place=GravitySource, results=Results)
+@with_options(OPTIONS, sources=LogsSource, place=GravitySource, results=FullResults)
 def diagnose(
     sources: LogsSource,
     place: GravitySource,
     *,
-    calibration: Calibration = None,
-    against: Against = None,
-    reference: Reference = None,
-    reference_columns: ReferenceColumns = None,
-    improved: Improved = None,
-    updated: Updated = None,
-    alpha: Alpha = 0.01,
-    full: Full = False,
-    results: Results,
+    calibration: Path | None = None,
+    against: Path | None = None,
+    reference: Path | None = None,
+    reference_columns: str | None = None,
+    improved: Path | None = None,
+    updated: Path | None = None,
+    alpha: float = 0.01,
+    results: FullResults,
 ) -> None:
     """Where a log and its model differ, which effects are missing, and what adding them gains. Status 0 if it ran.
 
@@ -75,7 +59,7 @@ def diagnose(
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
     results.check(updated, improved, inputs=(*sources.files, calibration, against))
-    if sources.are_many(None):
+    if sources.are_many():
         if any(one is not None for one in (calibration, against, reference, improved, updated)):
             raise typer.BadParameter("several logs are diagnosed without a model: each by itself, and what all share")
         _diagnose_many(sources, place, alpha, results)
@@ -101,8 +85,8 @@ def diagnose(
             progress=tell,
         )
     document = diagnosis_report(result, str(against or calibration or ""), str(improved or ""))
-    machine = diagnosis_document(result)
-    results.tell(document, machine, None if full else first_screen(result))
+    results.show(document, first_screen(result))
+    results.write(document, lambda: diagnosis_document(result))
     if improved is not None and against is not None:
         _improve(against, result, improved, force=results.force)
     if updated is not None:
@@ -113,7 +97,7 @@ def diagnose(
             say(f"calibration of this log: {updated}")
     elif known is not None and result.updated is not None and any(p.significant for p in result.parameters):
         say("The calibration that this log itself gives: --updated FILE.")
-    if not full and results.report is None:
+    if not results.full and results.report is None:
         _point_to_more(result)
     if known is not None:
         from trihedron.api.applying import doubted
@@ -122,7 +106,7 @@ def diagnose(
         leave(doubted(known))
 
 
-def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, results: Results) -> None:
+def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, results: FullResults) -> None:
     """Diagnose every log alone, and the effects that all share."""
     from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
@@ -130,7 +114,7 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
     recordings = [source.read() for source in sources.each()]
     with progress("diagnosing") as tell:
         found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=tell)
-    results.tell(shared_diagnosis_report(found), shared_diagnosis_record(found))
+    results.tell(shared_diagnosis_report(found), lambda: shared_diagnosis_record(found))
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:

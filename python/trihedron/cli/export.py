@@ -3,53 +3,47 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from trihedron.cli.options import Force
+from trihedron.cli.options import with_options
 from trihedron.cli.output import check_outputs, leave, say
 
 LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
 """Words that mark lines of a file about information that the format cannot represent."""
 
 
+OPTIONS = {
+    "to": ("TARGET", "px4, ardupilot, kalibr, c ...; 'list': all, and what each needs."),
+    "calibration": typer.Argument(
+        metavar="CALIBRATION", help="Calibration file, of ours or another maker's; or several."
+    ),
+    "output": ("FILE", "Where to write; '-' is stdout. A folder for several.", "-o"),
+    "noise": ("FILE", "Noise of a static log: the JSON of trihedron allan."),
+    "rate": ("HZ", "Rate of the samples; default: that of the static log."),
+    "topic": ("NAME", "Where the samples are published."),
+    "accel_lsb": ("SIZE", "Of a count, as the target's driver assumes: '0.061 mg'."),
+    "gyro_lsb": ("SIZE", "The same of the gyro: '0.0305 deg/s'."),
+    "current_parameters": (
+        "FILE",
+        "Autopilots: the board's parameters when it logged, where the log does not hold them; 'none' if raw.",
+    ),
+}
+
+
+@with_options(OPTIONS)
 def export(
-    to: Annotated[
-        str,
-        typer.Option("--to", metavar="TARGET", help="px4, ardupilot, kalibr, c ...; 'list': all, and what each needs."),
-    ],
-    calibration: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="CALIBRATION", help="Calibration file, of ours or another maker's; or several."),
-    ] = None,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout. A folder for several."),
-    ] = Path("-"),
-    noise: Annotated[
-        Path | None, typer.Option("--noise", metavar="FILE", help="Noise of a static log: the JSON of trihedron allan.")
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option("--rate", metavar="HZ", help="Rate of the samples; default: that of the static log."),
-    ] = None,
-    topic: Annotated[str, typer.Option("--topic", metavar="NAME", help="Where the samples are published.")] = "/imu0",
-    accel_lsb: Annotated[
-        str, typer.Option("--accel-lsb", metavar="SIZE", help="Of a count, as the target's driver assumes: '0.061 mg'.")
-    ] = "",
-    gyro_lsb: Annotated[
-        str, typer.Option("--gyro-lsb", metavar="SIZE", help="The same of the gyro: '0.0305 deg/s'.")
-    ] = "",
-    current_parameters: Annotated[
-        str,
-        typer.Option(
-            "--current-parameters",
-            metavar="FILE",
-            help="Autopilots: the board's parameters when it logged, where the log does not hold them; 'none' if raw.",
-        ),
-    ] = "",
-    force: Force = False,
+    to: str,
+    calibration: list[Path] | None = None,
+    output: Path = Path("-"),
+    noise: Path | None = None,
+    rate: float | None = None,
+    topic: str = "/imu0",
+    accel_lsb: str = "",
+    gyro_lsb: str = "",
+    current_parameters: str = "",
+    force: bool = False,
 ) -> None:
     """Write a calibration in another program's convention, with its equation stated."""
     if to == "list":

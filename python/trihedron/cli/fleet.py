@@ -3,50 +3,44 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from trihedron.cli.options import GravitySource, Json, progress, with_options
-from trihedron.cli.output import check_outputs, say, show, write_json
+from trihedron.cli.options import GravitySource, progress, with_options
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, check_outputs, say, show, write_json
 
-NOT_TO_BE_TRUSTED = 2
+OPTIONS = {
+    "logs": typer.Argument(metavar="DIR|GLOB...", help="Folder with logs, pattern such as 'logs/*.csv', or logs."),
+    "out": ("DIR", "Folder of the results; done logs in it are not redone.", "-o"),
+    "scheduler": ("ADDRESS", "Dask scheduler, tcp://host:8786; a local cluster otherwise."),
+    "workers": typer.Option(
+        "--workers", metavar="N", min=0, help="Processes of the local cluster; 0 works here, without Dask."
+    ),
+    "serial": ("REGEX", "Its group names the device in a log's path, 'unit_(\\d+)'; else the folder is the device."),
+    "no_diagnose": "Calibrate only: several times faster.",
+    "columns": ("LIST", "As for the other commands, the same for all logs."),
+    "rate": ("HZ", "Sampling rate of logs without a time column."),
+    "accel_unit": ("UNIT", "Unit of all accelerometers."),
+    "gyro_unit": ("UNIT", "Unit of all gyros."),
+    "force": "Replace the --json file if it exists.",
+}
 
 
-@with_options(place=GravitySource)
+@with_options(OPTIONS, place=GravitySource)
 def fleet(
     place: GravitySource,
-    logs: Annotated[
-        list[str],
-        typer.Argument(metavar="DIR|GLOB...", help="Folder with logs, pattern such as 'logs/*.csv', or logs."),
-    ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results; done logs in it are not redone.")
-    ],
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, tcp://host:8786; a local cluster otherwise.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=0, help="Processes of the local cluster; 0 works here, without Dask.")
-    ] = None,
-    serial: Annotated[
-        str | None,
-        typer.Option(
-            metavar="REGEX",
-            help="Its group names the device in a log's path, 'unit_(\\d+)'; else the folder is the device.",
-        ),
-    ] = None,
-    no_diagnose: Annotated[bool, typer.Option("--no-diagnose", help="Calibrate only: several times faster.")] = False,
-    columns: Annotated[
-        str | None, typer.Option(metavar="LIST", help="As for the other commands, the same for all logs.")
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Sampling rate of logs without a time column.")
-    ] = None,
-    accel_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of all accelerometers.")] = None,
-    gyro_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of all gyros.")] = None,
-    json: Json = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the --json file if it exists.")] = False,
+    logs: list[str],
+    out: Path,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    serial: str | None = None,
+    no_diagnose: bool = False,
+    columns: str | None = None,
+    rate: float | None = None,
+    accel_unit: str | None = None,
+    gyro_unit: str | None = None,
+    json: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Calibrate and diagnose many logs of many devices: one table, one page."""
     check_outputs(json, force=force)
@@ -71,7 +65,7 @@ def fleet(
     document = fleet_report(result.summary)
     shown = tuple(section for section in document.sections if section.heading != "Every log")
     show(document, json, sections=len(shown))
-    write_json({"rows": list(result.rows)}, json, force=force, document=document)
+    write_json(lambda: {"rows": list(result.rows)}, json, force=force, document=document)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
     if not document.is_trustworthy:

@@ -8,14 +8,14 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, LogSource, with_options
+from trihedron.cli.options import GravitySource, LogSource, with_options
 
 if TYPE_CHECKING:
-    from trihedron.capture.recorder import Block, Recorder
+    from trihedron.capture.recorder import Recorder
     from trihedron.records import Recording
     from trihedron.records.guiding import GuideView
 
@@ -26,18 +26,21 @@ DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
 
 
-@with_options(source=LogSource, place=GravitySource)
+OPTIONS = {
+    "accuracy": ("TEXT", 'When to stop: "accel 0.05 %, gyro 0.1 %".'),
+    "every": "Print the screen after every pose, not only the last.",
+    "output": ("FILE", "Calibration to write.", "-o"),
+}
+
+
+@with_options(OPTIONS, source=LogSource, place=GravitySource)
 def guide(
     source: LogSource,
     place: GravitySource,
-    accuracy: Annotated[
-        str, typer.Option("--accuracy", metavar="TEXT", help='When to stop: "accel 0.05 %, gyro 0.1 %".')
-    ] = DEFAULT_ACCURACY,
-    every: Annotated[
-        bool, typer.Option("--every", help="Print the screen after every pose, not only the last.")
-    ] = False,
-    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Calibration to write.")] = None,
-    force: Force = False,
+    accuracy: str = DEFAULT_ACCURACY,
+    every: bool = False,
+    output: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Replay a log through the guide of capture, which names the next pose after each, then calibrate and verify."""
     from trihedron.api.replaying import replay
@@ -62,12 +65,6 @@ def _size() -> tuple[int, int]:
     """Columns and lines of the terminal; elsewhere COLUMNS and LINES, or 80 x 24."""
     size = shutil.get_terminal_size((80, 24))
     return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
-
-
-def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
-    from trihedron.capture.guide import Guide
-
-    return Guide(wanted, examine)
 
 
 def _line(view: GuideView) -> str:
@@ -113,8 +110,10 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide; returns the guide, which has the start of the verification."""
+    from trihedron.api.capturing import sensor_columns
     from trihedron.api.guiding import examine
     from trihedron.api.reading import read
+    from trihedron.capture.guide import Guide
     from trihedron.records.guiding import Accuracy
 
     wanted = Accuracy.parse(accuracy)
@@ -123,24 +122,17 @@ def run_guided(
         recorder.write_now()
         return examine(read(log), wanted, gravity_m_s2=gravity_m_s2)
 
-    made = _guide(wanted, look)
+    made = Guide(wanted, look)
     columns: list[int] = []
     started = time.monotonic()
     with _Shown(recorder, started, browser=browser, bell=bell, open_browser=open_browser) as show:
         for block in recorder:
             if not columns:
-                columns = sensor_columns(block)
+                columns = sensor_columns(block.columns)
             show(made.advance(block.time_s, block.values[:, columns]))
             if made.is_done or (seconds is not None and time.monotonic() - started > seconds):
                 recorder.stop()
     return made
-
-
-def sensor_columns(block: Block) -> list[int]:
-    """Indices of the accelerometer's and the gyro's columns of a stream, as the log's reader assigns them."""
-    from trihedron.api.capturing import sensor_columns as of
-
-    return of(block.columns)
 
 
 class _Shown:

@@ -6,11 +6,11 @@ import functools
 import inspect
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
@@ -19,71 +19,65 @@ from trihedron.cli.provenance import note_input, note_options
 if TYPE_CHECKING:
     from trihedron.records import Recording
 
-Json = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; '-' (or no FILE) is stdout.")
-]
-Force = Annotated[bool, typer.Option("--force", help="Replace output files that exist.")]
-ReferenceColumns = Annotated[
-    str | None,
-    typer.Option(
-        "--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."
+Table = Mapping[str, Any]
+"""Options by parameter name: the help, or placeholder, help and short flag. What needs more is a typer.Option or
+typer.Argument."""
+
+SHARED: Table = {
+    "json": ("FILE", "Write the result as JSON; '-' (or no FILE) is stdout."),
+    "report": ("FILE", "Write a report: .html with figures, .txt or .json."),
+    "force": "Replace output files that exist.",
+    "full": "Print the whole report, with every pose and move.",
+    "output": ("FILE", "Write the calibration file (JSON).", "-o"),
+    "reference_columns": ("LIST", "Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."),
+    "stream": "A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
+    "units state what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
+    "checkpoint": (
+        "FILE",
+        "With --stream: keep how far the pass is in FILE, so that a run that was stopped goes on from there.",
     ),
-]
-Report = Annotated[
-    Path | None, typer.Option("--report", metavar="FILE", help="Write a report: .html with figures, .txt or .json.")
-]
+}
 
 
 @dataclass(frozen=True)
 class ReadingOptions:
     """How to read a log that does not state its columns, rate or units."""
 
-    columns: Annotated[
-        str | None,
-        typer.Option("--columns", metavar="LIST", help="'t,ax,ay,az,-,gx,gy,gz' in file order, or 'ax=3,ay=4,az=5'."),
-    ] = None
-    rate: Annotated[
-        float | None, typer.Option("--rate", metavar="HZ", help="Sampling rate of a log without a time column.")
-    ] = None
-    accel_unit: Annotated[
-        str | None, typer.Option("--accel-unit", metavar="UNIT", help="m/s^2, g, mg or counts; detected otherwise.")
-    ] = None
-    gyro_unit: Annotated[
-        str | None,
-        typer.Option("--gyro-unit", metavar="UNIT", help="rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
-    ] = None
-    time_unit: Annotated[
-        str | None, typer.Option("--time-unit", metavar="UNIT", help="s, ms, us or ns; detected otherwise.")
-    ] = None
-    device: Annotated[
-        int | None, typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several.")
-    ] = None
-    topic: Annotated[
-        str | None,
-        typer.Option("--topic", metavar="NAME", help="Which topic, dataset or member of a file that holds several."),
-    ] = None
-    instance: Annotated[
-        str | None, typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds.")
-    ] = None
+    columns: str | None = None
+    rate: float | None = None
+    accel_unit: str | None = None
+    gyro_unit: str | None = None
+    time_unit: str | None = None
+    device: int | None = None
+    topic: str | None = None
+    instance: str | None = None
+    OPTIONS: ClassVar[Table] = {
+        "columns": ("LIST", "'t,ax,ay,az,-,gx,gy,gz' in file order, or 'ax=3,ay=4,az=5'."),
+        "rate": ("HZ", "Sampling rate of a log without a time column."),
+        "accel_unit": ("UNIT", "m/s^2, g, mg or counts; detected otherwise."),
+        "gyro_unit": ("UNIT", "rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
+        "time_unit": ("UNIT", "s, ms, us or ns; detected otherwise."),
+        "device": ("N", "Which device (from 1) of an archive of several."),
+        "topic": ("NAME", "Which topic, dataset or member of a file that holds several."),
+        "instance": ("N", "Which of several IMUs whose readings one file holds."),
+    }
 
 
 @dataclass(frozen=True)
 class LogSource(ReadingOptions):
     """The log, as given on the command line."""
 
-    log: Annotated[
-        Path | None,
-        typer.Argument(
+    log: Path | None = None
+    accel: Path | None = None
+    gyro: Path | None = None
+    OPTIONS: ClassVar[Table] = {
+        **ReadingOptions.OPTIONS,
+        "log": typer.Argument(
             metavar="LOG", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
         ),
-    ] = None
-    accel: Annotated[
-        Path | None,
-        typer.Option("--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own."),
-    ] = None
-    gyro: Annotated[
-        Path | None, typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own.")
-    ] = None
+        "accel": ("F", "Log of the accelerometer, where each sensor has its own."),
+        "gyro": ("F", "Log of the gyroscope, where each sensor has its own."),
+    }
 
     @property
     def files(self) -> tuple[Path | None, ...]:
@@ -120,29 +114,22 @@ class LogSource(ReadingOptions):
 class LogsSource(ReadingOptions):
     """One log or several, as given on the command line."""
 
-    log: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="LOG", help="Log, or several of one unit; files and archives as for `read`."),
-    ] = None
-    accel: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own; once for each log."
-        ),
-    ] = None
-    gyro: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own; once for each log."
-        ),
-    ] = None
+    log: list[Path] | None = None
+    accel: list[Path] | None = None
+    gyro: list[Path] | None = None
+    OPTIONS: ClassVar[Table] = {
+        **ReadingOptions.OPTIONS,
+        "log": typer.Argument(metavar="LOG", help="Log, or several of one unit; files and archives as for `read`."),
+        "accel": ("F", "Log of the accelerometer, where each sensor has its own; once for each log."),
+        "gyro": ("F", "Log of the gyroscope, where each sensor has its own; once for each log."),
+    }
 
     @property
-    def files(self) -> tuple[Path | None, ...]:
+    def files(self) -> tuple[Path, ...]:
         """Input files, which no output may overwrite."""
         return tuple(path for paths in (self.log, self.accel, self.gyro) for path in paths or ())
 
-    def are_many(self, by: str | None) -> bool:
+    def are_many(self, by: str | None = None) -> bool:
         """Whether several logs, or a grouping, are given."""
         return by is not None or any(len(files or []) > 1 for files in (self.log, self.accel, self.gyro))
 
@@ -151,13 +138,7 @@ class LogsSource(ReadingOptions):
         return self.each()[0]
 
     def each(self) -> list[LogSource]:
-        """One source per log.
-
-        Raises
-        ------
-        typer.BadParameter
-            When the numbers of accelerometer and gyro logs differ.
-        """
+        """One source per log; refused where the numbers of accelerometer and gyro logs differ."""
         log, accel, gyro = (list(files or []) for files in (self.log, self.accel, self.gyro))
         rest: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(ReadingOptions)}
         if accel and gyro and len(accel) != len(gyro):
@@ -178,15 +159,14 @@ class LogsSource(ReadingOptions):
 class GravitySource:
     """|g| at the place of the recording, as given on the command line."""
 
-    gravity: Annotated[
-        float | None, typer.Option("--gravity", metavar="m/s^2", help="Local gravity, a factor of every scale.")
-    ] = None
-    latitude: Annotated[
-        float | None, typer.Option("--latitude", metavar="DEG", help="Latitude, from which gravity follows (WGS 84).")
-    ] = None
-    height: Annotated[
-        float | None, typer.Option("--height", metavar="M", help="Height above sea level, with --latitude.")
-    ] = None
+    gravity: float | None = None
+    latitude: float | None = None
+    height: float | None = None
+    OPTIONS: ClassVar[Table] = {
+        "gravity": ("m/s^2", "Local gravity, a factor of every scale."),
+        "latitude": ("DEG", "Latitude, from which gravity follows (WGS 84)."),
+        "height": ("M", "Height above sea level, with --latitude."),
+    }
 
     @property
     def said(self) -> dict[str, Any]:
@@ -201,28 +181,25 @@ class GravitySource:
         return settle_gravity(**self.said)[0]
 
 
-def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add the fields of option groups to a command's options: ``source=LogSource`` fills argument ``source``.
+def with_options(table: Table | None = None, /, **groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """A command's parameters as options, described by its ``table``, by the groups' or by ``SHARED``.
 
-    An option is defined once, in its group.
+    ``source=LogSource`` gives the command the options of that group, and fills its argument ``source``.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(command, eval_str=True)
         parameters: list[inspect.Parameter] = []
         for name, parameter in own.parameters.items():
-            if name in groups:
-                hints: dict[str, Any] = {}
-                for base in reversed(groups[name].__mro__[:-1]):
-                    hints |= inspect.get_annotations(base, eval_str=True)
-                parameters += [
-                    inspect.Parameter(
-                        f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=hints[f.name]
-                    )
-                    for f in fields(groups[name])
-                ]
-            else:
-                parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+            group = groups.get(name)
+            if group is None:
+                parameters.append(_described(name, parameter.annotation, parameter.default, table or {}))
+                continue
+            hints: dict[str, Any] = {}
+            for base in reversed(group.__mro__[:-1]):
+                hints |= inspect.get_annotations(base, eval_str=True)
+            said = {**getattr(group, "OPTIONS", {}), **(table or {})}
+            parameters += [_described(f.name, hints[f.name], f.default, said) for f in fields(group)]
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
@@ -237,6 +214,45 @@ def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[...
         return run
 
     return decorate
+
+
+def _described(name: str, kind: Any, default: Any, table: Table) -> inspect.Parameter:
+    """A parameter with the option or argument that its table describes; ``--its-name`` where it is an option."""
+    told = table[name] if name in table else SHARED[name]
+    if isinstance(told, str | tuple):
+        metavar, text, *short = (None, told) if isinstance(told, str) else told
+        told = typer.Option(f"--{name.replace('_', '-')}", *short, metavar=metavar, help=text)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, told])
+
+
+def whole_numbers(option: str, text: str) -> list[int]:
+    """Whole numbers of one digit, separated by commas."""
+    values = numbers(option, text)
+    if not all(abs(value) < 10 and value == int(value) for value in values):
+        raise typer.BadParameter(f"{option} takes whole numbers such as 1,-1,2,-2,3,-3, not {text[:40]!r}")
+    return [int(value) for value in values]
+
+
+def one_of(option: str, value: str, allowed: tuple[str, ...]) -> str:
+    """A word of a list; the error for another one lists the words."""
+    if value not in allowed:
+        raise typer.BadParameter(f"{option} is one of {', '.join(allowed)}, not {value!r}")
+    return value
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Numbers separated by commas."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{option} is a list of numbers with commas between, not {text!r}") from None
+
+
+def signs(option: str, text: str) -> list[int]:
+    """Three signs, + or -."""
+    if len(text) != 3 or set(text) - {"+", "-"}:
+        raise typer.BadParameter(f"{option} is three signs such as '-++', not {text!r}")
+    return [1 if sign == "+" else -1 for sign in text]
 
 
 @contextmanager

@@ -8,14 +8,13 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
-from trihedron.cli.options import Force, Json, Report
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import check_free, check_report, write_whole
@@ -32,25 +31,23 @@ NOT_TO_BE_TRUSTED = 2
 def check_outputs(
     *paths: Path | None, force: bool, report: Path | None = None, inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Check that outputs can be written, before minutes of work; ``inputs`` are files that they must not overwrite.
-
-    Raises
-    ------
-    OutputError
-        As :func:`trihedron.files.output.check_free`, or when the ending of a report is no known format.
-    """
+    """Refuse outputs that cannot be written, before minutes of work; none of ``inputs`` is overwritten."""
     if report is not None:
         check_report(report)
     check_free([*paths, report], overwrite=force, inputs=inputs)
 
 
-def write_report(document: Document, machine: dict[str, Any], report: Path | None, *, force: bool) -> None:
+Machine = Callable[[], dict[str, Any]]
+"""Makes the JSON of a result; called only where that is requested."""
+
+
+def write_report(document: Document, machine: Machine, report: Path | None, *, force: bool) -> None:
     """Write the report in the format of its file's ending."""
     if report is None:
         return
     from trihedron.report.saved import written
 
-    content = written(_with_provenance(document), lambda: machine, report)
+    content = written(_with_provenance(document), machine, report)
     write_whole(report, content, overwrite=force)
     say(f"report: {report}")
 
@@ -60,7 +57,7 @@ def _with_provenance(document: Document) -> Document:
     return document if document.provenance else with_provenance(document)
 
 
-def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, document: Document | None = None) -> None:
+def write_json(machine: Machine, target: Path | None, *, force: bool, document: Document | None = None) -> None:
     """Write the JSON to a file or ('-') stdout; a file includes the report, for ``trihedron report``.
 
     Called after every other file is written, since the reader of stdout may have closed the pipe.
@@ -70,13 +67,14 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, doc
     from trihedron.report.machine import json_text
 
     if str(target) == "-":
-        typer.echo(json_text(machine), nl=False)
+        typer.echo(json_text(machine()), nl=False)
         return
+    content = machine()
     if document is not None:
         from trihedron.report.saved import with_report
 
-        machine = with_report(machine, _with_provenance(document))
-    write_whole(target, json_text(machine), overwrite=force)
+        content = with_report(content, _with_provenance(document))
+    write_whole(target, json_text(content), overwrite=force)
     say(f"JSON: {target}")
 
 
@@ -84,56 +82,61 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool, doc
 class Results:
     """Output files of a result, as given on the command line."""
 
-    json: Json = None
-    report: Report = None
-    force: Force = False
+    json: Path | None = None
+    report: Path | None = None
+    force: bool = False
 
     def check(self, *more: Path | None, inputs: Iterable[Path | None] = ()) -> None:
         """As :func:`check_outputs`, with ``more`` files that the command writes."""
         check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
 
-    def tell(self, document: Document, machine: dict[str, Any], sections: int | None = None) -> None:
-        """Print the first ``sections`` on stdout; write JSON and report where requested."""
-        show(document, self.json, sections=sections)
+    def tell(self, document: Document, machine: Machine) -> None:
+        """Print the report on stdout; write JSON and report where requested."""
+        show(document, self.json, sections=None)
         self.write(document, machine)
 
-    def write(self, document: Document, machine: dict[str, Any]) -> None:
+    def write(self, document: Document, machine: Machine) -> None:
         """Write report and JSON where requested."""
         write_report(document, machine, self.report, force=self.force)
         write_json(machine, self.json, force=self.force, document=document)
 
 
 @dataclass(frozen=True)
-class Ending:
-    """Output files of a calibration, and how much of its report is printed."""
+class _Extent:
+    full: bool = False
 
-    output: Path | None
-    results: Results
-    full: bool
 
-    def tell(
+@dataclass(frozen=True)
+class FullResults(Results, _Extent):
+    """Output files of a result whose whole report is printed with ``--full`` only."""
+
+    def show(self, document: Document, sections: int | None) -> None:
+        """Print the first ``sections``, or with ``--full`` all."""
+        show(document, self.json, sections=None if self.full else sections)
+
+    def finish(self, document: Document, machine: Machine, more: str) -> None:
+        """Write report and JSON where requested; say ``more``, where the rest is found, unless all was shown."""
+        self.write(document, machine)
+        if not self.full and self.report is None:
+            say(more)
+
+    def tell_calibration(
         self,
         document: Document,
-        machine: Callable[[], dict[str, Any]],
+        machine: Machine,
         calibration: Calibration,
+        output: Path | None,
         sections: int,
-        more: str = "",
+        more: str,
     ) -> None:
-        """Print the report and ``more``, write the requested files; status 2 where it is not to be trusted.
-
-        ``machine`` makes the JSON, and is called only where that is requested.
-        """
+        """Print the report of a calibration, write what is requested; status 2 where it is not to be trusted."""
         from trihedron.files.calibration import write_calibration
 
-        json, report = self.results.json, self.results.report
-        show(document, json, sections=None if self.full else sections)
-        if self.output is not None:
-            write_calibration(calibration, self.output, overwrite=self.results.force)
-            say(f"calibration: {self.output}")
-        if json is not None or report is not None:
-            self.results.write(document, machine())
-        if more and not self.full and report is None:
-            say(more)
+        self.show(document, sections)
+        if output is not None:
+            write_calibration(calibration, output, overwrite=self.force)
+            say(f"calibration: {output}")
+        self.finish(document, machine, more)
         leave(calibration.findings)
 
 
@@ -168,18 +171,24 @@ def put(text: str) -> None:
 
     A closed pipe (`| head`) does not prevent the requested files from being written.
     """
-    try:
+    with _closed_is_silent(sys.stdout):
         typer.echo(text, nl=False, color=has_colour())
+
+
+@contextlib.contextmanager
+def _closed_is_silent(stream: TextIO) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         if error.errno not in (errno.EPIPE, errno.EBADF):
             raise
-        silence_stdout()
+        silence(stream)
 
 
-def silence_stdout() -> None:
-    """Redirect stdout to null, so that the interpreter does not flush it again at exit."""
+def silence(stream: TextIO) -> None:
+    """Redirect a stream to null, so that the interpreter does not flush it again at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def say(sentence: str) -> None:
@@ -187,13 +196,8 @@ def say(sentence: str) -> None:
     text = printable(sentence)
     if sys.stderr.isatty():
         text = textwrap.fill(text, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)
-    try:
+    with _closed_is_silent(sys.stderr):
         typer.echo(text, err=True)
-    except OSError as error:
-        if error.errno not in (errno.EPIPE, errno.EBADF):
-            raise
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def step(sentence: str) -> None:

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
-from trihedron.cli.calibrate import numbers
-from trihedron.cli.options import with_options
+from trihedron.cli.options import numbers, with_options
 from trihedron.cli.output import Results
 
+OPTIONS = {
+    "turns": ("LIST", "Known turns about every axis, in degrees: '90,-90' or '1440,-1440'."),
+    "turn_time": ("S", "How long a turn takes."),
+    "pose_time": ("S", "Length of a pose, and of the stretch without rotation."),
+    "gyro_noise": ("X", "White noise of the gyro [deg/s/√Hz]."),
+    "accel_noise": ("X", "White noise of the accelerometer [µg/√Hz]."),
+    "turn_error": ("DEG", "Standard error of a turn's angle (wall)."),
+}
 
-@with_options(results=Results)
+
+@with_options(OPTIONS, results=Results)
 def plan(
     *,
-    turns: Annotated[
-        str, typer.Option(metavar="LIST", help="Known turns about every axis, in degrees: '90,-90' or '1440,-1440'.")
-    ] = "90,-90",
-    turn_time: Annotated[float, typer.Option(metavar="S", help="How long a turn takes.")] = 2.0,
-    pose_time: Annotated[
-        float, typer.Option(metavar="S", help="Length of a pose, and of the stretch without rotation.")
-    ] = 4.0,
-    gyro_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the gyro [deg/s/√Hz].")] = 0.005,
-    accel_noise: Annotated[float, typer.Option(metavar="X", help="White noise of the accelerometer [µg/√Hz].")] = 150.0,
-    turn_error: Annotated[float, typer.Option(metavar="DEG", help="Standard error of a turn's angle (wall).")] = 0.0,
+    turns: str = "90,-90",
+    turn_time: float = 2.0,
+    pose_time: float = 4.0,
+    gyro_noise: float = 0.005,
+    accel_noise: float = 150.0,
+    turn_error: float = 0.0,
     results: Results,
 ) -> None:
     """Before an experiment: expected uncertainties from turns, poses and moves, and which of them matter most."""
@@ -40,6 +40,4 @@ def plan(
         accelerometer_density=units.m_s2_from_micro_g(accel_noise),
         sigma_turn_rad=units.radians_from_degrees(turn_error),
     )
-    document = plan_report(planned)
-    machine = plan_record(planned)
-    results.tell(document, machine)
+    results.tell(plan_report(planned), lambda: plan_record(planned))

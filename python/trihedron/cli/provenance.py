@@ -22,19 +22,8 @@ _inputs: ContextVar[tuple[tuple[str, str], ...]] = ContextVar("inputs", default=
 
 # Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
-    "json",
-    "report",
-    "output",
-    "force",
-    "full",
-    "csv",
-    "plot",
-    "updated",
-    "improved",
-    "log",
-    "accel",
-    "gyro",
-    "calibration",
+    *("json", "report", "output", "force", "full", "csv", "plot", "updated", "improved"),
+    *("log", "accel", "gyro", "calibration", "result"),
 }
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json as json_format
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.options import Force, Report
+from trihedron.cli.options import with_options
 from trihedron.cli.output import check_outputs, show, write_report
 from trihedron.errors import RefusedError
 
@@ -19,16 +19,16 @@ MOST_BYTES = 200_000_000
 """Largest saved result in bytes, far above any real one."""
 
 
-def report(
-    result: Annotated[Path, typer.Argument(metavar="RESULT.json", help="A saved result, or a calibration file.")],
-    report: Report = None,
-    force: Force = False,
-) -> None:
+OPTIONS = {"result": typer.Argument(metavar="RESULT.json", help="A saved result, or a calibration file.")}
+
+
+@with_options(OPTIONS)
+def report(result: Path, report: Path | None = None, force: bool = False) -> None:
     """Print a saved result again; --report FILE.html writes its page."""
     check_outputs(force=force, report=report, inputs=[result])
     document, saved = _read(result)
     show(document, None, sections=None)
-    write_report(document, saved, report, force=force)
+    write_report(document, lambda: saved, report, force=force)
 
 
 def _read(path: Path) -> tuple[Document, dict[str, Any]]:

@@ -150,8 +150,3 @@ def as_text(view: GuideView, width: int = 80, height: int = 24) -> str:
     with console.capture() as captured:
         console.print(screen(view, width, height))
     return captured.get()
-
-
-def bell(rings: int) -> str:
-    """The characters that ring the terminal's bell."""
-    return "\a" * rings

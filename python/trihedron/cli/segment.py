@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import Results, leave
-from trihedron.cli.streamed import Kept, Stream, needs_stream, segment_stream
+from trihedron.cli.streamed import needs_stream, opened
 
 
 @with_options(source=LogSource, results=Results)
-def segment(source: LogSource, *, stream: Stream = False, checkpoint: Kept = None, results: Results) -> None:
+def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None = None, results: Results) -> None:
     """Find the poses and the moves between them."""
     results.check(inputs=source.files)
     needs_stream(checkpoint, stream=stream)
-    if stream:
-        segment_stream(source, results, checkpoint)
-        return
-    recording = source.read()
-    from trihedron.api import reading
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
-    with progress("segmenting") as tell:
-        segments = reading.segment(recording, progress=tell)
-    document, machine = segments_report(segments, recording), segments_record(segments, recording)
-    results.tell(document, machine)
+    if stream:
+        log = opened(source)
+        from trihedron.api.streaming import condensed, segment_file
+
+        with progress("segmenting") as tell:
+            found = segment_file(log, checkpoint=checkpoint, progress=tell)
+        # Figures and times are from the rows of moves and of the ends of poses.
+        recording, segments = condensed(log, found)
+    else:
+        recording = source.read()
+        from trihedron.api import reading
+
+        with progress("segmenting") as tell:
+            segments = reading.segment(recording, progress=tell)
+    results.tell(segments_report(segments, recording), lambda: segments_record(segments, recording))
     leave((*recording.findings, *segments.findings))

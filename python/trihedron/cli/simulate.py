@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.options import Force, LogSource, ReadingOptions, Report, with_options
+from trihedron.cli.options import LogSource, ReadingOptions, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_report
-
-if TYPE_CHECKING:
-    from trihedron.records import Recording
-    from trihedron.records.truth import Truth
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from trihedron.records import Recording, Truth
@@ -56,75 +51,47 @@ def serve_recording(
     typer.echo(sent.sentence(), err=True)
 
 
-Scenario = Annotated[
-    str | None, typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list).")
-]
-Output = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet.")
-]
-TruthFile = Annotated[
-    Path | None, typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples.")
-]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of everything random.")]
-Like = Annotated[
-    Path | None, typer.Option("--like", metavar="LOG", help="Digital twin: repeat this recording, with --calibration.")
-]
-Calibration = Annotated[
-    Path | None, typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat.")
-]
-WithEffects = Annotated[
-    Path | None,
-    typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
-]
-Serve = Annotated[
-    str | None,
-    typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board does; prints the port to open. TCP:PORT too."),
-]
-Protocol = Annotated[
-    str, typer.Option("--protocol", metavar="NAME", help="With --serve: protocol of the board, or a .toml.")
-]
-Faults = Annotated[
-    str, typer.Option("--faults", metavar="LIST", help="With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'.")
-]
-Speed = Annotated[
-    float, typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once.")
-]
-Baud = Annotated[
-    int,
-    typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: baud rate; readers at another one get garbage."),
-]
-Link = Annotated[
-    Path | None,
-    typer.Option(
-        "--link", metavar="PATH", help="With --serve PTY: a name that stays the same when the port is reopened."
+OPTIONS = {
+    "scenario": typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list)."),
+    "output": ("LOG", "Log to write: .csv, .npz or .parquet.", "-o"),
+    "truth": ("FILE", "Truth to write: .npz, or .json without the samples."),
+    "seed": typer.Option("--seed", metavar="N", min=0, help="Seed of everything random."),
+    "like": ("LOG", "Digital twin: repeat this recording, with --calibration."),
+    "calibration": ("FILE", "Calibration of the recording to repeat."),
+    "with_effects": ("DIAGNOSIS", "Add the effects that this diagnosis accepted."),
+    "serve": ("PTY|TCP", "Send it as a board does; prints the port to open. TCP:PORT too."),
+    "protocol": ("NAME", "With --serve: protocol of the board, or a .toml."),
+    "faults": ("LIST", "With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'."),
+    "speed": typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once."),
+    "baud": typer.Option(
+        "--baud", metavar="N", min=0, help="With --serve PTY: baud rate; readers at another one get garbage."
     ),
-]
-ListThem = Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")]
-Template = Annotated[
-    Path | None, typer.Option("--template", metavar="FILE.toml", help="Write a scenario to begin with: change it.")
-]
+    "link": ("PATH", "With --serve PTY: a name that stays the same when the port is reopened."),
+    "list_them": typer.Option("--list", help="List the ready-made scenarios."),
+    "template": ("FILE.toml", "Write a scenario to begin with: change it."),
+}
 
 
-@with_options(how=ReadingOptions)
+@with_options(OPTIONS, how=ReadingOptions)
 def simulate(
     how: ReadingOptions,
-    scenario: Scenario = None,
-    output: Output = None,
-    truth: TruthFile = None,
-    seed: Seed = 0,
-    like: Like = None,
-    calibration: Calibration = None,
-    with_effects: WithEffects = None,
-    serve: Serve = None,
-    protocol: Protocol = "lines",
-    faults: Faults = "",
-    speed: Speed = 1.0,
-    baud: Baud = 0,
-    link: Link = None,
-    list_them: ListThem = False,
-    template: Template = None,
-    report: Report = None,
-    force: Force = False,
+    scenario: str | None = None,
+    output: Path | None = None,
+    truth: Path | None = None,
+    seed: int = 0,
+    like: Path | None = None,
+    calibration: Path | None = None,
+    with_effects: Path | None = None,
+    serve: str | None = None,
+    protocol: str = "lines",
+    faults: str = "",
+    speed: float = 1.0,
+    baud: int = 0,
+    link: Path | None = None,
+    list_them: bool = False,
+    template: Path | None = None,
+    report: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Simulate an instrument: a scenario, or the digital twin of a recording; the truth is kept apart from the log."""
     from trihedron.simulate import list_scenarios
@@ -168,10 +135,8 @@ def simulate(
         from trihedron.files.truth import truth_document
         from trihedron.report.simulation import simulation_report
 
-        write_report(simulation_report(recording, known), truth_document(known), report, force=force)
+        write_report(simulation_report(recording, known), lambda: truth_document(known), report, force=force)
     if serve is not None:
-        from trihedron.cli.simulate import serve_recording
-
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     _show(output, recording, known)
@@ -183,13 +148,13 @@ def simulate(
 
 
 def _check_endings(output: Path | None, truth: Path | None) -> None:
-    from trihedron.files.log import LOG_SUFFIXES
-    from trihedron.files.output import OutputError
+    from trihedron.files.log import check_suffix
+    from trihedron.files.truth import check_truth_suffix
 
-    if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
-        raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
-    if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
-        raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
+    if output is not None:
+        check_suffix(output)
+    if truth is not None:
+        check_truth_suffix(truth)
 
 
 def _show(output: Path | None, recording: Recording, known: Truth) -> None:

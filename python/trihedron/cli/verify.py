@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
-from trihedron.cli.output import Results, leave, say
+from trihedron.cli.output import FullResults, leave
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -17,33 +17,26 @@ if TYPE_CHECKING:
 FIRST_SCREEN = 2
 
 
-@dataclass(frozen=True)
-class Tested(LogsSource):
-    """Calibrations and the log that they are tested on."""
+OPTIONS = {
+    "log": typer.Argument(
+        metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."
+    ),
+    "limit_mg": (
+        "MG",
+        "Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
+    ),
+    "limit_deg": ("DEG", "The same for the tilt error after a rotation."),
+}
 
-    log: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."),
-    ] = None
 
-
-@with_options(source=Tested, place=GravitySource, results=Results)
+@with_options(OPTIONS, source=LogsSource, place=GravitySource, results=FullResults)
 def verify(
-    source: Tested,
+    source: LogsSource,
     place: GravitySource,
     *,
-    limit_mg: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MG",
-            help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
-        ),
-    ] = None,
-    limit_deg: Annotated[
-        float | None, typer.Option(metavar="DEG", help="The same for the tilt error after a rotation.")
-    ] = None,
-    full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
-    results: Results,
+    limit_mg: float | None = None,
+    limit_deg: float | None = None,
+    results: FullResults,
 ) -> None:
     """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
@@ -63,8 +56,9 @@ def verify(
     if len(known) > 1:
         with progress("ranking") as tell:
             ranking = rank(paths, recording, progress=tell, **place.said)
-        document, machine = ranking_report(ranking), ranking_record(ranking)
-        results.tell(document, machine, None if full else FIRST_SCREEN)
+        document = ranking_report(ranking)
+        results.show(document, FIRST_SCREEN)
+        results.write(document, lambda: ranking_record(ranking))
         leave(ranking.best.verification.findings)
         return
     from trihedron.report import verification_report
@@ -74,14 +68,13 @@ def verify(
             known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said
         )
     document = verification_report(result.verification, result.segments, recording)
-    machine = verification_record(result.verification)
-    results.tell(document, machine, None if full else FIRST_SCREEN)
-    if not full and results.report is None:
-        say("Every pose and move: --full, or --report FILE.html with figures.")
+    results.show(document, FIRST_SCREEN)
+    more = "Every pose and move: --full, or --report FILE.html with figures."
+    results.finish(document, lambda: verification_record(result.verification), more)
     leave(result.findings)
 
 
-def _parted(source: Tested) -> tuple[list[Path], LogSource]:
+def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:
     """Calibrations and the one log among the given files, distinguished by content."""
     from trihedron.files.formats import is_calibration
 

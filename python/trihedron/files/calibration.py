@@ -100,10 +100,7 @@ def calibration_text(calibration: Calibration) -> str:
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """A calibration as plain JSON types.
 
-    Raises
-    ------
-    ValueError
-        When a sensor's covariance differs from its block of the full one: the file stores each number once.
+    Refused when a sensor's covariance differs from its block of the full one: the file stores each number once.
     """
     sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
     for k, (name, sensor) in enumerate(sensors.items()):
@@ -137,10 +134,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
 def calibration_from_document(document: object, source: str = "document") -> Calibration:
     """The calibration in a document; ``source`` is its name in error messages.
 
-    Raises
-    ------
-    CalibrationFileError
-        When it does not follow the schema or its content is invalid.
+    Refused when it does not follow the schema or its content is invalid.
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(
@@ -151,7 +145,11 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
         raise CalibrationFileError(
             f"{source}: written in format {stated}, this version reads up to {FORMAT_VERSION}; update trihedron."
         )
-    _check_schema(document, source)
+    complaint = violation(document, "calibration")
+    if complaint:
+        raise CalibrationFileError(
+            f"{source}: does not follow the calibration schema ({complaint}); the file was changed by hand or damaged."
+        )
     if document["equation"] != EQUATION:
         raise CalibrationFileError(
             f"{source}: states the equation {document['equation']!r}, not {EQUATION!r}; convert S and b to it first."
@@ -164,9 +162,27 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
 
 def schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) that every calibration file follows."""
-    text = files("trihedron.files").joinpath("schema", "calibration.schema.json").read_text(encoding="utf-8")
+    return schema_of("calibration")
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """The JSON schema of a kind of document."""
+    text = files("trihedron.files").joinpath("schema", f"{kind}.schema.json").read_text(encoding="utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded
+
+
+def violation(document: object, kind: str) -> str:
+    """Where and how a document violates the schema of its kind; empty when it follows it."""
+    # Imported here because the import takes longer than reading the file.
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(schema_of(kind)).iter_errors(document))
+    if error is None:
+        return ""
+    place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error.absolute_path).lstrip(".")
+    return f"{place or 'the document'}: {error.message[:120]}"
 
 
 def plain(value: Any) -> Any:
@@ -182,21 +198,6 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, str | int | bool):
         return value
     raise TypeError(f"{type(value).__name__} has no place in a calibration file")
-
-
-def _check_schema(document: dict[str, Any], source: str) -> None:
-    # Imported here because the import takes longer than reading the file.
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
-    error = best_match(Draft202012Validator(schema()).iter_errors(document))
-    if error is not None:
-        place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error.absolute_path).lstrip(".")
-        what = error.message if len(error.message) < 120 else error.message[:117] + "..."
-        raise CalibrationFileError(
-            f"{source}: {place or 'the document'} does not follow the calibration schema ({what}); "
-            "the file was changed by hand or damaged."
-        )
 
 
 def _parameter_order(has_gyroscope: bool) -> list[str]:
@@ -225,18 +226,13 @@ def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:
     }
 
 
-def _array(value: Any) -> npt.NDArray[np.float64]:
-    """Array from JSON numbers; ``null`` becomes NaN."""
-    return np.array(value, dtype=np.float64)
-
-
 def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> SensorCalibration:
     quality, observability = document["residuals"], document["observability"]
     if observability is not None and observability["condition"] is None:
         observability = {**observability, "condition": math.inf}
     return SensorCalibration(
-        S=_array(document["S"]),
-        b=_array(document["b"]),
+        S=np.array(document["S"]),
+        b=np.array(document["b"]),
         covariance=covariance,
         raw_unit=document["raw_unit"],
         si_unit=document["si_unit"],
@@ -247,7 +243,7 @@ def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> Se
 
 
 def _from_checked(document: dict[str, Any]) -> Calibration:
-    covariance = _array(document["covariance"])
+    covariance = np.array(document["covariance"], dtype=np.float64)
     if document["parameter_order"] != _parameter_order(document["gyroscope"] is not None):
         raise RefusedError("parameter_order is not S row by row, then b, accelerometer first")
     n = 12 if document["gyroscope"] is None else 24

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from trihedron.documents import read_json
 from trihedron.errors import RefusedError
-from trihedron.files.calibration import plain
+from trihedron.files.calibration import plain, schema_of, violation
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
 
 
@@ -21,10 +19,7 @@ class DiagnosisFileError(RefusedError):
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """A diagnosis as plain JSON types, valid against the schema; a number that is not finite is ``null``.
 
-    Raises
-    ------
-    ValueError
-        When it does not follow the schema: a defect of this program.
+    Refused when it does not follow the schema: a defect of this program.
     """
     document: dict[str, Any] = plain(diagnosis.to_dict())
     complaint = complaint_about(document)
@@ -36,10 +31,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
 def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read and check a diagnosis written by ``trihedron diagnose --json``.
 
-    Raises
-    ------
-    DiagnosisFileError
-        When the file is missing, is no JSON, or does not follow the schema.
+    Refused when the file is missing, is no JSON, or does not follow the schema.
     """
     path = Path(path)
     meant = "name a file written by `trihedron diagnose --json`"
@@ -63,19 +55,9 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) that every diagnosis follows."""
-    text = files("trihedron.files").joinpath("schema", "diagnosis.schema.json").read_text(encoding="utf-8")
-    loaded: dict[str, Any] = json.loads(text)
-    return loaded
+    return schema_of("diagnosis")
 
 
 def complaint_about(document: object) -> str:
     """How a document violates the schema; empty when it follows it."""
-    # Imported here because the import takes longer than reading the file.
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
-    error = best_match(Draft202012Validator(schema()).iter_errors(document))
-    if error is None:
-        return ""
-    place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error.absolute_path).lstrip(".")
-    return f"{place or 'the document'}: {error.message[:120]}"
+    return violation(document, "diagnosis")

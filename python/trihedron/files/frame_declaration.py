@@ -26,10 +26,7 @@ _CHECKSUM_KEYS = {"kind", "at", "from", "to"}
 def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     """The frame that a TOML file declares.
 
-    Raises
-    ------
-    ValueError
-        When a key is wrong or missing; the message names the file and the key.
+    Refused when a key is wrong or missing; the message names the file and the key.
     """
     path = Path(path)
     try:

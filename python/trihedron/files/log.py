@@ -19,15 +19,9 @@ LOG_SUFFIXES = (".csv", ".npz", ".parquet")
 _TIME = "t [s]"
 
 
-def check_format(path: str | os.PathLike[str]) -> None:
-    """Refuse a file name whose ending is not that of a format, before any work; ``-`` is CSV on stdout.
-
-    Raises
-    ------
-    OutputError
-        When the ending is unknown; the message lists the valid ones.
-    """
-    if str(path) != "-" and Path(path).suffix.lower() not in LOG_SUFFIXES:
+def check_suffix(path: str | os.PathLike[str]) -> None:
+    """Refuse a file name whose ending is not that of a format, before any work; the message lists the valid ones."""
+    if Path(path).suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{path}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
 
 
@@ -36,12 +30,10 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 
     ``-`` is CSV on stdout.
 
-    Raises
-    ------
-    OutputError
-        When the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
+    Refused when the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
     """
-    check_format(path)
+    if str(path) != "-":
+        check_suffix(path)
     check_tables()
     columns = _columns(recording)
     if str(path) == "-":
@@ -68,12 +60,7 @@ def _columns(recording: Recording) -> dict[str, FloatArray]:
     ):
         if sensor is not None:
             columns |= {f"{letter}{axis} [{unit.value}]": sensor[:, k] for k, axis in enumerate(AXES)}
-    return columns | _others(recording)
-
-
-def _others(recording: Recording) -> dict[str, FloatArray]:
-    """Temperature, supply, and the other columns of the log under their own names."""
-    columns: dict[str, FloatArray] = dict(recording.auxiliary)
+    columns |= recording.auxiliary
     if recording.temperature_degc is not None:
         columns["temperature [degC]"] = recording.temperature_degc
     if recording.supply_v is not None:

@@ -23,10 +23,7 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 
     For a term that was not detected the value is the upper limit from the log.
 
-    Raises
-    ------
-    NoiseFileError
-        When the file is missing or is not what ``trihedron allan --json`` writes, or its readings are not in SI.
+    Refused when the file is missing or is not what ``trihedron allan --json`` writes, or its readings are not in SI.
     """
     meant = "name a file written by `trihedron allan --json`"
     return noise_figures(read_json(path, "file of noise terms", meant, NoiseFileError), str(Path(path)))
@@ -35,10 +32,7 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:
     """As :func:`read_noise`, from the JSON document itself; ``source`` is its name in error messages.
 
-    Raises
-    ------
-    NoiseFileError
-        When it contains no noise terms, or its readings are not in SI.
+    Refused when it contains no noise terms, or its readings are not in SI.
     """
     try:
         axes = document["axes"]

@@ -1,14 +1,13 @@
 """Output files: written completely or not at all, over an existing file only on request, and never over an input.
 
 A regular file is written under a temporary name in the same folder and renamed in one step. Other outputs (a device, a
-pipe, a socket) are written to directly and never replaced.
+pipe) are written to directly and never replaced.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import socket
 import stat
 import sys
 import time
@@ -60,10 +59,7 @@ class Temporary:
     def put_in_place(self, mode: int | None, *, overwrite: bool = False) -> None:
         """Rename to the target, which replaces a file of permissions ``mode``, or is new where ``mode`` is None.
 
-        Raises
-        ------
-        FileExistsError
-            When ``mode`` is None and a file has appeared, without ``overwrite``.
+        Raises FileExistsError when ``mode`` is None and a file has appeared, without ``overwrite``.
         """
         # The file was created private; it gets the permissions of the file it replaces, or those of any new file.
         if mode is None:
@@ -141,10 +137,7 @@ class OutputError(RefusedError):
 def check_report(path: Path) -> None:
     """Refuse a report whose ending is not that of a format.
 
-    Raises
-    ------
-    OutputError
-        When the ending is unknown; the message lists the valid ones.
+    Refused when the ending is unknown; the message lists the valid ones.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
         raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
@@ -157,11 +150,8 @@ def check_free(
 
     ``inputs`` are the files that the outputs are made from: none of them is overwritten, even with ``overwrite``.
 
-    Raises
-    ------
-    OutputError
-        When a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable, or
-        one name is given twice.
+    Refused when a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable,
+    or one name is given twice.
     """
     read = {identity: Path(path) for path in inputs if path is not None and (identity := _identity(path))}
     seen: set[str] = set()
@@ -229,10 +219,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
 
     A link is followed. Temporary files of killed processes in the folder are deleted.
 
-    Raises
-    ------
-    OutputError
-        As :func:`check_free`, or when the system refuses.
+    Refused as :func:`check_free`, or when the system refuses.
     """
     target = Path(path)
     check_free([target], overwrite=overwrite)
@@ -253,7 +240,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
         raise OutputError(f"{target}: the system cannot write this file ({error.strerror or error}).") from None
 
 
-# Outputs that are not regular files: terminals, pipes, sockets, devices. They are written to directly.
+# Outputs that are not regular files: terminals, pipes, devices. They are written to directly.
 
 _READER_WAIT_S = 5.0
 """Time to wait for the reader of a pipe [s]: enough for two commands started together, but not forever."""
@@ -272,18 +259,10 @@ def is_stream(path: Path, found: os.stat_result | None) -> bool:
 
 
 def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
-    """Write all of ``data`` to a device, pipe or socket.
+    """Write all of ``data`` to a device or pipe.
 
-    Raises
-    ------
-    OSError
-        When a pipe has no reader, or the system refuses.
+    Raises OSError when a pipe has no reader, or the system refuses.
     """
-    if found is not None and stat.S_ISSOCK(found.st_mode):
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.connect(str(path))
-            connection.sendall(data)
-        return
     with os.fdopen(_opened(path, found), "wb", buffering=0) as stream:
         left = memoryview(data)
         while left:

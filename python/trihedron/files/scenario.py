@@ -100,13 +100,7 @@ def improved_scenario(
 
 
 def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write an improved scenario to a file.
-
-    Raises
-    ------
-    OutputError
-        When the file exists and may not be replaced.
-    """
+    """Write an improved scenario to a file. Refused when the file exists and may not be replaced."""
     write_whole(path, text, overwrite=overwrite)
 
 

@@ -42,35 +42,31 @@ def truth_document(truth: Truth) -> dict[str, Any]:
     }
 
 
+def check_truth_suffix(path: Path) -> None:
+    """Refuse a file name whose ending is not that of a format, before any work."""
+    if path.suffix.lower() not in (".npz", ".json"):
+        raise OutputError(f"{path}: truth is written as .npz (everything) or .json (no samples).")
+
+
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the truth; ``.npz`` contains everything, ``.json`` all but the arrays per sample.
 
-    Raises
-    ------
-    OutputError
-        When the ending is another one, or the file exists and may not be replaced.
+    Refused when the ending is another one, or the file exists and may not be replaced.
     """
     target = Path(path)
+    check_truth_suffix(target)
     text = json.dumps(truth_document(truth), indent=1)
     if target.suffix.lower() == ".json":
         write_whole(target, text + "\n", overwrite=overwrite)
-    elif target.suffix.lower() == ".npz":
+    else:
         arrays = {name: getattr(truth, name) for name in _ARRAYS if getattr(truth, name) is not None}
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, header=np.array(text), **arrays)
         write_whole(target, buffer.getvalue(), overwrite=overwrite)
-    else:
-        raise OutputError(f"{target}: truth is written as .npz (everything) or .json (no arrays); give it that ending.")
 
 
 def read_truth(path: str | os.PathLike[str]) -> Truth:
-    """Read a truth file that :func:`write_truth` wrote as ``.npz``.
-
-    Raises
-    ------
-    ValueError
-        When the file is not such a file.
-    """
+    """Read a truth file that :func:`write_truth` wrote as ``.npz``. Refused when the file is not such a file."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             header = json.loads(str(archive["header"]))

@@ -174,10 +174,7 @@ def _why(error: BaseException | None) -> str:
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """A Dask client of the given scheduler, or of a cluster of processes on this machine.
 
-    Raises
-    ------
-    ValueError
-        When Dask is not installed, or the scheduler does not answer.
+    Refused when Dask is not installed, or the scheduler does not answer.
     """
     try:
         dask, distributed = import_module("dask"), import_module("distributed")

@@ -16,7 +16,7 @@ from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc, ndtr
-from trihedron.records.fleet import FleetLog, FleetSummary, MixedLogs, Outlier, SharedEffect
+from trihedron.records.fleet import EffectCount, FleetLog, FleetSummary, MixedLogs, Outlier
 from trihedron.records.sessions import PARAMETERS, Session
 
 ALPHA = 0.01
@@ -233,7 +233,7 @@ def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
     return tuple(found)
 
 
-def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:
+def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[EffectCount, ...]:
     """Every effect found, the commonest first; Clopper-Pearson interval of the fraction of devices."""
     logs: Counter[str] = Counter()
     devices: dict[str, set[str]] = {}
@@ -247,5 +247,5 @@ def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:
         k = len(devices[name])
         low = betaincinv(k, n - k + 1, 0.025) if k else 0.0
         high = betaincinv(k + 1, n - k, 0.975) if k < n else 1.0
-        out.append(SharedEffect(name, count, k, low, high))
+        out.append(EffectCount(name, count, k, low, high))
     return tuple(out)

@@ -18,16 +18,8 @@ if TYPE_CHECKING:
 PLAIN = (
     *("path", "serial", "status", "reason", "verdict", "effects", "warnings", "serious", "is_trustworthy"),
     *("n_samples", "duration_s", "rate_hz", "n_poses", "start_epoch_s", "temperature_degc", "gravity_m_s2"),
-    *(
-        "accelerometer_unit",
-        "gyroscope_unit",
-        "static_rms_m_s2",
-        "held_out_rms_m_s2",
-        "seconds",
-        "sha256",
-        "version",
-        "key",
-    ),
+    *("accelerometer_unit", "gyroscope_unit", "static_rms_m_s2", "held_out_rms_m_s2", "seconds"),
+    *("sha256", "version", "key"),
 )
 
 

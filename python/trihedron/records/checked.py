@@ -38,10 +38,7 @@ def said(value: Any) -> str:
 def numbers_of(name: str, value: Any) -> npt.NDArray[Any]:
     """An array of real numbers of any shape; masked entries become NaN (missing).
 
-    Raises
-    ------
-    WrongTypeError
-        When it is not an array of numbers.
+    Refused when it is not an array of numbers.
     """
     try:
         array = np.ma.filled(value.astype(np.float64), np.nan) if np.ma.isMaskedArray(value) else np.asarray(value)
@@ -54,13 +51,7 @@ def numbers_of(name: str, value: Any) -> npt.NDArray[Any]:
 
 
 def number_of(name: str, value: Any) -> float:
-    """A finite number.
-
-    Raises
-    ------
-    WrongTypeError, ValueError
-        When it is not a number, or not finite.
-    """
+    """A finite number. Raises WrongTypeError, ValueError when it is not a number, or not finite."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise WrongTypeError(f"{name} is a number, not {said(value)}.")
     try:
@@ -75,10 +66,7 @@ def number_of(name: str, value: Any) -> float:
 def word_of(name: str, value: Any, kind: type[Word]) -> Word:
     """A member of the enumeration ``kind``.
 
-    Raises
-    ------
-    WrongTypeError
-        When it is not a member; the message lists the members while the list is short.
+    Refused when it is not a member; the message lists the members while the list is short.
     """
     with suppress(ValueError, TypeError):
         return kind(value)
@@ -88,24 +76,14 @@ def word_of(name: str, value: Any, kind: type[Word]) -> Word:
 
 
 def kind_of(name: str, value: Any, *kinds: type) -> None:
-    """Raise unless the value is an instance of one of the classes.
-
-    Raises
-    ------
-    WrongTypeError
-    """
+    """Raise unless the value is an instance of one of the classes."""
     if not isinstance(value, kinds):
         wanted = " or ".join("None" if kind is type(None) else f"a {kind.__name__}" for kind in kinds)
         raise WrongTypeError(f"{name} is {wanted}, not {said(value)}.")
 
 
 def all_of(name: str, values: Any, kind: type) -> None:
-    """Raise unless the value is a tuple or list of instances of one class.
-
-    Raises
-    ------
-    WrongTypeError
-    """
+    """Raise unless the value is a tuple or list of instances of one class."""
     kind_of(name, values, tuple, list)
     for k, value in enumerate(values):
         kind_of(f"{name}[{k}]", value, kind)

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Literal, get_args
 
 from trihedron.arrays import FloatArray
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, said
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, HeldOut
 from trihedron.records.frozen import Frozen, freeze
@@ -200,6 +201,17 @@ class LinearModel(Frozen, Plain):
     accelerometer: MappingProxyType[str, Any]
     gyroscope: MappingProxyType[str, Any] | None
     covariance: FloatArray | None = None
+
+    @classmethod
+    def of_sensors(cls, accelerometer: SensorCalibration, gyroscope: SensorCalibration | None) -> LinearModel:
+        """The model of calibrated sensors."""
+        accel, gyro = (
+            None if s is None else {"S": s.S.tolist(), "b": s.b.tolist(), "sigma_S": s.sigma_S.tolist(),
+                                    "sigma_b": s.sigma_b.tolist(), "raw_unit": s.raw_unit}
+            for s in (accelerometer, gyroscope)
+        )  # fmt: skip
+        assert accel is not None
+        return cls(MappingProxyType(accel), None if gyro is None else MappingProxyType(gyro))
 
 
 @dataclass(frozen=True)

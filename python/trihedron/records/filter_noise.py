@@ -58,7 +58,7 @@ class Share(Plain):
 
 
 @dataclass(frozen=True)
-class Consistency(Plain):
+class Nees(Plain):
     """Cross-validated error over a horizon, squared and normalised by the predicted covariance (NEES, ideally 3).
 
     ``predicted``, ``actual`` rms over the three axes together [rad, or m/s]; ``static_*`` the same for a filter with
@@ -107,7 +107,7 @@ class SensorFilterNoise(Plain):
     vibration: Bounded | None = None
     reference: ReferenceWorth | None = None
     shares: tuple[Share, ...] = ()
-    consistency: tuple[Consistency, ...] = ()
+    consistency: tuple[Nees, ...] = ()
     is_only_static: bool = False
     is_settled: bool = True
 

@@ -206,10 +206,7 @@ class Finding(Frozen, Plain):
         two, ``numbers`` are figures for machines whose names depend on the recording. A stage writes no sentences: they
         are looked up here.
 
-        Raises
-        ------
-        KeyError
-            When the catalogue lacks the case, or a placeholder of its sentences has no value.
+        Raises KeyError when the catalogue lacks the case, or a placeholder of its sentences has no value.
         """
         severity, seen, cause, action = ask("words_of", code, case, severity, values)
         told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}

@@ -54,7 +54,7 @@ class MixedLogs:
 
 
 @dataclass(frozen=True)
-class SharedEffect:
+class EffectCount:
     """An effect of the catalogue: number of logs and devices in which it was found, and the 95 % interval of the
     fraction of devices that have it."""
 
@@ -77,6 +77,6 @@ class FleetSummary:
     repeated: tuple[Repeated, ...]
     changes: tuple[Change, ...]
     outliers: tuple[Outlier, ...]
-    effects: tuple[SharedEffect, ...]
+    effects: tuple[EffectCount, ...]
     passed_over: str = ""
     mixed: tuple[MixedLogs, ...] = ()

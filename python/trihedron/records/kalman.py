@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -221,7 +220,6 @@ class KalmanCalibration(Frozen):
     pose_s: FloatArray
     residual_m_s2: FloatArray
     findings: tuple[Finding, ...] = ()
-    extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def residual_without_drift_m_s2(self) -> FloatArray:

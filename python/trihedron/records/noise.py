@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Literal
@@ -314,8 +314,8 @@ class Noise(Presented):
     curve : AllanCurve
     excluded_s, breaks_s
         Intervals [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
-    source, findings, extensions
-        The log, its findings, and results beyond the five terms.
+    source, findings
+        The log and its findings.
     """
 
     axes: tuple[NoiseAxis, ...]
@@ -324,7 +324,6 @@ class Noise(Presented):
     excluded_s: tuple[tuple[float, float], ...] = ()
     breaks_s: tuple[float, ...] = ()
     findings: tuple[Finding, ...] = ()
-    extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     def __repr__(self) -> str:
         return f"<Noise of {one_line(self.source or 'a log')}: {', '.join(axis.name for axis in self.axes)}>"

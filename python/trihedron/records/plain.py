@@ -53,10 +53,7 @@ def as_plain(record: object, kind: type | None = None) -> dict[str, Any]:
 def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
     """A record from a document's entry. ``null`` in place of a number, written for a non-finite one, is read as NaN.
 
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        When the entry lacks a field or has a value of the wrong type.
+    Raises ValueError, TypeError, KeyError when the entry lacks a field or has a value of the wrong type.
     """
     from cattrs.errors import ForbiddenExtraKeysError
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.records.calibration import Calibration
@@ -125,17 +125,15 @@ class Change:
 @dataclass(frozen=True, eq=False)
 class ThermalTerm:
     """Temperature dependence of one group of parameters: polynomial ``coefficients`` (order + 1, 3) in T - reference,
-    lowest first; ``held_out_gain`` in score over a constant; ``hysteresis`` (3,) half of heating minus cooling,
+    lowest first; ``hysteresis`` (3,) half of heating minus cooling,
     ``None`` where it was not tested or not found; ``remaining`` (3,) spread of sessions about it."""
 
     id: str
     order: int
     coefficients: FloatArray
     covariance: FloatArray
-    held_out_gain: float
     remaining: tuple[Spread, ...]
     hysteresis: FloatArray | None = None
-    hysteresis_p: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +159,6 @@ class SessionsModel(Frozen):
     calibration: Calibration
     left_out: tuple[tuple[str, str], ...] = ()
     findings: tuple[Finding, ...] = ()
-    extensions: dict[str, Any] = field(default_factory=dict)
 
     @property
     def is_trustworthy(self) -> bool:

@@ -16,10 +16,7 @@ class Words(str):
 def words(phrase: str, /, **values: Any) -> Words:
     """The catalogue's words for a phrase by its id, with values inserted (``report/findings/phrases.py``).
 
-    Raises
-    ------
-    KeyError
-        When the catalogue has no such phrase, or a placeholder of it has no value.
+    Raises KeyError when the catalogue has no such phrase, or a placeholder of it has no value.
     """
     return Words(ask("phrase", phrase, values))
 
@@ -27,10 +24,7 @@ def words(phrase: str, /, **values: Any) -> Words:
 def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
     """The statement about an accepted effect, by its id and case, with values (``report/effects``).
 
-    Raises
-    ------
-    KeyError
-        When the catalogue has no such case, or a placeholder of it has no value.
+    Raises KeyError when the catalogue has no such case, or a placeholder of it has no value.
     """
     return Words(ask("effect_words", effect_id, case, values))
 
@@ -43,10 +37,7 @@ def experiment_for(effect_id: str, *, at_rest: bool = False) -> Words:
 def why_not(name: str, /, **values: Any) -> Words:
     """Why a recording cannot show an effect, by its id (``report/effects/catalogue.py``).
 
-    Raises
-    ------
-    KeyError
-        When there is no such reason, or a placeholder of it has no value.
+    Raises KeyError when there is no such reason, or a placeholder of it has no value.
     """
     return Words(ask("why_not", name, values))
 

@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.state import _LOWER, Prior, SessionState
-from trihedron.records import Calibration, SensorCalibration
+from trihedron.records import Calibration
 from trihedron.records.diagnosis import LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -175,12 +175,3 @@ def linear_model(fitted: Fit) -> LinearModel:
         )
     )  # fmt: skip
     return LinearModel(accel, None if obs.raw_rate is None else gyro)
-
-
-def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
-    """A linear model's sensor as a calibration record, with a diagonal covariance."""
-    variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
-    return SensorCalibration(
-        S=np.array(model["S"]), b=np.array(model["b"]), covariance=np.diag(variance),
-        raw_unit=str(model["raw_unit"]), si_unit=si_unit, method="diagnosis",
-    )  # fmt: skip

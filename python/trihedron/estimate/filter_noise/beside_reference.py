@@ -32,7 +32,7 @@ from trihedron.records.filter_noise import (
     CAUSES,
     BiasModel,
     Cause,
-    Consistency,
+    Nees,
     ReferenceWorth,
     SensorFilterNoise,
     Share,
@@ -227,7 +227,7 @@ def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stre
 
 def consistency(
     held: Sequence[tuple[Stretch, int]], taught: Fitted, static: StaticNoise | None, horizon_s: float
-) -> Consistency | None:
+) -> Nees | None:
     """Held-out NEES and rms over one horizon under ``taught``, and under static N and K with an exact reference."""
     some = taught.draws[:: max(1, len(taught.draws) // PREDICTING)]
     found = errors_over(held, some, horizon_s)
@@ -241,7 +241,7 @@ def consistency(
         plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
         exact = [(replace(one, given=None), first) for one, first in held]
         beside = errors_over(exact, plain[None], horizon_s)
-    return Consistency(
+    return Nees(
         horizon_s,
         float(np.mean(found.nees)),
         float(np.sqrt(found.predicted)),

@@ -65,7 +65,7 @@ def _term(sessions: Sequence[Session], name: str, t: FloatArray, branch: FloatAr
         if scores[candidate] > scores[order] + GAIN:
             order = candidate
     columns = _columns(t / scale, order)
-    hysteresis = p_value = None
+    hysteresis = None
     if min(np.sum(branch > 0), np.sum(branch < 0)) >= 2 and len(t) - order - 2 >= SPARE:
         hysteresis, p_value = _branches(values, variances, columns, branch)
         if p_value >= HYSTERESIS_P:
@@ -79,8 +79,7 @@ def _term(sessions: Sequence[Session], name: str, t: FloatArray, branch: FloatAr
     if hysteresis is not None:
         hysteresis = np.array([fit[0][order + 1] for fit in fits])
     remaining = tuple(_remaining(values[:, axis], variances[:, axis], columns) for axis in range(values.shape[1]))
-    gain = scores[order] - scores[0]
-    return ThermalTerm(name, order, coefficients, covariance, gain, remaining, hysteresis, p_value)
+    return ThermalTerm(name, order, coefficients, covariance, remaining, hysteresis)
 
 
 def _columns(t: FloatArray, order: int) -> FloatArray:

@@ -1,7 +1,7 @@
 """Calibrations in the file formats of other programs: written with their equation stated, and in most cases read.
 
 Programs differ in the direction of the matrices: some store raw → true, some true → raw, some subtract the bias before
-the matrix and some after it. Each module contains one format (``FORMAT``) and is found automatically. Writers are
+the matrix and some after it. The ``FORMATS`` of every module are found automatically. Writers are
 tested by evaluating the target's equation, readers as the inverse of their writers.
 """
 
@@ -19,34 +19,22 @@ from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
-from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise, given
-from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
+from trihedron.files.formats.contract import ExportOptions as ExportOptions
+from trihedron.files.formats.contract import Format, given
+from trihedron.files.formats.contract import NoiseFigure as NoiseFigure
+from trihedron.files.formats.contract import SensorNoise as SensorNoise
+from trihedron.files.formats.matrices import lower_orthogonal as lower_orthogonal
+from trihedron.files.formats.matrices import upper_frame as upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.folders import modules_of
 from trihedron.records import Calibration
 from trihedron.sanitise import printable
 
-__all__ = [
-    "ExportOptions",
-    "Format",
-    "NoiseFigure",
-    "SensorNoise",
-    "any_calibration",
-    "export_calibration",
-    "export_files",
-    "formats",
-    "is_calibration",
-    "lower_orthogonal",
-    "needs",
-    "targets",
-    "upper_frame",
-]
-
 
 @cache
 def formats() -> dict[str, Format]:
     """Every format by name."""
-    found = [module.FORMAT for module in modules_of(__name__, __path__) if hasattr(module, "FORMAT")]
+    found = [one for module in modules_of(__name__, __path__) for one in getattr(module, "FORMATS", ())]
     return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 
@@ -68,10 +56,7 @@ def needs(one: Format) -> list[str]:
 def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:
     """A calibration for ``target``, one of :func:`targets`: text by file name ending; ``""`` where there is one file.
 
-    Raises
-    ------
-    ValueError
-        When the target is unknown, the calibration is not plausible, or it cannot be expressed in that convention.
+    Refused when the target is unknown, the calibration is not plausible, or it cannot be expressed in that convention.
     """
     one = formats().get(target)
     if one is None or one.write is None:
@@ -90,10 +75,7 @@ def export_calibration(calibration: Calibration, target: str, options: ExportOpt
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration file of trihedron or of another program; its format is recognised by content.
 
-    Raises
-    ------
-    CalibrationFileError
-        (a ``ValueError``) when the file is missing or its format is not supported.
+    Refused when the file is missing or its format is not supported.
     """
     path = Path(path)
     text = _text(path)

@@ -6,26 +6,26 @@ TMIN to TMAX. By AP_InertialSensor (Backend and tempcal) of ArduPilot, https://g
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.files.formats.autopilot import (
     AxisCorrection,
     Composed,
+    about,
     board_of,
+    common_range,
     composed,
+    held_by,
     moved_to,
     orientation,
     parameters_in,
-    relative,
+    said_of_misfit,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, number
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, heading, number
 from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard
-from trihedron.records.plain import as_plain
 
 REFERENCE_DEGC = 35.0
 """Reference temperature of ArduPilot's polynomials."""
@@ -39,7 +39,8 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
     equation = "corrected = (reading - P(T) + P(CALTEMP) - OFFS) * SCAL per axis, SI; a gyro has no SCAL."
     held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
     lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
-    lines += [f"# {line}" for line in _about(board)]
+    turns = f"AHRS_ORIENTATION {board.parameters.get('AHRS_ORIENTATION', 0.0):g}"
+    lines += [f"# {line}" for line in about(board, turns)]
     for name, one in sensors.items():
         imu = board.accel if name == "accelerometer" else board.gyro
         letters, suffix = ("ACC" if name == "accelerometer" else "GYR"), _suffix(imu)
@@ -63,18 +64,7 @@ def from_ardupilot(text: str) -> Calibration | None:
     parameters = parameters_in(text)
     if not {"INS_ACCOFFS_X", "INS_ACCSCAL_X"} <= parameters.keys():
         return None
-    board = Onboard("ardupilot", 0, 0, "corrected", parameters)
-    return given(
-        "ardupilot",
-        {name: _direct(correction_of(board, name)) for name in ("accelerometer", "gyroscope")},
-        board_parameters=as_plain(board),
-    )
-
-
-def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """S and b by sensor that convert logged readings to those of a board with the parameters ``held``."""
-    as_there = Onboard("ardupilot", known.accel, known.gyro, known.stage, {**_turns(known), **held.parameters})
-    return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
+    return held_by(parameters, "ardupilot", correction_of)
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:
@@ -89,14 +79,6 @@ def correction_of(board: Onboard, name: str) -> AxisCorrection:
     scale = np.where(scale == 0.0, 1.0, scale)
     turn = np.eye(3) if board.stage == "corrected" else orientation(board.parameters.get("AHRS_ORIENTATION", 0.0))
     return AxisCorrection(triple(board.parameters, f"{root}{suffix}OFFS_{{}}"), scale, turn, _held_thermal(board, name))
-
-
-def _direct(own: AxisCorrection) -> tuple[FloatArray, FloatArray]:
-    return np.diag(own.scale), -own.scale * own.offset
-
-
-def _turns(board: Onboard) -> dict[str, float]:
-    return {name: value for name, value in board.parameters.items() if name.startswith("AHRS_")}
 
 
 def _suffix(imu: int) -> str:
@@ -128,10 +110,9 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray
         total = total + held.coefficients
         limits.append(held.range_degc)
     lines = [f"{root}ENABLE,1"]
-    known = [one for one in limits if one is not None]
-    if known:
-        low, high = max(low for low, _ in known), min(high for _, high in known)
-        lines += [f"{root}TMIN,{number(low)}", f"{root}TMAX,{number(high)}"]
+    valid = common_range(limits)
+    if valid is not None:
+        lines += [f"{root}TMIN,{number(valid[0])}", f"{root}TMAX,{number(valid[1])}"]
     else:
         lines.append(f"# Set {root}TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
     lines.append(f"INS_{letters}{imu + 1}_CALTEMP,{number(new.reference_degc)}")
@@ -144,32 +125,10 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray
     return constant, lines
 
 
-def said_of_misfit(thermal: Thermal, name: str) -> list[str]:
-    """Sentences on the temperature dependence that a cubic of the bias cannot represent, if there is any."""
-    unit = "m/s^2" if name == "accelerometer" else "rad/s"
-    said = []
-    if thermal.scale > 1e-6:
-        said.append(f"Over the range the {name}'s scale changes by up to {100 * thermal.scale:.2g} %, which is lost.")
-    if thermal.misfit > 1e-9:
-        said.append(f"Up to {thermal.misfit:.2g} {unit} of the {name}'s bias is beyond a cubic and is lost.")
-    return said
-
-
 def _at(thermal: Thermal, degc: float) -> FloatArray:
     low, high = thermal.range_degc or (degc, degc)
     t = min(max(degc, low), high) - thermal.reference_degc
     return np.asarray(np.array([t, t * t, t**3]) @ thermal.coefficients)
 
 
-def _about(board: Onboard) -> list[str]:
-    if board.stage == "raw":
-        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
-    parameters: Mapping[str, float] = board.parameters
-    turn = parameters.get("AHRS_ORIENTATION", 0.0)
-    return [
-        "The log's readings had been corrected on board; these values include that correction and replace it.",
-        f"They hold for AHRS_ORIENTATION {turn:g}; load all of them, once.",
-    ]
-
-
-FORMAT = Format("ardupilot", to_ardupilot, from_ardupilot, in_si=True)
+FORMATS = (Format("ardupilot", to_ardupilot, from_ardupilot, in_si=True),)

@@ -7,7 +7,7 @@ log are corrected by that already; the exported offsets and scales replace those
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,9 +15,10 @@ from numpy.polynomial import polynomial
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.files.formats.contract import ExportOptions, Thermal, of_si_readings, thermal_of
+from trihedron.files.formats.contract import ExportOptions, Thermal, given, of_si_readings, thermal_of
 from trihedron.records import Calibration, Onboard, SensorCalibration
-from trihedron.records.plain import from_plain
+from trihedron.records.onboard import Autopilot
+from trihedron.records.plain import as_plain, from_plain
 
 _DEG_ROLL_PITCH_YAW = (
     (0, 0, 0), (0, 0, 45), (0, 0, 90), (0, 0, 135), (0, 0, 180), (0, 0, 225), (0, 0, 270), (0, 0, 315), (180, 0, 0),
@@ -39,13 +40,13 @@ class AxisCorrection:
     thermal: Thermal | None = None
 
 
+Correction = Callable[[Onboard, str], AxisCorrection]
+
+
 def orientation(number: float) -> FloatArray:
     """(3, 3) rotation from the sensor's to the board's axes for one of MAVLink's orientations.
 
-    Raises
-    ------
-    ValueError
-        When the number is none of the fixed orientations.
+    Refused when the number is none of the fixed orientations.
     """
     if number != int(number) or not 0 <= number < len(_DEG_ROLL_PITCH_YAW):
         raise RefusedError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
@@ -78,10 +79,7 @@ def parameters_in(text: str) -> dict[str, float]:
 def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, prefix: str) -> Onboard:
     """The corrections that the board had applied to the calibrated readings.
 
-    Raises
-    ------
-    ValueError
-        When neither the calibration nor a parameter file states them, or the log is of another autopilot.
+    Refused when neither the calibration nor a parameter file states them, or the log is of another autopilot.
     """
     name = {"ardupilot": "ArduPilot", "px4": "PX4"}[autopilot]
     stated = calibration.extensions.get("onboard")
@@ -99,15 +97,15 @@ def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, p
     text = options.current_parameters
     if text.strip().lower() == "none":
         return Onboard(known.autopilot if known else autopilot, 0, 0, "raw")  # type: ignore[arg-type]
-    given = {key: value for key, value in parameters_in(text).items() if key.startswith((prefix, *_SHARED))}
-    if text and not any(key.startswith(prefix) for key in given):
+    current = {key: value for key, value in parameters_in(text).items() if key.startswith((prefix, *_SHARED))}
+    if text and not any(key.startswith(prefix) for key in current):
         raise RefusedError(
             f"the file of current parameters holds no {prefix}...: save the parameters of the {name} board."
         )
     if known is not None:
-        return replace(known, parameters={**known.parameters, **given})
-    if given:
-        return Onboard(autopilot, 0, 0, "body", given)  # type: ignore[arg-type]
+        return replace(known, parameters={**known.parameters, **current})
+    if current:
+        return Onboard(autopilot, 0, 0, "body", current)  # type: ignore[arg-type]
     if calibration.accelerometer.raw_unit == "counts":
         return Onboard(autopilot, 0, 0, "raw")  # type: ignore[arg-type]
     raise RefusedError(
@@ -137,10 +135,7 @@ def composed(
     With ``logged = R (s o (r - o))``, ``truth = S logged + b`` is ``S' r + b'`` with ``S' = Rᵀ S R diag(s)`` and
     ``b' = Rᵀ b - S' o``. The offset is the reading at zero input; the scale is along the sensitive axis.
 
-    Raises
-    ------
-    ValueError
-        When an axis is mirrored, which a positive scale cannot represent.
+    Refused when an axis is mirrored, which a positive scale cannot represent.
     """
     known = of_si_readings(calibration, target, options)
     made, out = {}, {}
@@ -187,19 +182,62 @@ def _turned(covariance: FloatArray, own: AxisCorrection) -> FloatArray:
     return np.asarray(J @ covariance @ J.T)
 
 
-def triple(parameters: Mapping[str, float], name: str, default: float = 0.0) -> FloatArray:
-    """(3,) values of the parameters ``name`` with ``{}`` replaced by X, Y and Z."""
-    return np.array([parameters.get(name.format(axis), default) for axis in XYZ])
+def against_log(
+    held: Onboard, known: Onboard, correction: Correction, turns: str
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """S and b by sensor that convert readings logged with parameters ``known`` to those of a board with ``held``.
 
-
-def relative(held: Callable[[str], AxisCorrection], known: Callable[[str], AxisCorrection]) -> dict[str, _Pair]:
-    """S and b by sensor that convert readings logged with parameters ``known`` to those of a board with ``held``."""
+    ``turns`` begins the names of the parameters that rotate the sensor's axes to the board's.
+    """
+    kept = {name: value for name, value in known.parameters.items() if name.startswith(turns)}
+    there = Onboard(held.autopilot, known.accel, known.gyro, known.stage, {**kept, **held.parameters})
     out = {}
     for name in ("accelerometer", "gyroscope"):
-        new, old = held(name), known(name)
+        new, old = correction(there, name), correction(known, name)
         S = (new.turn * (new.scale / old.scale)) @ old.turn.T
         out[name] = (S, new.turn @ (new.scale * (old.offset - new.offset)))
     return out
 
 
-_Pair = tuple[FloatArray, FloatArray]
+def held_by(
+    parameters: dict[str, float], autopilot: Autopilot, correction: Callable[[Onboard, str], AxisCorrection]
+) -> Calibration:
+    """The first IMU's parameters as a calibration of readings in the sensor's axes."""
+    board = Onboard(autopilot, 0, 0, "corrected", parameters)
+    pairs = {}
+    for name in ("accelerometer", "gyroscope"):
+        own = correction(board, name)
+        pairs[name] = np.diag(own.scale), -own.scale * own.offset
+    return given(autopilot, pairs, board_parameters=as_plain(board))
+
+
+def about(board: Onboard, turns: str) -> list[str]:
+    """Comments on the corrections that the readings had when they were logged, and on the orientation of the board."""
+    if board.stage == "raw":
+        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
+    return [
+        "The log's readings had been corrected on board; these values include that correction and replace it.",
+        f"They hold for {turns}; load all of them, once.",
+    ]
+
+
+def common_range(limits: Sequence[tuple[float, float] | None]) -> tuple[float, float] | None:
+    """Temperatures [°C] inside all ranges; ``None`` where none is known."""
+    known = [one for one in limits if one is not None]
+    return (max(low for low, _ in known), min(high for _, high in known)) if known else None
+
+
+def said_of_misfit(thermal: Thermal, name: str) -> list[str]:
+    """Sentences on the temperature dependence that a cubic of the bias cannot represent, if there is any."""
+    unit = "m/s^2" if name == "accelerometer" else "rad/s"
+    said = []
+    if thermal.scale > 1e-6:
+        said.append(f"Over the range the {name}'s scale changes by up to {100 * thermal.scale:.2g} %, which is lost.")
+    if thermal.misfit > 1e-9:
+        said.append(f"Up to {thermal.misfit:.2g} {unit} of the {name}'s bias is beyond a cubic and is lost.")
+    return said
+
+
+def triple(parameters: Mapping[str, float], name: str, default: float = 0.0) -> FloatArray:
+    """(3,) values of the parameters ``name`` with ``{}`` replaced by X, Y and Z."""
+    return np.array([parameters.get(name.format(axis), default) for axis in XYZ])

@@ -46,4 +46,4 @@ def from_basalt(text: str) -> Calibration | None:
     return given("basalt", sensors)
 
 
-FORMAT = Format("basalt", to_basalt, from_basalt, in_si=True)
+FORMATS = (Format("basalt", to_basalt, from_basalt, in_si=True),)

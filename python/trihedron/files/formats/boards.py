@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from trihedron.files.formats import ardupilot, px4
+from trihedron.files.formats.autopilot import against_log
 from trihedron.records import Calibration, Onboard
 from trihedron.records.plain import from_plain
 
-_AGAINST = {"ardupilot": ardupilot.against_log, "px4": px4.against_log}
+_CORRECTIONS = {"ardupilot": (ardupilot.correction_of, "AHRS_"), "px4": (px4.correction_of, "SENS_BOARD")}
+"""Correction of a sensor by each autopilot, and the beginning of the names of its rotations."""
 
 
 def as_logged(calibration: Calibration, known: Onboard | None) -> Calibration:
@@ -19,7 +21,7 @@ def as_logged(calibration: Calibration, known: Onboard | None) -> Calibration:
     held = from_plain(dict(stated), Onboard)  # type: ignore[call-overload]
     if held.autopilot != known.autopilot:
         return calibration
-    pairs = _AGAINST[held.autopilot](held, known)
+    pairs = against_log(held, known, *_CORRECTIONS[held.autopilot])
     S, b = pairs["accelerometer"]
     gyro = calibration.gyroscope
     if gyro is not None:

@@ -94,10 +94,7 @@ class Format:
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
     """The calibration for readings that the target's driver converts to SI.
 
-    Raises
-    ------
-    ValueError
-        When it is for counts and the LSB is not given.
+    Refused when it is for counts and the LSB is not given.
     """
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     unit = acceleration_to_si(AccelerationUnit(accel.raw_unit))

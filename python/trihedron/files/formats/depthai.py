@@ -20,4 +20,4 @@ def from_depthai(text: str) -> Calibration | None:
     return None
 
 
-FORMAT = Format("depthai", None, from_depthai)
+FORMATS = (Format("depthai", None, from_depthai),)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import NoiseFigure, number
-from trihedron.files.formats.kalibr import KEYS
-from trihedron.files.formats.noise_keys import Figures, si_rows
+from trihedron.files.formats.noise_keys import COVARIANCES, KEYS, Figures, si_rows
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
 
 
@@ -20,18 +19,8 @@ class _Written:
     accel_axes: tuple[float, ...]
     gyro_axes: tuple[float, ...]
 
-    @property
-    def rate_hz(self) -> float:
-        """Rate of the samples."""
-        return self.figures.rate_hz
-
-    def four(self) -> tuple[NoiseFigure, NoiseFigure, NoiseFigure, NoiseFigure]:
-        """N and K of the accelerometer, N and K of the gyro."""
-        f = self.figures
-        return f.accel_N, f.accel_K, f.gyro_N, f.gyro_K
-
     def by_axis(self) -> tuple[tuple[float, ...], ...]:
-        """As :meth:`four`, for X, Y and Z; K is the same on all axes."""
+        """As :attr:`Figures.four`, for X, Y and Z; K is the same on all axes."""
         f = self.figures
         return self.accel_axes, (f.accel_K.value,) * 3, self.gyro_axes, (f.gyro_K.value,) * 3
 
@@ -41,24 +30,27 @@ def _short(value: float) -> str:
     return number(float(f"{value:.4g}"))
 
 
-def _rows(names: tuple[str, str, str, str], rate: str = "") -> Callable[[_Written], list[str]]:
+def _rows(names: tuple[str, ...], rate: str = "") -> Callable[[_Written], list[str]]:
     """Rows of densities and random walks in SI, and of the rate if ``rate`` is its key."""
-    return lambda f: [*si_rows(f.figures, names), *([f"{rate}: {number(f.rate_hz)}"] if rate else [])]
+    return lambda f: [*si_rows(f.figures, names), *([f"{rate}: {number(f.figures.rate_hz)}"] if rate else [])]
 
 
 def _openvins(f: _Written) -> list[str]:
-    return ["imu0:", *(f"  {line}" for line in [*si_rows(f.figures, KEYS), f"update_rate: {number(f.rate_hz)}"])]
+    return [
+        "imu0:",
+        *(f"  {line}" for line in [*si_rows(f.figures, KEYS["kalibr"]), f"update_rate: {number(f.figures.rate_hz)}"]),
+    ]
 
 
 def _basalt(f: _Written) -> list[str]:
     keys = zip(("accel_noise_std", "accel_bias_std", "gyro_noise_std", "gyro_bias_std"), f.by_axis(), strict=True)
     rows = [f'    "{key}": [{", ".join(_short(one) for one in axes)}]' for key, axes in keys]
-    return ['  "value0": {', f'    "imu_update_rate": {number(f.rate_hz)},', ",\n".join(rows), "  }"]
+    return ['  "value0": {', f'    "imu_update_rate": {number(f.figures.rate_hz)},', ",\n".join(rows), "  }"]
 
 
 def _fast_lio(f: _Written) -> list[str]:
-    keys = zip(("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov"), f.four(), strict=True)
-    rows = [f"  {key}: {_short(one.value**2 * f.rate_hz)}" for key, one in keys]
+    keys = zip(COVARIANCES, f.figures.four, strict=True)
+    rows = [f"  {key}: {_short(one.value**2 * f.figures.rate_hz)}" for key, one in keys]
     return ["# variances of one sample: N^2 rate and K^2 rate", "mapping:", *rows]
 
 
@@ -77,7 +69,7 @@ def _robot_localization(f: _Written) -> list[str]:
     """Covariances of sensor_msgs/Imu, which its filters read from every message; they have no bias states."""
     rows = []
     for key, axes in (("angular_velocity", f.gyro_axes), ("linear_acceleration", f.accel_axes)):
-        x, y, z = (_short(one**2 * f.rate_hz) for one in axes)
+        x, y, z = (_short(one**2 * f.figures.rate_hz) for one in axes)
         rows.append(f"{key}_covariance: [{x}, 0, 0, 0, {y}, 0, 0, 0, {z}]")
     return [
         "# robot_localization takes the covariances of the messages (N^2 rate, row by row); it has no bias states.",
@@ -96,13 +88,11 @@ class _Target:
 
 YAML = "%YAML:1.0"
 TARGETS: dict[str, _Target] = {
-    "kalibr": _Target(_rows(KEYS, "update_rate")),
+    "kalibr": _Target(_rows(KEYS["kalibr"], "update_rate")),
     "openvins": _Target(_openvins, first=YAML),
-    "vins-fusion": _Target(_rows(("acc_n", "acc_w", "gyr_n", "gyr_w")), first=YAML),
+    "vins-fusion": _Target(_rows(KEYS["vins-fusion"]), first=YAML),
     "basalt": _Target(_basalt, comment=""),
-    "orb-slam3": _Target(
-        _rows(("IMU.NoiseAcc", "IMU.AccWalk", "IMU.NoiseGyro", "IMU.GyroWalk"), "IMU.Frequency"), first=YAML
-    ),
+    "orb-slam3": _Target(_rows(KEYS["orb-slam3"], "IMU.Frequency"), first=YAML),
     "fast-lio": _Target(_fast_lio),
     "gtsam": _Target(_gtsam),
     "robot_localization": _Target(_robot_localization),
@@ -113,10 +103,7 @@ TARGETS: dict[str, _Target] = {
 def filter_noise_text(found: FilterNoise, target: str) -> str:
     """The noise of both sensors in the format of ``target``.
 
-    Raises
-    ------
-    ValueError
-        When the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
+    Refused when the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
     """
     one = TARGETS.get(target)
     if one is None:

@@ -33,4 +33,4 @@ def to_gtsam(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, "    return params", ""])
 
 
-FORMAT = Format("gtsam", to_gtsam, in_si=True)
+FORMATS = (Format("gtsam", to_gtsam, in_si=True),)

@@ -30,4 +30,4 @@ def from_imu_calib(text: str) -> Calibration | None:
     return given("imu_calib", {"accelerometer": (SM, -bias)})
 
 
-FORMAT = Format("imu_calib", to_imu_calib, from_imu_calib, in_si=True)
+FORMATS = (Format("imu_calib", to_imu_calib, from_imu_calib, in_si=True),)

@@ -48,4 +48,4 @@ def from_imu_tk(text: str) -> Calibration | None:
     return given("imu_tk", sensors) if sensors else None
 
 
-FORMAT = Format("imu_tk", to_imu_tk, from_imu_tk, pair=("acc", "gyro"))
+FORMATS = (Format("imu_tk", to_imu_tk, from_imu_tk, pair=("acc", "gyro")),)

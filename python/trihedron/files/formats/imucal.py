@@ -65,4 +65,4 @@ def from_imucal(text: str) -> Calibration | None:
     return given("imucal", sensors, units=units, g_sensitivity=G)
 
 
-FORMAT = Format("imucal", to_imucal, from_imucal)
+FORMATS = (Format("imucal", to_imucal, from_imucal),)

@@ -26,10 +26,7 @@ LARGEST_GAIN, LARGEST_OFFSET = 8192, 32767
 def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     """Commands for INAV's command line, from a calibration of uncorrected readings.
 
-    Raises
-    ------
-    ValueError
-        When the readings were not raw, the LSB is not given, or a value exceeds the range of a setting.
+    Refused when the readings were not raw, the LSB is not given, or a value exceeds the range of a setting.
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
         raise RefusedError(
@@ -77,4 +74,4 @@ def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
     return [f"set {word}_{axis.lower()} = {value:.0f}" for axis, value in zip(XYZ, whole, strict=True)]
 
 
-FORMAT = Format("inav", to_inav, in_si=True)
+FORMATS = (Format("inav", to_inav, in_si=True),)

@@ -20,32 +20,22 @@ from trihedron.files.formats.contract import (
     row,
 )
 from trihedron.files.formats.matrices import in_lower, lower_orthogonal
-from trihedron.files.formats.noise_keys import required, si_rows
+from trihedron.files.formats.noise_keys import KEYS, required, si_rows
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
-
-KEYS = (
-    "accelerometer_noise_density",
-    "accelerometer_random_walk",
-    "gyroscope_noise_density",
-    "gyroscope_random_walk",
-)
 
 
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     """``imu.yaml`` with the six keys that its reader requires, and intrinsics named as in Kalibr's results.
 
-    Raises
-    ------
-    ValueError
-        When noise or rate, which the reader requires, are not given.
+    Refused when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
     figures = required(lower, options, "Kalibr")
     equation = "a_m = M a + b;  w_m = M C_gyro_i w + A C_gyro_i a + b: true to measured."
     lines = [f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",))]
-    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS)]
+    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS["kalibr"])]
     lines += [f"rostopic: {options.topic}", f"update_rate: {number(figures.rate_hz)}"]
     lines += ["# Intrinsics, named as in Kalibr's own results:", "model: scale-misalignment", "accelerometers:", "  M:"]
     lines += matrix_rows(M_a, 2)
@@ -63,10 +53,7 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
 def from_kalibr(text: str) -> Calibration | None:
     """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``).
 
-    Raises
-    ------
-    ValueError
-        When it is the camera chain written beside those results, which contains only the pose of the IMU.
+    Refused when it is the camera chain written beside those results, which contains only the pose of the IMU.
     """
     document = yaml_of(text)
     if document is None or text.lstrip().startswith("%YAML:1.0"):
@@ -75,7 +62,7 @@ def from_kalibr(text: str) -> Calibration | None:
     if isinstance(camera, dict) and "T_cam_imu" in camera and "imu0" not in document:
         raise without_readings("Kalibr's camchain-imucam.yaml")
     document = document.get("imu0", document)
-    if not isinstance(document, dict) or not {KEYS[0], KEYS[2]} <= document.keys():
+    if not isinstance(document, dict) or not {KEYS["kalibr"][0], KEYS["kalibr"][2]} <= document.keys():
         return None
     accel, gyro = document.get("accelerometers") or {}, document.get("gyroscopes") or {}
     M_a = array_of(accel.get("M"), (3, 3), np.eye(3))
@@ -96,4 +83,4 @@ def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dt
     return np.array([[values.get(f"G_{i}{j}", 0.0) for j in AXES] for i in AXES])
 
 
-FORMAT = Format("kalibr", to_kalibr, from_kalibr, in_si=True)
+FORMATS = (Format("kalibr", to_kalibr, from_kalibr, in_si=True),)

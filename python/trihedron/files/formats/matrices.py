@@ -1,13 +1,11 @@
-"""Matrix factors in the conventions of other programs, and comments for files without matrices."""
+"""Matrix factors in the conventions of other programs."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.files.formats.contract import ExportOptions, heading, of_si_readings
-from trihedron.files.formats.losses import lost_without_intrinsics
-from trihedron.files.formats.noise_keys import Figures, required
+from trihedron.files.formats.contract import ExportOptions, of_si_readings
 from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import in_frame, other_form
@@ -21,22 +19,6 @@ def in_lower(
     lower = of_si_readings(lower, target, options)
     M, b = other_form(lower.accelerometer.S, lower.accelerometer.b)
     return lower, np.tril(M), b
-
-
-def noise_alone(
-    calibration: Calibration, options: ExportOptions, target: str, poses: str = ""
-) -> tuple[Calibration, Figures, list[str]]:
-    """The calibration of readings in SI, the noise figures that the target requires, and comments for its file.
-
-    Raises
-    ------
-    ValueError
-        When noise or rate are not given: the target reads a missing key as 0.
-    """
-    known = of_si_readings(calibration, target, options)
-    figures = required(known, options, target)
-    said = heading(known, f"{target} has no intrinsics of the IMU{poses}.")
-    return known, figures, [f"# {line}" for line in [*said, *lost_without_intrinsics(known)]]
 
 
 def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:

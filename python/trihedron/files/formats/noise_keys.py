@@ -19,15 +19,28 @@ class Figures:
     gyro_K: NoiseFigure
     rate_hz: float
 
+    @property
+    def four(self) -> tuple[NoiseFigure, NoiseFigure, NoiseFigure, NoiseFigure]:
+        """N and K of the accelerometer, N and K of the gyro."""
+        return self.accel_N, self.accel_K, self.gyro_N, self.gyro_K
+
+
+KEYS = {
+    "kalibr": (
+        *("accelerometer_noise_density", "accelerometer_random_walk"),
+        *("gyroscope_noise_density", "gyroscope_random_walk"),
+    ),
+    "vins-fusion": ("acc_n", "acc_w", "gyr_n", "gyr_w"),
+    "lio-sam": ("imuAccNoise", "imuAccBiasN", "imuGyrNoise", "imuGyrBiasN"),
+    "orb-slam3": ("IMU.NoiseAcc", "IMU.AccWalk", "IMU.NoiseGyro", "IMU.GyroWalk"),
+}
+"""Keys of densities and random walks in SI by target, in the order of :attr:`Figures.four`."""
+COVARIANCES = ("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov")
+"""FAST-LIO's keys in the same order."""
+
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
-    """The noise and rate that the target's reader requires.
-
-    Raises
-    ------
-    ValueError
-        When noise or rate are not given.
-    """
+    """The noise and rate that the target's reader requires. Refused when noise or rate are not given."""
     accel, gyro = options.accelerometer_noise, options.gyroscope_noise
     if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
         raise RefusedError(
@@ -46,13 +59,12 @@ def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
     return [said, f"{name}: {number(figure.value)}"]
 
 
-def si_rows(figures: Figures, names: tuple[str, str, str, str]) -> list[str]:
+def si_rows(figures: Figures, names: tuple[str, ...]) -> list[str]:
     """Rows of densities and random walks in SI; ``names`` in the order accelerometer N, K, gyro N, K."""
     units = ("m/s^2/sqrt(Hz)", "m/s^2/sqrt(s)", "rad/s/sqrt(Hz)", "rad/s/sqrt(s)")
-    figures4 = (figures.accel_N, figures.accel_K, figures.gyro_N, figures.gyro_K)
     return [
         line
-        for name, figure, unit in zip(names, figures4, units, strict=True)
+        for name, figure, unit in zip(names, figures.four, units, strict=True)
         for line in noise_row(name, figure, unit)
     ]
 

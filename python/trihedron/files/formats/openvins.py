@@ -16,9 +16,9 @@ from trihedron.files.formats.contract import (
     number,
     row,
 )
-from trihedron.files.formats.kalibr import KEYS, g_sensitivity
+from trihedron.files.formats.kalibr import g_sensitivity
 from trihedron.files.formats.matrices import in_lower, lower_orthogonal
-from trihedron.files.formats.noise_keys import required, si_rows
+from trihedron.files.formats.noise_keys import KEYS, required, si_rows
 from trihedron.files.formats.parsing import array_of, numbers_in, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
@@ -29,10 +29,7 @@ def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
 
     Comments are on separate lines: OpenCV's reader takes a value followed by a comment for a sequence.
 
-    Raises
-    ------
-    ValueError
-        When noise or rate, which the reader requires, are not given.
+    Refused when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "OpenVINS", options)
     figures = required(lower, options, "OpenVINS")
@@ -48,7 +45,7 @@ def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
     lines += ["# Biases are states of the filter, not keys of this file; here they were, in readings:"]
     lines += [f"#   accelerometer [{row(b_a)}]", f"#   gyroscope [{row(b_w)}]"]
     lines += ["imu0:", "  T_i_b:", *matrix_rows(np.eye(4), 4)]
-    lines += [f"  {line}" for line in si_rows(figures, KEYS)]
+    lines += [f"  {line}" for line in si_rows(figures, KEYS["kalibr"])]
     lines += [f"  rostopic: {options.topic}", "  time_offset: 0.0", f"  update_rate: {number(figures.rate_hz)}"]
     lines += ['  model: "kalibr"']
     for key, value in (("Tw", Tw), ("R_IMUtoGYRO", C), ("Ta", M_a), ("R_IMUtoACC", np.eye(3)), ("Tg", Tg)):
@@ -75,4 +72,4 @@ def from_openvins(text: str) -> Calibration | None:
     return given("openvins", sensors, without_bias=without, g_sensitivity=sensors["gyroscope"][0] @ Tg)
 
 
-FORMAT = Format("openvins", to_openvins, from_openvins, in_si=True)
+FORMATS = (Format("openvins", to_openvins, from_openvins, in_si=True),)

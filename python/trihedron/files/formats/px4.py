@@ -8,24 +8,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
-from trihedron.files.formats.ardupilot import said_of_misfit
+from trihedron.arrays import XYZ
 from trihedron.files.formats.autopilot import (
     AxisCorrection,
     Composed,
+    about,
     board_of,
+    common_range,
     composed,
     euler,
+    held_by,
     moved_to,
     orientation,
     parameters_in,
-    relative,
+    said_of_misfit,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, number
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, heading, number
 from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard
-from trihedron.records.plain import as_plain
 
 _REAL, _INTEGER = 9, 6
 """MAVLink's type numbers of a float and of a 32-bit integer in a parameter file."""
@@ -41,7 +42,9 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
     )
     held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
     lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
-    lines += [f"# {line}" for line in _about(board)]
+    names = ("SENS_BOARD_ROT", *(f"SENS_BOARD_{axis}_OFF" for axis in XYZ))
+    turns = ", ".join(f"{name} {board.parameters.get(name, 0.0):g}" for name in names)
+    lines += [f"# {line}" for line in about(board, turns)]
     lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
     for name, one in sensors.items():
         root, _ = _names(board, name)
@@ -67,19 +70,7 @@ def from_px4(text: str) -> Calibration | None:
     parameters = parameters_in(text)
     if not {"CAL_ACC0_XOFF", "CAL_ACC0_XSCALE"} <= parameters.keys():
         return None
-    board = Onboard("px4", 0, 0, "corrected", parameters)
-    pairs = {}
-    for name in ("accelerometer", "gyroscope"):
-        own = correction_of(board, name)
-        pairs[name] = np.diag(own.scale), -own.scale * own.offset
-    return given("px4", pairs, board_parameters=as_plain(board))
-
-
-def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """S and b by sensor that convert logged readings to those of a board with the parameters ``held``."""
-    turns = {name: value for name, value in known.parameters.items() if name.startswith("SENS_BOARD")}
-    as_there = Onboard("px4", known.accel, known.gyro, known.stage, {**turns, **held.parameters})
-    return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
+    return held_by(parameters, "px4", correction_of)
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:
@@ -140,10 +131,9 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> list[str]:
         lines.append(f"# {group}_ID must be that of the board.")
     else:
         lines.append(_line(f"{group}_ID", device, _INTEGER))
-    known = [one for one in limits if one is not None]
-    if known:
-        lines.append(_line(f"{group}_TMIN", max(low for low, _ in known)))
-        lines.append(_line(f"{group}_TMAX", min(high for _, high in known)))
+    valid = common_range(limits)
+    if valid is not None:
+        lines += [_line(f"{group}_TMIN", valid[0]), _line(f"{group}_TMAX", valid[1])]
     else:
         lines.append(f"# Set {group}_TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
     lines.append(_line(f"{group}_TREF", new.reference_degc))
@@ -157,17 +147,4 @@ def _line(name: str, value: float, kind: int = _REAL) -> str:
     return f"1\t1\t{name}\t{number(float(value)) if kind == _REAL else f'{value:.0f}'}\t{kind}"
 
 
-def _about(board: Onboard) -> list[str]:
-    if board.stage == "raw":
-        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
-    p = board.parameters
-    turn = f"SENS_BOARD_ROT {p.get('SENS_BOARD_ROT', 0.0):g}" + "".join(
-        f", SENS_BOARD_{axis}_OFF {p.get(f'SENS_BOARD_{axis}_OFF', 0.0):g}" for axis in XYZ
-    )
-    return [
-        "The log's readings had been corrected on board; these values include that correction and replace it.",
-        f"They hold for {turn}; load all of them, once.",
-    ]
-
-
-FORMAT = Format("px4", to_px4, from_px4, in_si=True)
+FORMATS = (Format("px4", to_px4, from_px4, in_si=True),)

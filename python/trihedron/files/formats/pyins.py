@@ -37,4 +37,4 @@ def from_pyins(text: str) -> Calibration | None:
     return given("pyins", sensors) if "accelerometer" in sensors else None
 
 
-FORMAT = Format("pyins", to_pyins, from_pyins)
+FORMATS = (Format("pyins", to_pyins, from_pyins),)

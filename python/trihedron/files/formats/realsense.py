@@ -44,4 +44,4 @@ def from_realsense(text: str) -> Calibration | None:
     return given("realsense", sensors) if "accelerometer" in sensors else None
 
 
-FORMAT = Format("realsense", to_realsense, from_realsense, in_si=True)
+FORMATS = (Format("realsense", to_realsense, from_realsense, in_si=True),)

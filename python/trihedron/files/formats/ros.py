@@ -13,10 +13,7 @@ from trihedron.records import Calibration
 def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     """The three covariances of a message.
 
-    Raises
-    ------
-    ValueError
-        When noise or rate, from which the covariance is computed, are not given.
+    Refused when noise or rate, from which the covariance is computed, are not given.
     """
     known = of_si_readings(calibration, "ROS", options)
     figures = required(known, options, "ROS")
@@ -34,4 +31,4 @@ def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     return "\n".join([*lines, f"orientation_covariance: [{row(unknown)}]", ""])
 
 
-FORMAT = Format("ros", to_ros, in_si=True)
+FORMATS = (Format("ros", to_ros, in_si=True),)

@@ -48,4 +48,4 @@ def from_xio(text: str) -> Calibration | None:
     return given("xio", sensors) if "accelerometer" in sensors else None
 
 
-FORMAT = Format("xio", to_xio, from_xio)
+FORMATS = (Format("xio", to_xio, from_xio),)
