@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.effects.direct import MUST_HALVE
 from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import move_residuals
+from trihedron.diagnose.session.solve import move_residuals, wrt_lost_time
 from trihedron.diagnose.session.state import SessionState
 
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
@@ -29,8 +29,8 @@ OVER_USUAL, LEFT_SHARE = 5.0, 0.1
 in 48 healthy sessions."""
 NARROW = 3
 """Samples on either side that a join uses in quick motion."""
-PLACE_S, TRIAL_S = 0.01, 0.03
-"""Spacing of the places tried, s; length of the trial insertion for the linear response of the residuals, s."""
+PLACE_S = 0.01
+"""Spacing of the places tried, s."""
 MOST_IN_A_MOVE = 3
 FEWEST_OF_PARABOLA = 6
 """Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
@@ -146,23 +146,25 @@ def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, 
     """
     found: list[Loss] = []
     gain, places = _of_joints(obs, m)
-    step = max(1, round(TRIAL_S * obs.recording.rate_hz))
     for _ in range(MOST_IN_A_MOVE if len(places) else 0):
         held = {one.sample: one.count for one in found}
-        before = residual_after(obs, state, m, held)
+        moved = with_inserted(obs, m, held)
+        before = move_residuals(moved, state)[0]
         misfit = float(before @ before)
         if misfit <= limit:
             break
         free = np.array([all(abs(k - other) > 2 * NARROW for other in held) for k in places])
-        by_sample = np.stack([(residual_after(obs, state, m, held | {int(k): step}) - before) / step for k in places])
+        after = places - obs.move_ranges[m][0] + sum(count * (places > sample) for sample, count in held.items())
+        by_time = wrt_lost_time(moved, state, 0)
+        by_sample = 0.5 * (by_time[after] + by_time[after + 1]) / obs.recording.rate_hz
         counts = np.arange(gain.shape[1])
         left = before + counts[None, :, None] * by_sample[:, None, :]
         score = gain + (misfit - (left**2).sum(axis=2)) / usual
         score[~free] = -np.inf
         at, n = np.unravel_index(int(score.argmax()), score.shape)
         loss = Loss(int(places[at]), m, int(n), float(score[at, n]), (float(score[at, n]),))
-        after = residual_after(obs, state, m, held | {loss.sample: loss.count})
-        if gain[at, n] < LEAST_GAIN or float(after @ after) > MUST_HALVE * misfit:
+        without = residual_after(obs, state, m, held | {loss.sample: loss.count})
+        if gain[at, n] < LEAST_GAIN or float(without @ without) > MUST_HALVE * misfit:
             break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
         found.append(loss)
     return found
@@ -183,6 +185,11 @@ def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, IntArray]:
 
 def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> FloatArray:
     """(5,) residuals of gravity and velocity after one move with ``losses`` inserted, in standard errors."""
+    return np.asarray(move_residuals(with_inserted(obs, m, losses), state)[0])
+
+
+def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observations:
+    """One move alone, with ``losses`` (counts after samples) inserted."""
     a, b = obs.move_ranges[m]
     assert obs.raw_rate is not None
     force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
@@ -194,8 +201,7 @@ def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[
         put = time[i] + step * np.arange(1, n + 1)
         time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
     ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
-    one = replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
-    return np.asarray(move_residuals(one, state)[0])
+    return replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
 
 
 def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
