@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.simulate import (
-    Environment,
-    Scenario,
-    Temperature,
-    hand_session,
-    profile_by_name,
-    simulate,
-    with_effect,
-)
+from trihedron.simulate import Environment, Scenario, Temperature, hand_session, profile_by_name, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
 

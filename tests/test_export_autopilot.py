@@ -151,9 +151,7 @@ def log_of(autopilot, parameters, stage="body"):
     recording = trihedron.read({"t": t, "acc": rng.normal(0, 5, (n, 3)), "gyr": rng.normal(0, 1, (n, 3))},
                                accelerometer_unit="m/s^2", gyroscope_unit="rad/s")  # fmt: skip
     return replace(
-        recording,
-        temperature_degc=np.linspace(15.0, 55.0, n),
-        onboard=Onboard(autopilot, 0, 0, stage, parameters),
+        recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=Onboard(autopilot, 0, 0, stage, parameters)
     )
 
 

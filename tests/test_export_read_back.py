@@ -125,10 +125,7 @@ OAK = {
 
 @pytest.mark.parametrize(
     ("name", "text", "says"),
-    [
-        ("camchain-imucam.yaml", yaml.dump(CAMCHAIN), "Kalibr"),
-        ("oak.json", json.dumps(OAK), "depthai"),
-    ],
+    [("camchain-imucam.yaml", yaml.dump(CAMCHAIN), "Kalibr"), ("oak.json", json.dumps(OAK), "depthai")],
 )
 def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(name, text, says, tmp_path):
     """Kalibr's camera chain and the EEPROM of an OAK camera hold pose and delay of the IMU, nothing of its readings."""

@@ -33,8 +33,7 @@ pytestmark = pytest.mark.usefixtures("few_simulations")
 
 
 @pytest.mark.parametrize(
-    ("N", "B", "low_pass"),
-    [(1e-3, 3e-3, Smoother()), (1e-3, 0.0, Smoother(12.0, 2)), (1e-3, 2e-3, Smoother(20.0, 1))],
+    ("N", "B", "low_pass"), [(1e-3, 3e-3, Smoother()), (1e-3, 0.0, Smoother(12.0, 2)), (1e-3, 2e-3, Smoother(20.0, 1))]
 )
 def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low_pass):
     x = low_pass.apply(make_noise(NoiseTerms(N=(N,) * 3, B=(B,) * 3), 40_000, 1.0 / RATE, 4, "octaves"), 1.0 / RATE)

@@ -28,11 +28,7 @@ def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
     names = "quantisation white flicker walk ramp gauss_markov gauss_markov_rate resolution dither"
     named = dict.fromkeys(names.split(), 0.0)
     return _core.AxisKalmanModel(
-        **(named | terms),
-        flicker_rates=list(rates),
-        ramp_frequency=ramp_frequency,
-        ramp_damping=0.7,
-        averages=averages,
+        **(named | terms), flicker_rates=list(rates), ramp_frequency=ramp_frequency, ramp_damping=0.7, averages=averages
     )
 
 

@@ -73,10 +73,7 @@ RETIRED = {
     r"\bhonest(ly)?\b|\bswallow(s|ed)?\b": "valid, absorb",
     r"\bnumbers (differ|re-estimated)\b|\bother numbers\b|\bnumbers of (any|the|a given) (model|device)": "parameters",
 }
-ALLOWED = {
-    "docs/model.md": r"\binstrument trihedron\b",
-    "docs/tutorials/laboratory.md": r"\binstrument trihedron\b",
-}
+ALLOWED = {"docs/model.md": r"\binstrument trihedron\b", "docs/tutorials/laboratory.md": r"\binstrument trihedron\b"}
 """Where the word is the subject: the manual's own name beside ours, once."""
 _PATTERN = {re.compile(pattern, re.IGNORECASE): word for pattern, word in RETIRED.items()}
 
