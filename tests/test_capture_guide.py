@@ -20,22 +20,24 @@ from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
+from trihedron.files.log import write_recording
 from trihedron.records.guiding import Accuracy, Examination, Phase
 from trihedron.simulate import scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
 
-def guided_session(seed, accuracy, n_checks=3):
+@pytest.fixture(scope="module")
+def led():
     """A hand that does what the guide says, heard only through the guide's view; the session grows pose by pose."""
-    hand = FollowingHand(scenario_by_name("hand-session"), seed, first_pose_s=7.5)
+    hand = FollowingHand(scenario_by_name("hand-session"), 1, first_pose_s=7.5)
     state = {}
 
     def look():
         until = part_of(state["recording"], -np.inf, state["now"] + 1e-9)
-        return examine(until, accuracy, gravity_m_s2=state["truth"].gravity_m_s2)
+        return examine(until, ACCURACY, gravity_m_s2=state["truth"].gravity_m_s2)
 
-    guide = Guide(accuracy, look, n_checks=n_checks)
+    guide = Guide(ACCURACY, look, n_checks=3)
     views, done = [], 0
     while not guide.is_done and hand.n_poses < 40:
         recording, truth = hand.session()
@@ -51,11 +53,6 @@ def guided_session(seed, accuracy, n_checks=3):
         target = guide.view().target_up
         hand.go(np.array([0.3, 0.5, 0.8]) if target is None else target, guide.view().pose_s + 1.0)
     return guide, views, state["recording"], state["truth"]
-
-
-@pytest.fixture(scope="module")
-def led():
-    return guided_session(1, ACCURACY)
 
 
 def test_a_hand_that_follows_the_guide_ends_with_the_wanted_accuracy(led):
@@ -194,10 +191,11 @@ def test_the_screen_fits_the_terminal_and_says_what_matters(led, width, height):
     assert "uncertainty" in "\n".join(lines)
 
 
-def test_a_log_is_replayed_through_the_guide_to_a_calibration(tmp_path, capsys):
+def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, capsys):
+    _, _, recording, truth = led
     log, calibration = tmp_path / "log.csv", tmp_path / "cal.json"
-    assert main(["simulate", "hand-session", "-o", str(log)]) == 0
-    assert main(["guide", str(log), "--gravity", "9.80665", "-o", str(calibration)]) == 0
+    write_recording(recording, log)
+    assert main(["guide", str(log), "--gravity", f"{truth.gravity_m_s2}", "-o", str(calibration)]) == 0
     said = capsys.readouterr().out
     assert "Accuracy reached. 3 more poses to check it." in said
     assert "Verification" in said

@@ -33,7 +33,9 @@ def declaration(tmp_path):
     return read_frame_declaration(path)
 
 
-def decode(decoder, data, pieces):
+def decode(decoder, data, seed):
+    """Frames of bytes that come in pieces of any size."""
+    pieces = random.Random(seed)
     frames, at = [], 0
     while at < len(data):
         n = pieces.randrange(1, 200)
@@ -42,11 +44,14 @@ def decode(decoder, data, pieces):
     return frames + decoder.finish()
 
 
-def placed_frames(decoder, frames):
-    by_counter, by_clock = frames[0].counter is not None, frames[0].ticks is not None
-    modulus = decoder.counter_modulus if by_counter else decoder.clock_modulus
-    sequence = Sequence(by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s)
-    return sequence, sequence.push(frames, 0.0) + sequence.finish()
+def sequenced(numbers, modulus, rate_hz=0.0, text=str):
+    """What a sequence counts of frames with these numbers, and where it puts them."""
+    sequence, placed = Sequence(by_counter=True, modulus=modulus), []
+    for number in numbers:
+        arrival = number / rate_hz if rate_hz else 0.0
+        placed += sequence.push([Frame(number % modulus, None, (0.0,), text(number))], arrival)
+    placed += sequence.finish()
+    return sequence.tally, placed
 
 
 def stream(protocol, declaration, n, rate_hz, faults):
@@ -64,7 +69,7 @@ def decoder_of(name, declaration):
 def test_every_frame_of_a_clean_line_is_read_with_its_values(board, name, declaration):
     recording, _, data = stream(board, declaration, 300, 200.0, Faults())
     decoder = decoder_of(name, declaration)
-    frames = decode(decoder, data, random.Random(1))
+    frames = decode(decoder, data, 1)
     assert len(frames) == 300
     assert decoder.corrupt == 0
     column = [c.split("[")[0].strip().lower() for c in decoder.columns]
@@ -78,13 +83,22 @@ def test_every_frame_of_a_clean_line_is_read_with_its_values(board, name, declar
     assert np.allclose([float(frame.text.split(",")[z]) for frame in frames], values, rtol=1e-8)
 
 
-@pytest.mark.parametrize(("board", "name"), COUNTED)
-@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+FAST = ("declared", "xio")
+RATES = [(*one, 100.0) for one in COUNTED] + [
+    pytest.param(*one, 1000.0, marks=() if one[0] in FAST else pytest.mark.slow) for one in COUNTED
+]
+
+
+@pytest.mark.parametrize(("board", "name", "rate_hz"), RATES)
 def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declaration):
     n = 3000
     _, sent, data = stream(board, declaration, n, rate_hz, parse_faults("1%"))
     decoder = decoder_of(name, declaration)
-    sequence, placed = placed_frames(decoder, decode(decoder, data, random.Random(2)))
+    frames = decode(decoder, data, 2)
+    by_counter, by_clock = frames[0].counter is not None, frames[0].ticks is not None
+    modulus = decoder.counter_modulus if by_counter else decoder.clock_modulus
+    sequence = Sequence(by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s)
+    placed = sequence.push(frames, 0.0) + sequence.finish()
     assert sequence.tally.saved == len(placed)
     # Frames before the first and after the last one saved are nobody's to count: at most a few.
     assert 0 <= n - (sequence.tally.saved + sequence.tally.lost) <= 5
@@ -99,59 +113,39 @@ def test_frames_do_not_depend_on_the_pieces_in_which_bytes_come(name, declaratio
     whole = decoder_of(name, declaration)
     expected = [*whole.feed(data), *whole.finish()]
     for seed in range(3):
-        assert decode(decoder_of(name, declaration), data, random.Random(seed)) == expected
+        assert decode(decoder_of(name, declaration), data, seed) == expected
 
 
-def test_a_garbled_counter_is_not_a_thousand_lost_frames():
-    sequence = Sequence(by_counter=True, modulus=1 << 16)
-    counters = [*range(10), 5010, *range(11, 20)]
-    placed = sequence.push([Frame(c, None, (0.0,), str(i)) for i, c in enumerate(counters)], 0.0)
-    placed += sequence.finish()
-    assert (sequence.tally.lost, sequence.tally.garbled) == (1, 1)
+def test_a_garbled_counter_is_not_a_thousand_lost_frames_and_one_that_begins_anew_a_restart():
+    tally, placed = sequenced([*range(10), 5010, *range(11, 20)], 1 << 16)
+    assert (tally.lost, tally.garbled) == (1, 1)
     assert [one.place for one in placed] == [*range(10), *range(11, 20)]
-
-
-def test_a_counter_that_begins_anew_is_a_restart_not_a_loss():
-    sequence = Sequence(by_counter=True, modulus=1 << 32)
-    counters = [*range(1000, 1050), *range(5, 60)]
-    sequence.push([Frame(c, None, (0.0,), str(i)) for i, c in enumerate(counters)], 0.0)
-    sequence.finish()
-    assert (sequence.tally.saved, sequence.tally.lost, sequence.tally.restarts) == (105, 0, 1)
+    tally, _ = sequenced([*range(1000, 1050), *range(5, 60)], 1 << 32)
+    assert (tally.saved, tally.lost, tally.restarts) == (105, 0, 1)
 
 
 @pytest.mark.parametrize(("modulus", "uncounted"), [(1 << 8, 1), (1 << 16, 0)])
 def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus, uncounted):
-    sequence = Sequence(by_counter=True, modulus=modulus)
-    numbers = [*range(500), *range(850, 900)]
-    for number in numbers:
-        sequence.push([Frame(number % modulus, None, (0.0,), str(number))], number / 1000.0)
-    sequence.finish()
+    tally, _ = sequenced([*range(500), *range(850, 900)], modulus, rate_hz=1000.0)
     # 350 frames are missing; a counter of one byte has gone round once and shows 94 of them.
-    assert (sequence.tally.lost, sequence.tally.uncounted) == (350 - 256 * uncounted, uncounted)
+    assert (tally.lost, tally.uncounted) == (350 - 256 * uncounted, uncounted)
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, 1000.0])
 @pytest.mark.parametrize("lost", [195, 220, 250])
 def test_new_frames_whose_short_counter_looks_like_a_stretch_sent_twice_are_kept(lost, rate_hz):
-    sequence = Sequence(by_counter=True, modulus=256)
     # Where time says how much is missing, readings may even be those of before.
     numbers = [*range(500), *range(500 + lost, 580 + lost)]
-    for number in numbers:
-        text = "still" if rate_hz else str(number)
-        sequence.push([Frame(number % 256, None, (0.0,), text)], number / rate_hz if rate_hz else 0.0)
-    sequence.finish()
-    assert sequence.tally.saved == len(numbers)
+    tally, _ = sequenced(numbers, 256, rate_hz, text=(lambda _: "still") if rate_hz else str)
+    assert tally.saved == len(numbers)
     # What is missing cannot be counted, and that is said.
-    assert Count(sequence.tally, counted_by="counter").is_least
+    assert Count(tally, counted_by="counter").is_least
 
 
 def test_a_stretch_that_was_sent_twice_is_saved_once():
-    sequence = Sequence(by_counter=True, modulus=256)
-    numbers = [*range(500), *range(470, 600)]
-    placed = sequence.push([Frame(number % 256, None, (0.0,), str(number)) for number in numbers], 0.0)
-    placed += sequence.finish()
+    tally, placed = sequenced([*range(500), *range(470, 600)], 256)
     assert [one.frame.text for one in placed] == list(map(str, range(600)))
-    assert (sequence.tally.repeated, sequence.tally.lost, sequence.tally.restarts) == (30, 0, 0)
+    assert (tally.repeated, tally.lost, tally.restarts) == (30, 0, 0)
 
 
 @pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
@@ -181,7 +175,7 @@ def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian,
     path.write_text(DECLARED.replace('"crc16-ccitt"', f'"{kind}"').replace("sync", f'endian = "{endian}"\nsync'))
     declaration = read_frame_declaration(path)
     _, _, data = stream("declared", declaration, 50, 100.0, Faults())
-    assert len(decode(decoder_factory(declaration)(), data, random.Random(0))) == 50
+    assert len(decode(decoder_factory(declaration)(), data, 0)) == 50
 
 
 @pytest.mark.parametrize(

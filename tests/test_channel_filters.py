@@ -37,13 +37,11 @@ def log(seed, corners, order=2, rate_hz=100.0, seconds=240.0, step=0.0, rest=0.6
     return Recording.from_arrays(t, out[0], out[1])
 
 
-MORE = (((0.2, 0.35), 2, 50.0), ((0.3, 0.08), 3, 400.0))
+SESSIONS = [((0.1, 0.15), 1, 100.0)]
+SESSIONS += [pytest.param(*one, marks=pytest.mark.slow) for one in (((0.2, 0.35), 2, 50.0), ((0.3, 0.08), 3, 400.0))]
 
 
-@pytest.mark.parametrize(
-    ("corners", "order", "rate_hz"),
-    [((0.1, 0.15), 1, 100.0), *(pytest.param(*one, marks=pytest.mark.slow) for one in MORE)],
-)
+@pytest.mark.parametrize(("corners", "order", "rate_hz"), SESSIONS)
 def test_the_corner_of_either_sensor_is_found_beside_motion(corners, order, rate_hz):
     found = log(11, corners, order, rate_hz).low_passes
     for sensor, corner in zip(("accelerometer", "gyroscope"), corners, strict=True):
@@ -53,14 +51,14 @@ def test_the_corner_of_either_sensor_is_found_beside_motion(corners, order, rate
             assert one.corner_hz.value == pytest.approx(corner * rate_hz, rel=0.15)
 
 
-@pytest.mark.parametrize(("sessions", "most"), [(3, 1), pytest.param(10, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("sessions", "most"), [(2, 1), pytest.param(10, 2, marks=pytest.mark.slow)])
 def test_white_noise_has_no_corner_and_says_above_what_one_would_lie(sessions, most):
     named = 0
     for seed in range(20, 20 + sessions):
         for axes in log(seed, (0.0, 0.0)).low_passes.values():
             named += axes[0].corner_hz is not None
             assert axes[0].corner_hz is not None or axes[0].above_hz > 40.0
-    # 4 in 100 sessions at most invent one (docs/noise.md, 8): two of 6 come once in 45 then, three of 20 once in 30.
+    # 4 in 100 sessions at most invent one (docs/noise.md, 8): two of 4 come once in 100 then, three of 20 once in 30.
     assert named <= most
 
 

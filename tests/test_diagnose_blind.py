@@ -24,10 +24,7 @@ def test_healthy_sessions_are_consistent_at_the_stated_rate(sessions):
 
 @pytest.mark.parametrize(
     ("effect", "grade", "seed"),
-    [
-        ("gyro-thermal-bias", "tactical", 2),
-        pytest.param("lever-arm", "adis", 4, marks=pytest.mark.slow),
-    ],
+    [("gyro-thermal-bias", "tactical", 2), pytest.param("lever-arm", "adis", 4, marks=pytest.mark.slow)],
 )
 def test_a_drawn_flaw_is_named_with_its_size(effect, grade, seed):
     result = trial(Job((effect,), grade, seed))

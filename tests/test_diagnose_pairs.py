@@ -7,11 +7,7 @@ import numpy as np
 
 import trihedron
 from trihedron.diagnose.against.mechanisms import compare_effects
-from trihedron.records.diagnosis import (
-    AcceptedEffect,
-    Candidate,
-    EffectParameter,
-)
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
 from trihedron.records.domains import HeldOut
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
@@ -24,17 +20,6 @@ def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share
     return AcceptedEffect(effect_id, "Said.", (parameter,), 0.0, 99.0, held, model={"variant": variant}, share=share)
 
 
-def scattered(recording, sigma, seed):
-    """Zeros of the gyro that are others in every pose, by ``sigma`` of its raw unit."""
-    rng = np.random.default_rng(seed)
-    gyro = np.array(recording.gyroscope)
-    poses = trihedron.segment(recording).poses
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(poses)], len(gyro)]
-    for first, last in pairwise(edges):
-        gyro[first:last] += sigma * rng.standard_normal(3)
-    return replace(recording, gyroscope=gyro)
-
-
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     profile = profile_by_name("mpu")
     accel, gyro = profile.unit(7)
@@ -44,8 +29,15 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)
     flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
-    recording = scattered(simulate(flawed, 11)[0], 0.03 * 65.5, 3)
-    found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
+    recording = simulate(flawed, 11)[0]
+    # Zeros of the gyro that are others in every pose, in its raw unit.
+    rng = np.random.default_rng(3)
+    rates = np.array(recording.gyroscope)
+    poses = trihedron.segment(recording).poses
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(poses)], len(rates)]
+    for first, last in pairwise(edges):
+        rates[first:last] += 0.03 * 65.5 * rng.standard_normal(3)
+    found = trihedron.diagnose(replace(recording, gyroscope=rates), gravity_m_s2=9.80665)
     assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
     assert found.verdict == "missing-physics"
 

@@ -15,6 +15,7 @@ from trihedron.records import Pose
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0
+WHITE = 0.1 * np.sqrt(RATE_HZ)
 
 JUMPS = 1e-3
 """p-value from which zeros are said to change inside poses."""
@@ -32,34 +33,26 @@ class Poses:
         self.recording = SimpleNamespace(rate_hz=RATE_HZ)
 
 
-def white(rng):
-    return rng.normal(0.0, 0.1 * np.sqrt(RATE_HZ), (15000, 3))
-
-
 def test_white_and_slow_noise_are_not_called_jumps():
     called = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
         walk = np.cumsum(rng.normal(0.0, 0.01, (15000, 3)), axis=0)
-        called += min(jumps_in_poses(Poses(white(rng), white(rng) + walk)).p_value) < JUMPS
+        force, rate = rng.normal(0.0, WHITE, (2, 15000, 3))
+        called += min(jumps_in_poses(Poses(force, rate + walk)).p_value) < JUMPS
     assert called <= 1  # 80 looks at one in a thousand
 
 
 def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not():
-    rng = np.random.default_rng(51)
-    force, rate = white(rng), white(rng)
-    turning = rate.copy()
+    force, rate = np.random.default_rng(51).normal(0.0, WHITE, (2, 15000, 3))
+    moved = force.copy()
     for k in (3, 9, 14, 22, 27):
         rate[500 * k + 250 : 500 * k + 500, 1] += 1.0
-        turning[500 * k + 250 : 500 * k + 500, 1] += 1.0
-        force[500 * k + 250 : 500 * k + 500, 0] += 0.0
+        moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
     found = jumps_in_poses(Poses(force, rate))
     assert found.p_value[1] < JUMPS
     assert set(found.poses[1]) <= {3, 9, 14, 22, 27}
-    moved = force.copy()
-    for k in (3, 9, 14, 22, 27):
-        moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
-    assert min(jumps_in_poses(Poses(moved, turning)).p_value) > JUMPS
+    assert min(jumps_in_poses(Poses(moved, rate)).p_value) > JUMPS
 
 
 def test_the_error_of_a_mean_of_few_turns_covers_it():
@@ -102,10 +95,7 @@ def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(
     found = SimpleNamespace(p_value=(0.2, 0.3), ratio=(1.1, 1.2), poses=((), ()))
     monkeypatch.setattr(goodness_of_fit, "jumps_in_poses", lambda _obs: found)
     changed = np.zeros((2, 3))
+    obs = SimpleNamespace(time_s=(), pose_names=tuple, segments=SimpleNamespace(poses=()))
     for force, rate, accel, gyro in ((changed, None, 1.0, 0.3), (None, changed, 0.2, 1.0), (None, None, 0.2, 0.3)):
-        line = SimpleNamespace(
-            distortion=SimpleNamespace(force=force, rate=rate), obs=SimpleNamespace(time_s=(), pose_names=tuple)
-        )
-        line.obs.segments = SimpleNamespace(poses=())
-        p_values = [goodness_of_fit._inside_poses(line, k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)]
-        assert p_values == [accel, gyro]
+        line = SimpleNamespace(distortion=SimpleNamespace(force=force, rate=rate), obs=obs)
+        assert [goodness_of_fit._inside_poses(line, k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)] == [accel, gyro]

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.simulate import (
-    Environment,
-    Scenario,
-    Temperature,
-    hand_session,
-    profile_by_name,
-    simulate,
-    with_effect,
-)
+from trihedron.simulate import Environment, Scenario, Temperature, hand_session, profile_by_name, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
 
@@ -69,11 +61,8 @@ MECHANISMS = {
 }  # fmt: skip
 
 
-EVERY_THIRD = list(MECHANISMS)[::3]
-
-
 @pytest.mark.parametrize(
-    "name", [name if name in EVERY_THIRD else pytest.param(name, marks=pytest.mark.slow) for name in MECHANISMS]
+    "name", [pytest.param(name, marks=pytest.mark.slow if k % 3 else ()) for k, name in enumerate(MECHANISMS)]
 )
 def test_it_is(name):
     grade, environment, effect, size = MECHANISMS[name]
@@ -128,6 +117,7 @@ def test_one_bad_pose_is_one_bad_pose():
     assert "Pose 10 was disturbed" in trihedron.report(found)
 
 
+@pytest.mark.slow
 def test_a_pushed_pose_is_not_a_bent_sensor():
     pushed = with_effect(session("adis"), "disturbed-pose", poses=[7], tilt_deg=1.5, shift_m=0.002)
     assert_not_taken_in(diagnosed(pushed), "disturbed-pose")

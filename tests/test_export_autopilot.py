@@ -13,8 +13,6 @@ from trihedron.files.formats import ExportOptions, export_calibration
 from trihedron.files.formats.autopilot import orientation, parameters_in
 from trihedron.records import Calibration, Onboard, SensorCalibration
 
-# Numbers are written with all digits; what is left is the order of operations on values below 100.
-ROUNDING = {"rtol": 0.0, "atol": 1e-9}
 AXES = "XYZ"
 
 
@@ -71,26 +69,33 @@ def px4(p, raw_accel, raw_gyro, T, accel, gyro, R):
     return out
 
 
+def given(accelerometer, gyroscope, gravity=9.81, raw_unit=None):
+    """A calibration of two pairs (S, b), of readings in SI unless a unit is said."""
+    sensors = [
+        SensorCalibration(S, b, np.zeros((12, 12)), raw_unit or unit, unit, "given")
+        for (S, b), unit in ((accelerometer, "m/s^2"), (gyroscope, "rad/s"))
+    ]
+    return Calibration(*sensors, np.zeros((24, 24)), "case", gravity, "given")
+
+
 def diagonal_in(R, recording, gyro_scale=(1.0, 1.0, 1.0)):
     """A calibration of a log that scales and shifts the axes of the sensor: what an autopilot can hold of one."""
     pairs = (
-        (np.array([1.012, 0.991, 1.004]), np.array([0.21, -0.13, 0.34]), "m/s^2"),
-        (np.array(gyro_scale), np.array([0.011, -0.007, 0.02]), "rad/s"),
+        (np.array([1.012, 0.991, 1.004]), np.array([0.21, -0.13, 0.34])),
+        (np.array(gyro_scale), np.array([0.011, -0.007, 0.02])),
     )
-    sensors = [
-        SensorCalibration(R @ np.diag(s) @ R.T, R @ b, np.zeros((12, 12)), unit, unit, "given") for s, b, unit in pairs
-    ]
-    known = Calibration(*sensors, np.zeros((24, 24)), "case", 9.81, "given", "log", "")
-    return of_board(known, recording)
+    return of_board(given(*((R @ np.diag(s) @ R.T, R @ b) for s, b in pairs)), recording)
 
 
-def before_ardupilot(recording, imu):
-    """The log's readings as the sensor gave them, by the equation of the board solved for them."""
-    p, suffix = recording.onboard.parameters, "" if imu == 0 else str(imu + 1)
-    R = turn(0, 180, 0)
-    accel = (recording.accelerometer @ R) / [p[f"INS_ACC{suffix}SCAL_{a}"] for a in AXES]
-    accel = accel + [p[f"INS_ACC{suffix}OFFS_{a}"] for a in AXES]
-    return accel, recording.gyroscope @ R + [p[f"INS_GYR{suffix}OFFS_{a}"] for a in AXES], R
+def assert_alike(made, applied, atol=1e-9):
+    """Numbers are written with all digits; what is left is the order of operations on values below 100."""
+    np.testing.assert_allclose(made[0], applied.accelerometer, rtol=0.0, atol=atol)
+    np.testing.assert_allclose(made[1], applied.gyroscope, rtol=0.0, atol=1e-9)
+
+
+def corrected(autopilot, p, raw, T, R):
+    """Of the first sensors, as the autopilot does with these parameters."""
+    return ardupilot(p, *raw, T, 0, R) if autopilot == "ardupilot" else px4(p, *raw, T, 0, 0, R)
 
 
 @pytest.mark.parametrize("imu", [0, 1, 2])
@@ -98,15 +103,16 @@ def test_ardupilot_parameters_on_the_raw_readings_of_a_flight_are_what_apply_giv
     pytest.importorskip("pymavlink")
     recording = trihedron.read(real_data / "formats" / "ardupilot_log171.bin", instance=imu)
     assert (recording.onboard.stage, recording.onboard.accel) == ("body", imu)
-    raw_accel, raw_gyro, R = before_ardupilot(recording, imu)
-    known = diagonal_in(R, recording)
+    # The log's readings as the sensor gave them, by the equation of the board solved for them.
+    p, suffix, R = recording.onboard.parameters, "" if imu == 0 else str(imu + 1), turn(0, 180, 0)
+    raw_accel = (recording.accelerometer @ R) / [p[f"INS_ACC{suffix}SCAL_{a}"] for a in AXES]
+    raw_accel = raw_accel + [p[f"INS_ACC{suffix}OFFS_{a}"] for a in AXES]
+    raw_gyro = recording.gyroscope @ R + [p[f"INS_GYR{suffix}OFFS_{a}"] for a in AXES]
     # Through its file, as a person's calibration goes.
-    known = calibration_from_document(calibration_document(known))
-    applied = trihedron.apply(known, recording)
+    known = calibration_from_document(calibration_document(diagonal_in(R, recording)))
     parameters = parameters_in(export_calibration(known, "ardupilot"))
     made = ardupilot(parameters, raw_accel, raw_gyro, recording.temperature_degc, imu, R)
-    np.testing.assert_allclose(made[0], applied.accelerometer, **ROUNDING)
-    np.testing.assert_allclose(made[1], applied.gyroscope, **ROUNDING)
+    assert_alike(made, trihedron.apply(known, recording))
 
 
 def test_px4_parameters_on_the_raw_readings_of_a_flight_are_what_apply_gives(real_data):
@@ -120,24 +126,17 @@ def test_px4_parameters_on_the_raw_readings_of_a_flight_are_what_apply_gives(rea
     raw_gyro = recording.gyroscope @ R + [p[f"CAL_GYRO0_{a}OFF"] for a in AXES]
     # Firmware of that age holds gyro scales, and the log says so.
     known = diagonal_in(R, recording, gyro_scale=(0.99, 1.02, 1.005))
-    applied = trihedron.apply(known, recording)
     parameters = parameters_in(export_calibration(known, "px4"))
     assert parameters["CAL_ACC0_ID"] == 1245450
     assert parameters["CAL_GYRO0_ID"] == 2162688
-    made = px4(parameters, raw_accel, raw_gyro, None, 0, 0, R)
-    np.testing.assert_allclose(made[0], applied.accelerometer, **ROUNDING)
-    np.testing.assert_allclose(made[1], applied.gyroscope, **ROUNDING)
+    assert_alike(px4(parameters, raw_accel, raw_gyro, None, 0, 0, R), trihedron.apply(known, recording))
 
 
 def test_an_identity_on_corrected_readings_gives_back_the_parameters_that_the_board_holds(real_data):
     """The harm that was done: what remains, written as the absolute value, threw 1.278 m/s² of offset away."""
     pytest.importorskip("pymavlink")
     recording = trihedron.read(real_data / "formats" / "ardupilot_log171.bin", instance=1)
-    sensors = [
-        SensorCalibration(np.eye(3), np.zeros(3), np.zeros((12, 12)), unit, unit, "given")
-        for unit in ("m/s^2", "rad/s")
-    ]
-    known = of_board(Calibration(*sensors, np.zeros((24, 24)), "case", 9.81, "given"), recording)
+    known = of_board(given(*[(np.eye(3), np.zeros(3))] * 2), recording)
     parameters = parameters_in(export_calibration(known, "ardupilot"))
     held = recording.onboard.parameters
     for name in (*(f"INS_ACC2{k}_{a}" for k in ("OFFS", "SCAL") for a in AXES), *(f"INS_GYR2OFFS_{a}" for a in AXES)):
@@ -152,9 +151,7 @@ def log_of(autopilot, parameters, stage="body"):
     recording = trihedron.read({"t": t, "acc": rng.normal(0, 5, (n, 3)), "gyr": rng.normal(0, 1, (n, 3))},
                                accelerometer_unit="m/s^2", gyroscope_unit="rad/s")  # fmt: skip
     return replace(
-        recording,
-        temperature_degc=np.linspace(15.0, 55.0, n),
-        onboard=Onboard(autopilot, 0, 0, stage, parameters),
+        recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=Onboard(autopilot, 0, 0, stage, parameters)
     )
 
 
@@ -178,46 +175,37 @@ TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0,
         "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
 
 
-@pytest.mark.parametrize("held", [{}, TCAL])
-def test_temperature_terms_are_added_to_those_that_the_board_holds_already(held):
+ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
+ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
+ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
+ARDUPILOT |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0}
+PX4 = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
+PX4 |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
+PX4 |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
+TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
+      "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "p", "R"),
+    [
+        ("ardupilot", ARDUPILOT, turn(180, 0, 90)),
+        ("ardupilot", ARDUPILOT | TCAL, turn(180, 0, 90)),
+        ("px4", PX4, turn(0, 0, 90)),
+        ("px4", PX4 | TC, turn(0, 0, 90)),
+    ],
+)
+def test_temperature_terms_are_added_to_those_that_the_board_holds_already(autopilot, p, R):
     rng = np.random.default_rng(3)
-    p = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
-    p |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
-    p |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
-    p |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0} | held
-    recording = log_of("ardupilot", p)
-    R, T = turn(180, 0, 90), recording.temperature_degc
+    recording = log_of(autopilot, p)
+    T = recording.temperature_degc
     raw = rng.normal(0, 6, (len(T), 3)), rng.normal(0, 1, (len(T), 3))
-    logged = ardupilot(p, *raw, T, 0, R)
+    logged = corrected(autopilot, p, raw, T, R)
     recording = replace(recording, accelerometer=logged[0], gyroscope=logged[1])
     known = with_temperature(diagonal_in(R, recording))
-    applied = trihedron.apply(known, recording)
-    parameters = parameters_in(export_calibration(known, "ardupilot"))
-    assert parameters["INS_ACC_ID"] == 2753036
-    made = ardupilot({**p, **parameters}, *raw, T, 0, R)
-    np.testing.assert_allclose(made[0], applied.accelerometer, **ROUNDING)
-    np.testing.assert_allclose(made[1], applied.gyroscope, **ROUNDING)
-
-
-@pytest.mark.parametrize("is_compensated", [False, True])
-def test_px4_compensates_temperature_by_the_sum_of_both_polynomials(is_compensated):
-    rng = np.random.default_rng(4)
-    p = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
-    p |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
-    p |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
-    if is_compensated:
-        p |= {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
-              "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
-    recording = log_of("px4", p)
-    R, T = turn(0, 0, 90), recording.temperature_degc
-    raw = rng.normal(0, 6, (len(T), 3)), rng.normal(0, 1, (len(T), 3))
-    logged = px4(p, *raw, T, 0, 0, R)
-    recording = replace(recording, accelerometer=logged[0], gyroscope=logged[1])
-    known = with_temperature(diagonal_in(R, recording))
-    applied = trihedron.apply(known, recording)
-    made = px4({**p, **parameters_in(export_calibration(known, "px4"))}, *raw, T, 0, 0, R)
-    np.testing.assert_allclose(made[0], applied.accelerometer, **ROUNDING)
-    np.testing.assert_allclose(made[1], applied.gyroscope, **ROUNDING)
+    parameters = parameters_in(export_calibration(known, autopilot))
+    assert autopilot == "px4" or parameters["INS_ACC_ID"] == 2753036
+    assert_alike(corrected(autopilot, p | parameters, raw, T, R), trihedron.apply(known, recording))
 
 
 def by_temperature(known):
@@ -235,18 +223,13 @@ def by_temperature(known):
 def test_polynomials_of_several_recordings_go_where_the_autopilot_has_places(target):
     recording = replace(log_of(target, {}, "raw"), temperature_degc=np.linspace(5.0, 45.0, 400))
     known = by_temperature(diagonal_in(np.eye(3), recording))
-    applied = trihedron.apply(known, recording)
-    text = export_calibration(known, target, ExportOptions(current_parameters="none"))
-    p = parameters_in(text)
-    raw = recording.accelerometer, recording.gyroscope, recording.temperature_degc
-    if target == "ardupilot":
-        made = ardupilot(p, *raw, 0, np.eye(3))
-    else:
+    p = parameters_in(export_calibration(known, target, ExportOptions(current_parameters="none")))
+    if target == "px4":
         p |= {"CAL_ACC0_ID": 1, "CAL_GYRO0_ID": 2, "TC_A0_ID": 1, "TC_G0_ID": 2}
-        made = px4(p, *raw, 0, 0, np.eye(3))
+    raw = recording.accelerometer, recording.gyroscope
+    made = corrected(target, p, raw, recording.temperature_degc, np.eye(3))
     # `apply` follows the polynomials linearly between 257 temperatures.
-    np.testing.assert_allclose(made[0], applied.accelerometer, rtol=0, atol=3e-6)
-    np.testing.assert_allclose(made[1], applied.gyroscope, rtol=0, atol=1e-9)
+    assert_alike(made, trihedron.apply(known, recording), atol=3e-6)
 
 
 @pytest.mark.parametrize("target", ["c", "imu_tk", "xio"])
@@ -259,12 +242,8 @@ def test_a_target_of_constants_says_what_the_temperature_is_worth(target):
 
 
 def test_a_log_that_does_not_say_makes_the_export_ask_for_the_parameters(tmp_path, capsys):
-    sensors = [
-        SensorCalibration(1.01 * np.eye(3), np.full(3, 0.1), np.zeros((12, 12)), unit, unit, "given")
-        for unit in ("m/s^2", "rad/s")
-    ]
     file = tmp_path / "unit.json"
-    write_calibration(Calibration(*sensors, np.zeros((24, 24)), "case", 9.81, "given"), file)
+    write_calibration(given(*[(1.01 * np.eye(3), np.full(3, 0.1))] * 2), file)
     assert main(["export", str(file), "--to", "ardupilot"]) == 1
     assert "--current-parameters" in capsys.readouterr().err
     lines = [f"INS_ACCOFFS_{a} {0.5}" for a in AXES] + [f"INS_ACCSCAL_{a} {1.02}" for a in AXES]
@@ -280,17 +259,13 @@ def test_a_log_that_does_not_say_makes_the_export_ask_for_the_parameters(tmp_pat
     assert main([*ask, str(tmp_path / "absent.param")]) == 1
 
 
-def test_parameters_that_changed_in_flight_or_of_another_autopilot_are_refused():
+def test_parameters_that_changed_in_flight_or_of_another_autopilot_and_a_mirrored_axis_are_refused():
     recording = log_of("ardupilot", {"INS_ACCOFFS_X": 0.1})
-    known = diagonal_in(np.eye(3), recording)
     with pytest.raises(ValueError, match="another autopilot"):
-        export_calibration(known, "px4")
+        export_calibration(diagonal_in(np.eye(3), recording), "px4")
     moved = replace(recording, onboard=replace(recording.onboard, changed=("INS_GYROFFS_X",)))
     with pytest.raises(ValueError, match="INS_GYROFFS_X changed"):
         export_calibration(diagonal_in(np.eye(3), moved), "ardupilot")
-
-
-def test_a_mirrored_axis_is_refused_for_an_autopilot():
     known = diagonal_in(np.eye(3), log_of("px4", {}, "raw"))
     mirrored = replace(known, accelerometer=replace(known.accelerometer, S=np.diag([1.0, -1.0, 1.0])))
     with pytest.raises(ValueError, match="mirrored"):
@@ -310,35 +285,26 @@ def test_orientations_are_those_of_mavlink():
         orientation(100)
 
 
-def inav(text, raw_accel, raw_gyro, accel_count, gyro_count):
-    """As INAV's acceleration.c and gyro.c correct, but for their rounding of the result."""
-    p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}
-    zero, gain, rate = ([p[f"{word}_{a}"] for a in "xyz"] for word in ("acczero", "accgain", "gyro_zero"))
-    return (raw_accel - zero) * gain / 4096 * accel_count, (raw_gyro - rate) * gyro_count
-
-
 @pytest.mark.parametrize("exact", [True, False])
 def test_settings_of_inav_on_raw_counts_are_what_apply_gives(exact):
     counts = 9.80665 / 2048, np.radians(1 / 16.4)
     zero, gain = np.array([33.0, 68.0, -9.0]), np.array([4349.0, 4204.0, 4083.0]) / 4096
     if not exact:
         zero, gain = zero + 0.3, gain + 1e-4
-    pairs = ((np.diag(gain) * counts[0], zero), (np.eye(3) * counts[1], np.array([9.0, -11.0, -4.0])))
-    units = ("m/s^2", "rad/s")
-    sensors = [
-        SensorCalibration(S, -S @ z, np.zeros((12, 12)), "counts", unit, "given")
-        for (S, z), unit in zip(pairs, units, strict=True)
-    ]
-    known = Calibration(*sensors, np.zeros((24, 24)), "case", 9.80665, "given")
+    S_a, S_g = np.diag(gain) * counts[0], np.eye(3) * counts[1]
+    known = given((S_a, -S_a @ zero), (S_g, -S_g @ [9.0, -11.0, -4.0]), 9.80665, "counts")
     text = export_calibration(
         known, "inav", ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
     )
     raw = np.random.default_rng(2).integers(-3000, 3000, (50, 3)).astype(float)
-    made = inav(text, raw, raw, *counts)
+    # As INAV's acceleration.c and gyro.c correct, but for their rounding of the result.
+    p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}
+    zeros, gains, rates = ([p[f"{word}_{a}"] for a in "xyz"] for word in ("acczero", "accgain", "gyro_zero"))
+    made = (raw - zeros) * gains / 4096 * counts[0], (raw - rates) * counts[1]
     # Half a count of zero and half a 4096th of gain, where the settings cannot say it whole.
     bound = 1e-9 if exact else counts[0] * (0.51 * 1.07 + 3100 / 8192)
-    np.testing.assert_allclose(made[0], raw @ sensors[0].S.T + sensors[0].b, rtol=0, atol=bound)
-    np.testing.assert_allclose(made[1], raw @ sensors[1].S.T + sensors[1].b, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(made[0], raw @ S_a.T + known.accelerometer.b, rtol=0, atol=bound)
+    np.testing.assert_allclose(made[1], raw @ S_g.T + known.gyroscope.b, rtol=0, atol=1e-9)
     with pytest.raises(ValueError, match="--accel-lsb"):
         export_calibration(known, "inav")
     si = replace(known, accelerometer=replace(known.accelerometer, S=np.eye(3), raw_unit="m/s^2"))

@@ -24,19 +24,22 @@ def scenario(motion: Motion, gyro_noise=2e-4, accel_noise=1e-3, S=SCALE, b=BIAS,
     )
 
 
-def given_accelerometer(truth, covariance=None):
-    return SensorCalibration(
-        truth.accelerometer_S,
-        truth.accelerometer_b,
+def calibrated(recording, segments, truth, options=None, error=None, covariance=None):
+    """The gyro beside an accelerometer that is known, or off by ``error`` of a stated covariance."""
+    error = np.zeros(12) if error is None else error
+    given = SensorCalibration(
+        truth.accelerometer_S + error[:9].reshape(3, 3),
+        truth.accelerometer_b + error[9:],
         np.zeros((12, 12)) if covariance is None else covariance,
         "m/s^2",
         "m/s^2",
         "given",
     )
+    return calibrate_moves(recording, segments, given, truth.gravity_m_s2, *([options] if options else []))
 
 
-def z_scores(found, S, b):
-    error = np.concatenate([(found.S - S).ravel(), found.b - b])
+def z_scores(found, truth):
+    error = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
     return error / np.sqrt(np.diag(found.covariance))
 
 
@@ -55,10 +58,8 @@ def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate(s
     scores = []
     for seed in range(sessions):
         recording, truth = simulate(scenario(hand_session(12, pose_s=2.0, first_pose_s=3.0)), seed)
-        segments = segments_from_truth(recording, truth)
-        options = MoveOptions(n_folds=0)
-        found, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2, options)
-        scores.append(z_scores(found, truth.gyroscope_S, truth.gyroscope_b))
+        found, _ = calibrated(recording, segments_from_truth(recording, truth), truth, MoveOptions(n_folds=0))
+        scores.append(z_scores(found, truth))
     scores = np.array(scores)
     # 12 scores a session; the parameters of one run are correlated, so count 6 independent ones: three binomial sigmas.
     for level, expected in ((1.0, 0.683), (1.96, 0.95)):
@@ -75,63 +76,21 @@ def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_
     distance = []
     for _ in range(draws):
         error = rng.normal(size=12) * sigma
-        given = SensorCalibration(
-            truth.accelerometer_S + error[:9].reshape(3, 3),
-            truth.accelerometer_b + error[9:],
-            np.diag(sigma**2),
-            "m/s^2",
-            "m/s^2",
-            "given",
-        )
-        found, _ = calibrate_moves(recording, segments, given, truth.gravity_m_s2, MoveOptions(n_folds=0))
+        found, _ = calibrated(recording, segments, truth, MoveOptions(n_folds=0), error, np.diag(sigma**2))
         e = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
         distance.append(e @ np.linalg.solve(found.covariance, e))
     # Draws of χ²(12), whose variance is 24: four standard deviations of their sum.
     assert abs(sum(distance) - 12.0 * draws) < 4.0 * np.sqrt(24.0 * draws)
 
 
-@pytest.mark.parametrize("sign", [(1, 1, -1), (-1, -1, -1)])
-def test_a_left_handed_gyro_is_recovered_and_reported(sign):
-    S = np.array(SCALE) @ np.diag(sign)
+@pytest.mark.parametrize("axes", [np.diag([1, 1, -1]), -np.eye(3), np.eye(3)[:, [1, 2, 0]]])
+def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_reported(axes):
+    S = np.array(SCALE) @ axes
     recording, truth = simulate(scenario(hand_session(14, pose_s=2.0), S=tuple(map(tuple, S))), seed=2)
-    segments = segments_from_truth(recording, truth)
-    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
-    assert np.linalg.det(found.S) < 0.0
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
-    assert FindingCode.LEFT_HANDED in codes(findings)
-
-
-def test_exchanged_axes_are_found_without_any_nominal_scale():
-    S = np.array(SCALE)[:, [1, 2, 0]]
-    recording, truth = simulate(scenario(hand_session(14, pose_s=2.0), S=tuple(map(tuple, S))), seed=2)
-    segments = segments_from_truth(recording, truth)
-    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    found, findings = calibrated(recording, segments_from_truth(recording, truth), truth)
+    assert np.linalg.det(found.S) * np.linalg.det(axes) > 0.0
+    assert np.abs(z_scores(found, truth)).max() < 4.0
     assert FindingCode.LEFT_HANDED in codes(findings)  # which says that axes differ in name
-
-
-def test_the_manuals_unit_in_counts_is_recovered_and_both_triads_are_left_handed():
-    S_f = np.array([[-0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
-    S_w = np.radians([[-0.0290, 0.0002, 0.0002], [0.0021, 0.0251, -0.0022], [0.0004, -0.0005, 0.0285]]) * 10.0
-    b_w = np.radians([-457.68, -400.59, -447.47])
-    recording, truth = simulate(
-        Scenario(
-            motion=hand_session(18, pose_s=3.0, first_pose_s=5.0),
-            accelerometer=Accelerometer(
-                S=tuple(map(tuple, S_f)),
-                b=(19.5696, -22.4746, -20.3088),
-                unit="counts",
-                noise=NoiseTerms(N=(2e-3,) * 3),
-            ),
-            gyroscope=Gyroscope(S=tuple(map(tuple, S_w)), b=tuple(b_w), unit="counts", noise=NoiseTerms(N=(5e-4,) * 3)),
-        ),
-        seed=5,
-    )
-    segments = segments_from_truth(recording, truth)
-    assert np.linalg.det(truth.accelerometer_S) < 0.0
-    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
-    assert FindingCode.LEFT_HANDED in codes(findings)
 
 
 def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
@@ -141,9 +100,7 @@ def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
         steps += [MoveTo(direction, 2.0, wobble_deg=0.0), SimulatedPose(3.0)]
     recording, truth = simulate(scenario(Motion(tuple(steps))), seed=1)
     segments = segments_from_truth(recording, truth)
-    found, findings = calibrate_moves(
-        recording, segments, given_accelerometer(truth), truth.gravity_m_s2, MoveOptions(nominal_scale=1.0)
-    )
+    found, findings = calibrated(recording, segments, truth, MoveOptions(nominal_scale=1.0))
     finding = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
     assert "Y axis" in finding.action
     assert "Z axis" in finding.action
@@ -156,12 +113,10 @@ def test_a_disturbed_hold_costs_its_two_moves_and_is_named(quiet):
     recording, truth, segments = quiet
     mean = segments.accelerometer_mean.copy()
     mean[7] += [0.4, -0.3, 0.2]
-    found, findings = calibrate_moves(
-        recording, replace(segments, accelerometer_mean=mean), given_accelerometer(truth), truth.gravity_m_s2
-    )
+    found, findings = calibrated(recording, replace(segments, accelerometer_mean=mean), truth)
     named = {int(f.numbers["move"]) for f in findings if f.code is FindingCode.OUTLIER_MOVE}
     assert named == {7, 8}
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert np.abs(z_scores(found, truth)).max() < 4.0
     assert list(np.flatnonzero(found.quality.weights == 0.0)) == [6, 7]
 
 
@@ -170,12 +125,12 @@ def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
     speed = np.abs(recording.gyroscope[:, 0])
     limit = np.sort(speed)[-12]
     clipped = replace(recording, gyroscope=np.clip(recording.gyroscope, [-limit, -9, -9], [limit, 9, 9]))
-    found, findings = calibrate_moves(clipped, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    found, findings = calibrated(clipped, segments, truth)
     assert FindingCode.CLIPPING in codes(findings)
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert np.abs(z_scores(found, truth)).max() < 4.0
     hard = np.clip(recording.gyroscope, -0.3 * limit, 0.3 * limit)
     with pytest.raises(ValueError, match="clipped in every move"):
-        calibrate_moves(replace(recording, gyroscope=hard), segments, given_accelerometer(truth), truth.gravity_m_s2)
+        calibrated(replace(recording, gyroscope=hard), segments, truth)
 
 
 def test_a_zero_that_follows_gravity_is_found_and_taken_out(quiet):
@@ -183,10 +138,9 @@ def test_a_zero_that_follows_gravity_is_found_and_taken_out(quiet):
     A = np.array([[0.0, 3e-4, 0.0], [4e-4, 0.0, 0.0], [0.0, 0.0, -2e-4]])
     tilted = replace(recording, gyroscope=recording.gyroscope + truth.specific_force_m_s2 @ A.T)
     means = segments.gyroscope_mean + segments.accelerometer_mean @ A.T
-    segments = replace(segments, gyroscope_mean=means)
-    found, findings = calibrate_moves(tilted, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    found, findings = calibrated(tilted, replace(segments, gyroscope_mean=means), truth)
     assert FindingCode.GYRO_G_SENSITIVITY in codes(findings)
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert np.abs(z_scores(found, truth)).max() < 4.0
     # Left in, it would miss by several times the noise of a move.
     assert found.quality.held_out_rms < 1.5 * found.quality.floor
 
@@ -196,17 +150,14 @@ def test_a_zero_that_drifts_is_followed_and_reported(quiet):
     drift = 0.01 * recording.time_s / recording.time_s[-1]
     drifting = replace(recording, gyroscope=recording.gyroscope + drift[:, None])
     means = np.array([drifting.gyroscope[h.start : h.stop].mean(axis=0) for h in segments.poses])
-    found, findings = calibrate_moves(
-        drifting, replace(segments, gyroscope_mean=means), given_accelerometer(truth), truth.gravity_m_s2
-    )
+    found, findings = calibrated(drifting, replace(segments, gyroscope_mean=means), truth)
     assert FindingCode.GYRO_BIAS_DRIFT in codes(findings)
-    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)[:9]).max() < 4.0
+    assert np.abs(z_scores(found, truth)[:9]).max() < 4.0
 
 
 def test_held_out_moves_are_predicted_as_well_as_the_error_bars_say(quiet):
     recording, truth, segments = quiet
-    found, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
-    quality = found.quality
+    quality = calibrated(recording, segments, truth)[0].quality
     z = quality.held_out / quality.held_out_sigma
     # 51 scores, two thirds independent: mean square 1 with standard deviation √(2/34); four of them.
     assert abs(np.mean(z**2) - 1.0) < 1.0
@@ -217,18 +168,12 @@ def test_held_out_moves_are_predicted_as_well_as_the_error_bars_say(quiet):
 
 def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
     recording, truth, segments = quiet
-    given = given_accelerometer(truth)
-    with pytest.raises(ValueError, match="no gyroscope"):
-        calibrate_moves(replace(recording, gyroscope=None), segments, given, 9.8)
-    with pytest.raises(ValueError, match="no move between two poses"):
-        calibrate_moves(recording, replace(segments, moves=()), given, 9.8)
-    short = replace(
-        recording,
-        time_s=recording.time_s[:500],
-        accelerometer=recording.accelerometer[:500],
-        gyroscope=recording.gyroscope[:500],
-    )
-    with pytest.raises(ValueError, match="another log"):
-        calibrate_moves(short, segments, given, 9.8)
-    with pytest.raises(ValueError, match=r"\(3, 3\)"):
-        calibrate_moves(recording, segments, given, 9.8, MoveOptions(nominal_scale=np.ones(3)))
+    rows = {name: getattr(recording, name)[:500] for name in ("time_s", "accelerometer", "gyroscope")}
+    for log, parts, options, words in (
+        (replace(recording, gyroscope=None), segments, None, "no gyroscope"),
+        (recording, replace(segments, moves=()), None, "no move between two poses"),
+        (replace(recording, **rows), segments, None, "another log"),
+        (recording, segments, MoveOptions(nominal_scale=np.ones(3)), r"\(3, 3\)"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            calibrated(log, parts, truth, options)

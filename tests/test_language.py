@@ -27,9 +27,7 @@ from trihedron.simulate import hand_session
 from written_session import G, simulated
 
 ROOT = Path(__file__).parents[1]
-SCHEMAS = sorted((ROOT / "python/trihedron/files/schema").glob("*.json"))
 PACKAGE = ROOT / "python/trihedron"
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 RETIRED = {
     # Only where zero means a bias: as a number it stays.
@@ -75,10 +73,7 @@ RETIRED = {
     r"\bhonest(ly)?\b|\bswallow(s|ed)?\b": "valid, absorb",
     r"\bnumbers (differ|re-estimated)\b|\bother numbers\b|\bnumbers of (any|the|a given) (model|device)": "parameters",
 }
-ALLOWED = {
-    "docs/model.md": r"\binstrument trihedron\b",
-    "docs/tutorials/laboratory.md": r"\binstrument trihedron\b",
-}
+ALLOWED = {"docs/model.md": r"\binstrument trihedron\b", "docs/tutorials/laboratory.md": r"\binstrument trihedron\b"}
 """Where the word is the subject: the manual's own name beside ours, once."""
 _PATTERN = {re.compile(pattern, re.IGNORECASE): word for pattern, word in RETIRED.items()}
 
@@ -92,25 +87,113 @@ def retired(text: str) -> list[str]:
     ]
 
 
-def prose(markdown: str) -> str:
-    """A page without fences, code and addresses; equations with the words between them stay."""
-    text = re.sub(r"^ *```.*?^ *```", "", markdown, flags=re.DOTALL | re.MULTILINE)
-    text = re.sub(r"^ +(trihedron|from|import) .*$", "", text, flags=re.MULTILINE)
-    return re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
-
-
 def test_the_words_are_found_where_they_are():
     assert retired("The gyro's zero is -0.3 °/s; gravity at rest missed by 3 mm/s² in hold 3.")
     assert retired("Still poses tell a converter's steps; stamps of axis 1; the law of its twin.")
     assert not retired("The log holds zeros where nothing was read; the timestamp of X; a digital twin; rows of zeros.")
 
 
-@pytest.mark.parametrize("name", ["", *(command.__name__.replace("_", "-") for command in COMMANDS)])
-def test_no_help_uses_a_retired_word(name):
+Said = Iterator[tuple[str, str]]
+"""Texts, each with where it stands."""
+
+
+def helps() -> Said:
     group = typer.main.get_command(build_app())
-    command = group.commands[name] if name else group  # type: ignore[attr-defined]
-    words = command.get_help(typer.Context(command, info_name=f"trihedron {name}".strip()))
-    assert retired(re.sub(r"\s+", " ", words)) == []
+    for name in ("", *(command.__name__.replace("_", "-") for command in COMMANDS)):
+        command = group.commands[name] if name else group  # type: ignore[attr-defined]
+        words = command.get_help(typer.Context(command, info_name=f"trihedron {name}".strip()))
+        yield name, re.sub(r"\s+", " ", words)
+
+
+def catalogues() -> Said:
+    """Every sentence; the names of its places are no words."""
+    for entry in FINDINGS:
+        for text in (entry.seen, entry.cause, entry.action):
+            yield f"finding {entry.code.value} {entry.case}", re.sub(r"\{(\w+)", "{", text or "")
+    for effect_id, effect in EFFECTS.items():
+        for text in (effect.mechanism, effect.experiment, effect.experiment_at_rest, *effect.said.values()):
+            yield f"effect {effect_id}", re.sub(r"\{(\w+)", "{", text or "")
+    for name, text in {**PHRASES, **LINES, **REASONS}.items():
+        yield f"phrase {name}", re.sub(r"\{(\w+)", "{", text or "")
+    for name, family in FAMILIES.items():
+        yield f"family {name}", " ".join([family.experiment, *family.resembles])
+
+
+def modules() -> Said:
+    """Texts of two words and more, docstrings apart: errors, prompts, comments in exported files."""
+    for path in PACKAGE.rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        inside = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
+        for node in nodes:
+            body = getattr(node, "body", None)
+            inside |= {id(one.value) for one in (body if isinstance(body, list) else ()) if isinstance(one, ast.Expr)}
+        for node in nodes:
+            if isinstance(node, ast.JoinedStr):
+                text = "".join(str(part.value) if isinstance(part, ast.Constant) else "{" for part in node.values)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inside:
+                text = node.value
+            else:
+                continue
+            # A label of a random stream keeps its letters, or every seed would draw another series; verbs are bare.
+            is_verbs = set(text.split()) <= set(trihedron.__all__)
+            if " " in text.strip() and not text.startswith("{/") and not is_verbs:
+                yield str(path.relative_to(PACKAGE)), text
+
+
+def schemas() -> Said:
+    def walk(node: object) -> Iterator[str]:
+        if isinstance(node, dict):
+            yield from (str(node[key]) for key in ("title", "description") if isinstance(node.get(key), str))
+            yield from (key.replace("_", " ") for key in node.get("properties", {}))
+        for child in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+            yield from walk(child)
+
+    for path in (PACKAGE / "files/schema").glob("*.json"):
+        yield from ((path.name, text) for text in walk(json.loads(path.read_text(encoding="utf-8"))))
+
+
+def pages() -> Said:
+    """Prose without fences, code and addresses; equations with the words between them stay."""
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")):
+        name = str(page.relative_to(ROOT))
+        text = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        text = re.sub(r"^ +(trihedron|from|import) .*$", "", text, flags=re.MULTILINE)
+        text = re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
+        yield name, re.sub(ALLOWED[name], "", text) if name in ALLOWED else text
+    # What stands on an index and above a site.
+    for name in ("pyproject.toml", "Cargo.toml", "mkdocs.yml", "CITATION.cff"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        said = re.findall(r"^(?:site_)?(?:description|title|message)\s*[=:]\s*(.+)$", text, re.MULTILINE)
+        yield name, "\n".join(said)
+
+
+def docstrings() -> Said:
+    """Of every public name, and of what a public class shows."""
+    for name in filter(str.isidentifier, trihedron.__all__):
+        public = getattr(trihedron, name)
+        yield name, inspect.getdoc(public) or ""
+        for one, member in inspect.getmembers(public) if inspect.isclass(public) else ():
+            if not one.startswith("_"):
+                yield f"{name}.{one}", inspect.getdoc(member) or ""
+
+
+@pytest.mark.parametrize("source", [helps, catalogues, modules, schemas, pages, docstrings])
+def test_nothing_that_a_user_reads_uses_a_retired_word(source):
+    assert [(where, found) for where, text in source() for found in retired(text)] == []
+
+
+RETIRED_IN_NAMES = re.compile(
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden|wander)(?![a-z])"
+)
+
+
+def keys_of(node: object) -> Iterator[str]:
+    """Keys at every depth, the laid-out report apart: its drawings have the names of shapes."""
+    for key, child in node.items() if isinstance(node, dict) else ():
+        yield key
+        yield from keys_of(child) if key != "report" else ()
+    for child in node if isinstance(node, list) else ():
+        yield from keys_of(child)
 
 
 @pytest.fixture(scope="module")
@@ -128,144 +211,31 @@ def results():
     }
 
 
-KINDS = ["calibration", "verification", "diagnosis", "check", "segments", "ranking", "plan"]
+def test_no_report_and_no_key_of_its_json_uses_a_retired_word(results, tmp_path):
+    for kind, result in results.items():
+        assert retired(trihedron.report(result, tmp_path / f"{kind}.html")) == []
+        page = re.sub(
+            r"<(style|script)\b.*?</\1>", " ", (tmp_path / f"{kind}.html").read_text("utf-8"), flags=re.DOTALL
+        )
+        assert retired(html.unescape(re.sub(r"<[^>]*>", " ", page))) == []
+        trihedron.report(result, tmp_path / f"{kind}.json")
+        keys = keys_of(json.loads((tmp_path / f"{kind}.json").read_text("utf-8")))
+        assert {key for key in keys if RETIRED_IN_NAMES.search(key)} == set()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_report_uses_a_retired_word(results, kind, tmp_path):
-    assert retired(trihedron.report(results[kind], tmp_path / "report.html")) == []
-    page = re.sub(r"<(style|script)\b.*?</\1>", " ", (tmp_path / "report.html").read_text("utf-8"), flags=re.DOTALL)
-    assert retired(html.unescape(re.sub(r"<[^>]*>", " ", page))) == []
-
-
-def sentences() -> Iterator[tuple[str, str]]:
-    """Every sentence of the catalogues, with where it stands; the names of its places are no words."""
-    for entry in FINDINGS:
-        for text in (entry.seen, entry.cause, entry.action):
-            yield f"finding {entry.code.value} {entry.case}", text
-    for effect_id, effect in EFFECTS.items():
-        for text in (effect.mechanism, effect.experiment, effect.experiment_at_rest, *effect.said.values()):
-            yield f"effect {effect_id}", text
-    for name, text in {**PHRASES, **LINES, **REASONS}.items():
-        yield f"phrase {name}", text
-    for name, family in FAMILIES.items():
-        yield f"family {name}", " ".join([family.experiment, *family.resembles])
-
-
-def test_no_sentence_of_a_catalogue_uses_a_retired_word():
-    said = {where: retired(re.sub(r"\{(\w+)", "{", text or "")) for where, text in sentences()}
-    assert {where: words for where, words in said.items() if words} == {}
-
-
-def written(path: Path) -> Iterator[str]:
-    """Texts of two words and more in a module, docstrings apart: errors, prompts, comments in exported files."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    nodes = list(ast.walk(tree))
-    inside = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
-    for node in nodes:
-        body = getattr(node, "body", None)
-        inside |= {id(one.value) for one in (body if isinstance(body, list) else ()) if isinstance(one, ast.Expr)}
-    for node in nodes:
-        if isinstance(node, ast.JoinedStr):
-            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "{" for part in node.values)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inside:
-            text = node.value
-        else:
-            continue
-        # A label of a random stream keeps its letters, or every seed would draw another series; verbs are listed bare.
-        is_verbs = set(text.split()) <= set(trihedron.__all__)
-        if " " in text.strip() and not text.startswith("{/") and not is_verbs:
-            yield text
-
-
-def test_no_error_and_no_written_text_uses_a_retired_word():
-    said = {
-        f"{path.relative_to(PACKAGE)}: {found}"
-        for path in PACKAGE.rglob("*.py")
-        for text in written(path)
-        for found in retired(text)
-    }
-    assert said == set()
-
-
-@pytest.mark.parametrize("path", SCHEMAS, ids=lambda path: path.name)
-def test_no_schema_uses_a_retired_word(path):
-    words: list[str] = []
-
-    def walk(node: object) -> None:
-        if isinstance(node, dict):
-            words.extend(str(node[key]) for key in ("title", "description") if isinstance(node.get(key), str))
-            words.extend(key.replace("_", " ") for key in node.get("properties", {}))
-        for child in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
-            walk(child)
-
-    walk(json.loads(path.read_text(encoding="utf-8")))
-    assert [found for word in words for found in retired(word)] == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_no_page_uses_a_retired_word(page):
-    text = prose(page.read_text(encoding="utf-8"))
-    allowed = ALLOWED.get(str(page.relative_to(ROOT)))
-    assert retired(re.sub(allowed, "", text) if allowed else text) == []
-
-
-@pytest.mark.parametrize("name", ["pyproject.toml", "Cargo.toml", "mkdocs.yml", "CITATION.cff"])
-def test_no_description_on_an_index_or_a_site_uses_a_retired_word(name):
-    text = (ROOT / name).read_text(encoding="utf-8")
-    said = re.findall(r"^(?:site_)?(?:description|title|message)\s*[=:]\s*(.+)$", text, re.MULTILINE)
-    assert [found for one in said for found in retired(one)] == []
-
-
-def docstrings() -> Iterator[tuple[str, str]]:
-    """Of every public name, and of what a public class shows."""
+def test_no_public_name_is_a_retired_word():
+    names = {*(code.value for code in FindingCode), *EFFECTS}
     for name in filter(str.isidentifier, trihedron.__all__):
         public = getattr(trihedron, name)
-        yield name, inspect.getdoc(public) or ""
-        for one, member in inspect.getmembers(public) if inspect.isclass(public) else ():
-            if not one.startswith("_"):
-                yield f"{name}.{one}", inspect.getdoc(member) or ""
-
-
-def test_public_docstrings_use_no_retired_word():
-    said = {name: retired(text) for name, text in docstrings()}
-    assert {name: words for name, words in said.items() if words} == {}
-
-
-def names() -> Iterator[str]:
-    """Public names: verbs and their parameters, classes and what they show, findings' codes, effects' ids."""
-    for name in filter(str.isidentifier, trihedron.__all__):
-        public = getattr(trihedron, name)
-        yield name
+        names.add(name)
         if inspect.isclass(public):
             fields = dataclasses.fields(public) if dataclasses.is_dataclass(public) else ()
-            yield from (f"{name}.{one}" for one in {*dir(public), *(f.name for f in fields)} if not one.startswith("_"))
+            names |= {one for one in {*dir(public), *(f.name for f in fields)} if not one.startswith("_")}
         elif callable(public):
-            yield from (f"{name}.{parameter}" for parameter in inspect.signature(public).parameters)
-    yield from (code.value for code in FindingCode)
-    yield from EFFECTS
+            names |= set(inspect.signature(public).parameters)
+    assert {name for name in names if RETIRED_IN_NAMES.search(name)} == set()
 
 
 RETIRED_IN_NAMES = re.compile(
     r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden|wander)(?![a-z])"
 )
-
-
-def keys_of(node: object) -> Iterator[str]:
-    """Keys at every depth, the laid-out report apart: its drawings have the names of shapes."""
-    for key, child in node.items() if isinstance(node, dict) else ():
-        yield key
-        yield from keys_of(child) if key != "report" else ()
-    for child in node if isinstance(node, list) else ():
-        yield from keys_of(child)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_key_of_a_json_report_is_a_retired_word(results, kind, tmp_path):
-    trihedron.report(results[kind], tmp_path / "report.json")
-    written = json.loads((tmp_path / "report.json").read_text("utf-8"))
-    assert {key for key in keys_of(written) if RETIRED_IN_NAMES.search(key)} == set()
-
-
-def test_no_public_name_is_a_retired_word():
-    assert {name for name in names() if RETIRED_IN_NAMES.search(name)} == set()

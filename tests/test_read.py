@@ -51,48 +51,27 @@ def assert_same(recording: Recording, table: np.ndarray) -> None:
     np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("header", "separator", "decimal", "lead", "end", "line_end"),
-    [
-        (HEADER, ",", ".", "", "", "\n"),
-        (HEADER, ",", ".", "", "", "\r\n"),
-        (HEADER, ",", ".", "", "", "\r"),
-        ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
-        (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
-        (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
-        (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
-        ("", "   ", ".", "  ", "  ", "\n"),
-        ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
-        (HEADER, ",", ".", "", ",", "\n"),
-        ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
-        ('"t","ax","ay","az","gx","gy","gz"\n"', '","', ".", "", '"', '\n"'),
-    ],
-    ids=[
-        "csv",
-        "crlf",
-        "cr",
-        "byte-order-mark",
-        "tsv",
-        "decimal-comma",
-        "tab-decimal-comma",
-        "blanks",
-        "comment-header",
-        "trailing-comma",
-        "preamble",
-        "quoted",
-    ],
-)
-def test_every_text_layout_gives_the_numbers_that_were_written(
-    tmp_path, header, separator, decimal, lead, end, line_end
-):
+# Header, separator, decimal mark, what stands before and behind a row, what ends it.
+LAYOUTS = {
+    "csv": (HEADER, ",", ".", "", "", "\n"),
+    "crlf": (HEADER, ",", ".", "", "", "\r\n"),
+    "cr": (HEADER, ",", ".", "", "", "\r"),
+    "byte-order-mark": ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
+    "tsv": (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
+    "decimal-comma": (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
+    "tab-decimal-comma": (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
+    "blanks": ("", "   ", ".", "  ", "  ", "\n"),
+    "comment-header": ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
+    "trailing-comma": (HEADER, ",", ".", "", ",", "\n"),
+    "preamble": ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
+    "quoted": ('"t","ax","ay","az","gx","gy","gz"\n', '","', ".", '"', '"', "\n"),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
+def test_every_text_layout_gives_the_numbers_that_were_written(tmp_path, layout):
     table = readings()
-    path = tmp_path / "log.txt"
-    if line_end == '\n"':
-        rows = ['"' + '","'.join(repr(float(v)) for v in row) + '"' for row in table]
-        path.write_text(header.rstrip('"') + "\n".join(rows) + "\n")
-    else:
-        write(path, table, header, separator, decimal, lead, end, line_end)
-    assert_same(read_recording(path), table)
+    assert_same(read_recording(write(tmp_path / "log.txt", table, *layout)), table)
 
 
 @pytest.mark.parametrize("extension", [".csv", ".csv.gz", ".npz", ".parquet"])
@@ -131,26 +110,17 @@ def test_comments_and_blank_lines_between_rows_are_passed_over_and_lines_still_c
         read_recording(path)
 
 
-def test_words_for_missing_become_nan_and_are_counted(tmp_path):
+def test_words_for_missing_become_nan_and_are_counted_and_a_column_of_words_is_left_out_and_said(tmp_path):
     table = readings(100)
-    rows = [[repr(float(v)) for v in row] for row in table]
+    rows = [["walk", *map(repr, map(float, row))] for row in table]
     for i, word in enumerate(["", "NA", "null", "nan", "-"]):
-        rows[10 + i][2] = word
+        rows[10 + i][3] = word
     path = tmp_path / "log.csv"
-    path.write_text(HEADER + "\n".join(map(",".join, rows)) + "\n")
+    path.write_text("activity," + HEADER + "\n".join(map(",".join, rows)) + "\n")
     recording = read_recording(path)
     assert np.flatnonzero(np.isnan(recording.accelerometer[:, 1])).tolist() == [10, 11, 12, 13, 14]
+    np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
     assert finding(recording, FindingCode.NON_FINITE).numbers["count"] == 5
-
-
-def test_a_column_of_words_is_left_out_and_said(tmp_path):
-    table = readings(50)
-    path = tmp_path / "log.csv"
-    path.write_text(
-        "activity," + HEADER + "\n".join("walk," + ",".join(map(repr, map(float, row))) for row in table) + "\n"
-    )
-    recording = read_recording(path)
-    assert_same(recording, table)
     assert "activity" in finding(recording, FindingCode.COLUMN_LEFT_OUT).seen
 
 
@@ -181,9 +151,13 @@ def test_other_columns_are_kept_aside_untouched(tmp_path):
     np.testing.assert_array_equal(recording.auxiliary["lidar"], extra[:, 9])
 
 
-def test_the_hash_is_that_of_the_file(tmp_path):
+def test_a_recording_has_the_hash_of_its_file_and_frozen_arrays(tmp_path):
     path = write(tmp_path / "log.csv", readings())
-    assert read_recording(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    recording = read_recording(path)
+    assert recording.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert os.path.basename(recording.source) == "log.csv"
+    with pytest.raises(ValueError, match="read-only"):
+        recording.accelerometer[0, 0] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -255,11 +229,17 @@ def test_the_unit_of_time_is_told_by_its_step_or_its_date(tmp_path, scale, unit,
     assert recording.start_epoch_s == pytest.approx(start / scale)
 
 
-def test_a_given_time_unit_wins(tmp_path):
-    recording = read_recording(write(tmp_path / "log.csv", readings()), time_unit="ms")
+def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
+    path = write(tmp_path / "log.csv", readings())
+    recording = read_recording(path, accelerometer_unit="g", gyroscope_unit="deg/s", time_unit="ms")
+    assert recording.accelerometer_unit is AccelerationUnit.G
+    assert recording.gyroscope_unit is RateUnit.DEG_S
     assert recording.rate_hz == pytest.approx(1e5, rel=1e-9)
+    assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
+    with pytest.raises(ReadError, match="not an acceleration unit"):
+        read_recording(path, accelerometer_unit="furlong")
     with pytest.raises(ReadError, match="not a time unit"):
-        read_recording(write(tmp_path / "log.csv", readings()), time_unit="fortnight")
+        read_recording(path, time_unit="fortnight")
 
 
 def test_seconds_and_nanoseconds_in_two_columns_are_one_clock(tmp_path):
@@ -295,20 +275,3 @@ def test_one_sensor_alone_is_a_recording(tmp_path):
     path = write(tmp_path / "log.csv", table)
     assert read_recording(accelerometer_path=path).gyroscope is None
     assert read_recording(gyroscope_path=path).accelerometer is None
-
-
-def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
-    path = write(tmp_path / "log.csv", readings())
-    recording = read_recording(path, accelerometer_unit="g", gyroscope_unit="deg/s")
-    assert recording.accelerometer_unit is AccelerationUnit.G
-    assert recording.gyroscope_unit is RateUnit.DEG_S
-    assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
-    with pytest.raises(ReadError, match="not an acceleration unit"):
-        read_recording(path, accelerometer_unit="furlong")
-
-
-def test_arrays_of_a_recording_are_frozen_and_not_copied(tmp_path):
-    recording = read_recording(write(tmp_path / "log.csv", readings()))
-    with pytest.raises(ValueError, match="read-only"):
-        recording.accelerometer[0, 0] = 1.0
-    assert os.path.basename(recording.source) == "log.csv"

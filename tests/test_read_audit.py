@@ -9,18 +9,9 @@ from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
 
 N = 4000
-ALARMS = {
-    FindingCode.TIME_GAP,
-    FindingCode.TIME_JITTER,
-    FindingCode.TIME_DUPLICATE,
-    FindingCode.TIME_BACKWARD,
-    FindingCode.STUCK_VALUES,
-    FindingCode.CLIPPING,
-    FindingCode.REPEATED_ROWS,
-    FindingCode.NON_FINITE,
-    FindingCode.COARSE_RESOLUTION,
-    FindingCode.SAMPLES_LOST,
-}
+GAPS = "TIME_GAP TIME_JITTER TIME_DUPLICATE TIME_BACKWARD SAMPLES_LOST"
+READINGS = "STUCK_VALUES CLIPPING REPEATED_ROWS NON_FINITE COARSE_RESOLUTION"
+ALARMS = {FindingCode[name] for name in f"{GAPS} {READINGS}".split()}
 
 
 def counts(seed: int = 1, moving: bool = True) -> np.ndarray:
@@ -66,45 +57,34 @@ def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):
     assert recording.rate_hz == pytest.approx(100, rel=1e-3)
 
 
-def test_rows_written_twice_are_dropped_and_said(tmp_path):
+def test_rows_written_twice_are_dropped_and_late_packets_sorted_and_both_said(tmp_path):
     table = counts()
     recording = read(tmp_path, np.repeat(table, 2, axis=0))
     assert recording.n_samples == N
     np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
     assert finding(recording, FindingCode.REPEATED_ROWS).numbers["count"] == N
-
-
-def test_late_packets_are_sorted_and_said(tmp_path):
-    table = counts()
     order = np.arange(N)
     order[[500, 501, 900, 903]] = order[[501, 500, 903, 900]]
     recording = read(tmp_path, table[order])
     np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
     backward = finding(recording, FindingCode.TIME_BACKWARD)
     assert backward.severity is Severity.WARNING
-    assert backward.numbers["displaced_rows"] == 3
-    assert backward.numbers["sample"] == 501
+    assert (backward.numbers["displaced_rows"], backward.numbers["sample"]) == (3, 501)
 
 
 @pytest.mark.parametrize("sensor", [0, 1])
-def test_a_sensor_slower_than_its_log_repeats_itself(tmp_path, sensor):
+def test_a_sensor_slower_than_its_log_and_a_frozen_channel_are_found_with_their_place(tmp_path, sensor):
     table = counts()
     columns = slice(1 + 3 * sensor, 4 + 3 * sensor)
     table[1::2, columns] = table[0::2, columns]
-    recording = read(tmp_path, table)
-    repeated = finding(recording, FindingCode.REPEATED_ROWS)
+    repeated = finding(read(tmp_path, table), FindingCode.REPEATED_ROWS)
     assert repeated.numbers["fraction"] == pytest.approx(0.5, abs=0.01)
     assert ("accelerometer", "gyro")[sensor] in repeated.seen
-
-
-@pytest.mark.parametrize("column", [1, 5])
-def test_a_frozen_channel_is_found_with_its_place(tmp_path, column):
-    table = counts()
+    table, column = counts(), (1, 5)[sensor]
     table[1500:1600, column] = table[1500, column]
     stuck = finding(read(tmp_path, table), FindingCode.STUCK_VALUES)
     assert stuck.numbers["axis"] == (column - 1) % 3
-    assert stuck.numbers["longest_run"] == 100
-    assert stuck.numbers["sample"] == 1500
+    assert (stuck.numbers["longest_run"], stuck.numbers["sample"]) == (100, 1500)
 
 
 def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):
@@ -127,25 +107,19 @@ def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neithe
     assert not found & {FindingCode.CLIPPING, FindingCode.STUCK_VALUES, FindingCode.REPEATED_ROWS}
 
 
-def test_non_finite_readings_become_nan_at_their_place(tmp_path):
-    table = counts()
-    table[700, 2] = np.inf
-    table[701, 5] = np.nan
-    recording = read(tmp_path, table)
-    found = [f for f in recording.findings if f.code is FindingCode.NON_FINITE]
-    assert [f.numbers["sample"] for f in found] == [700, 701]
-    assert np.isnan(recording.accelerometer[700, 1])
-    assert np.isnan(recording.gyroscope[701, 1])
-
-
-def test_a_row_without_time_is_left_out_and_lines_stay_right(tmp_path):
+def test_non_finite_readings_become_nan_at_their_place_and_a_row_without_time_is_left_out(tmp_path):
     table = counts()
     table[10, 0] = np.nan
-    table[900, 4] = np.nan
+    table[700, 2] = np.inf
+    table[900, 5] = np.nan
     recording = read(tmp_path, table)
     assert recording.n_samples == N - 1
+    found = [f for f in recording.findings if f.code is FindingCode.NON_FINITE]
+    assert [f.numbers.get("sample") for f in found] == [None, 699, 899]
     # Sample 899 was row 900, line 902.
     assert any("sample 899, line 902" in f.seen for f in recording.findings)
+    assert np.isnan(recording.accelerometer[699, 1])
+    assert np.isnan(recording.gyroscope[899, 1])
 
 
 @pytest.mark.parametrize("modulus", [256, 65536])

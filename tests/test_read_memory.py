@@ -5,17 +5,11 @@ import polars as pl
 import pytest
 
 import trihedron
-from test_read import readings
+from test_read import assert_same, readings
 from trihedron.records import FindingCode, Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 NAMES = ["t", "ax", "ay", "az", "gx", "gy", "gz"]
-
-
-def assert_same(recording: Recording, table: np.ndarray) -> None:
-    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
-    np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
-    np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
 
 
 TABLE = readings()
@@ -64,19 +58,17 @@ def test_every_carrier_gives_the_numbers_that_it_holds(carrier):
 
 def test_dates_of_frames_are_the_clock():
     pandas = pytest.importorskip("pandas")
-    table = readings()
-    frame = pandas.DataFrame(dict(zip(NAMES[1:], table[:, 1:].T, strict=True)))
-    frame.index = pandas.Timestamp("2024-03-01") + pandas.to_timedelta(table[:, 0], unit="s")
+    frame = pandas_frame().drop(columns="t")
+    frame.index = pandas.Timestamp("2024-03-01") + pandas.to_timedelta(TABLE[:, 0], unit="s")
     recording = trihedron.read(frame)
     assert recording.rate_hz == pytest.approx(100.0, rel=1e-6)
     assert recording.start_epoch_s == pytest.approx(1709251200.0)
 
 
 def test_masked_readings_are_missing_readings():
-    table = readings()
-    mask = np.zeros(table.shape, dtype=bool)
+    mask = np.zeros(TABLE.shape, dtype=bool)
     mask[50:60, 3] = True
-    wild = table.copy()
+    wild = TABLE.copy()
     wild[50:60, 3] = 1e6
     for data in (
         np.ma.masked_array(wild, mask),
@@ -86,20 +78,19 @@ def test_masked_readings_are_missing_readings():
         assert np.isnan(recording.accelerometer[50:60, 2]).all()
         assert np.isfinite(np.delete(recording.accelerometer, np.s_[50:60], axis=0)).all()
         assert any(f.code is FindingCode.NON_FINITE for f in recording.findings)
-    made = Recording.from_arrays(table[:, 0], np.ma.masked_array(wild, mask)[:, 1:4], table[:, 4:])
+    made = Recording.from_arrays(TABLE[:, 0], np.ma.masked_array(wild, mask)[:, 1:4], TABLE[:, 4:])
     assert np.isnan(made.accelerometer[50:60, 2]).all()
 
 
 def test_arrays_make_an_audited_recording_in_their_units():
-    table = readings()
     recording = Recording.from_arrays(
-        table[:, 0], table[:, 1:4], np.degrees(table[:, 4:]), gyroscope_unit="deg/s", temperature_degc=np.arange(200.0)
+        TABLE[:, 0], TABLE[:, 1:4], np.degrees(TABLE[:, 4:]), gyroscope_unit="deg/s", temperature_degc=np.arange(200.0)
     )
     assert recording.gyroscope_unit is RateUnit.DEG_S
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
     assert recording.temperature_degc is not None
     assert recording.rate_hz == pytest.approx(100.0)
-    wrong = Recording.from_arrays(None, table[:, 1:4], rate_hz=50.0, accelerometer_unit="g")
+    wrong = Recording.from_arrays(None, TABLE[:, 1:4], rate_hz=50.0, accelerometer_unit="g")
     assert wrong.rate_hz == 50.0
     assert any(f.code is FindingCode.UNIT_CONTRADICTED for f in wrong.findings)
 

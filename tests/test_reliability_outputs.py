@@ -167,13 +167,7 @@ def test_impossible_places_end_in_a_sentence(tmp_path):
     assert locked.read_text() == "keep"
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["--help"],
-        ["apply", "c.json", "log.csv"],
-    ],
-)
+@pytest.mark.parametrize("words", [["--help"], ["apply", "c.json", "log.csv"]])
 def test_standard_output_on_a_full_disk_is_status_1(session, words):
     with open("/dev/full", "wb") as full:
         status, _, err = run(*words, cwd=session, stdout=full)

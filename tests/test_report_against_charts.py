@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.records.diagnosis import NoiseDifference
-from trihedron.report.diagnosis_charts import (
-    allan_chart,
-    allan_of,
-    noise_pictures,
-)
+from trihedron.report.diagnosis_charts import allan_chart, allan_of, noise_pictures
 
 EDGES = np.array([[2.0**k, 2.0 ** (k + 1)] for k in range(-3, 8)])
 

@@ -115,9 +115,7 @@ def test_the_gyro_turns_with_the_accelerometer_and_shares_its_uncertainty(frame)
         R = reframing(a[:9].reshape(3, 3), a[9:], frame).rotation
         return np.concatenate([(R @ s[:9].reshape(3, 3)).ravel() for s in (a, w)] + [R @ a[9:], R @ w[9:]])
 
-    x = np.concatenate(
-        [parameters(s.S, s.b) for s in (calibration.accelerometer, calibration.gyroscope)],
-    )
+    x = np.concatenate([parameters(s.S, s.b) for s in (calibration.accelerometer, calibration.gyroscope)])
     columns = []
     for k in range(24):
         step = np.zeros(24)

@@ -179,10 +179,7 @@ def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
         moved = replace(moved, accelerometer=recording.accelerometer + offset)
         found = calibrate(moved, segments=segment_recording(moved), gravity_m_s2=truth.gravity_m_s2).calibration
         error = np.concatenate(
-            [
-                (found.accelerometer.S - truth.accelerometer_S).ravel(),
-                (found.gyroscope.S - truth.gyroscope_S).ravel(),
-            ]
+            [(found.accelerometer.S - truth.accelerometer_S).ravel(), (found.gyroscope.S - truth.gyroscope_S).ravel()]
         )
         sigma = np.concatenate([found.accelerometer.sigma_S.ravel(), found.gyroscope.sigma_S.ravel()])
         free = sigma > 0.0

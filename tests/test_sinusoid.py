@@ -17,18 +17,10 @@ def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     # Uneven timestamps with a hole, far from zero: phases of thousands of turns.
     t = 4000.0 + np.sort(rng.uniform(0.0, 20.0, n)) + np.where(np.arange(n) > n // 2, 7.0, 0.0)
     x = np.sin(2 * np.pi * 3.1 * t) + rng.normal(size=n)
-    found = _core.sinusoid_power(t, x, start_hz=2.9, step_hz=0.011, count=41)
+    found = _core.sinusoid_power(t, np.repeat(x, 2)[::2], start_hz=2.9, step_hz=0.011, count=41)
     plain = [explained(t, x, 2.9 + 0.011 * k) for k in range(41)]
     # A phase of 10^4 turns is good to 10^-11 of a turn; three samples may see sine and cosine nearly alike.
     assert np.abs(found - plain).max() < 1e-8 * (x @ x)
-
-
-def test_the_answer_does_not_depend_on_how_memory_lies():
-    t, x = np.linspace(0.0, 9.0, 900), np.arange(1800.0) % 7.0
-    assert (
-        _core.sinusoid_power(t, x[::2], start_hz=1.0, step_hz=0.1, count=5)
-        == _core.sinusoid_power(t, x[::2].copy(), start_hz=1.0, step_hz=0.1, count=5)
-    ).all()
 
 
 def test_readings_need_as_many_times():

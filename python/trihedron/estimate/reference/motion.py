@@ -65,7 +65,7 @@ class MotionFit:
         own = places([side], tuple(self.places[k]))
         problem = side.problem(self.points[k], own[0], self.wider)
         strengths = self.fitted.strengths[k]
-        mean = together([problem], [equations(problem, strengths)]).mean
+        mean = together([problem], strengths[None]).mean
         change = {name: _si(side, name, self.wider) * mean[at] for name, at in own[0].items()}
         walked = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())[0] @ np.append(-mean, 1.0)
         change["b"] = change["b"] + walked[-3:]
