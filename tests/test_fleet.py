@@ -13,7 +13,6 @@ import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.cli import main
 from trihedron.fleet import find_jobs, running, summarise
-from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
 from trihedron.sanitise import printable
@@ -188,12 +187,6 @@ def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_pat
         assert printable(text) == text
     names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
     assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
-
-
-def test_the_diagnosis_of_a_log_is_in_its_row(logs):
-    row = work(str(logs / "unit_0" / "log_0.csv"), None, {"gravity_m_s2": G})
-    assert row["status"] == "done"
-    assert row["diagnosis"]["verdict"] == "consistent"
 
 
 @pytest.mark.filterwarnings("ignore")
