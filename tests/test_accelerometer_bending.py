@@ -27,9 +27,7 @@ def errors(rng, n, name):
     return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(covariance_by_bends(up, residual, sigma, G)))
 
 
-@pytest.mark.parametrize(
-    ("n", "name"), [(13, None), (13, "unlike-scales"), (18, "quadratic"), (36, None), (36, "cubic")]
-)
+@pytest.mark.parametrize(("n", "name"), [(13, None), (18, "quadratic"), (36, None), (36, "cubic")])
 def test_bars_hold_for_scatter_and_for_bending(name, n):
     rng, n_trials = np.random.default_rng([31, n]), 60
     before, after = (np.array(x) for x in zip(*(errors(rng, n, name) for _ in range(n_trials)), strict=True))
@@ -38,8 +36,7 @@ def test_bars_hold_for_scatter_and_for_bending(name, n):
     assert covered > binom.ppf(1e-3, n_trials, 0.95) / n_trials
     if name is not None:
         assert float(np.mean(np.abs(before) < 1.96)) < 0.75
-    many = 30
-    if n > many and name is None:
+    if n == 36 and name is None:
         # Many poses tell one from the other: uncertainties under scatter stay within half again of what they were.
         assert float(np.median(np.abs(after) / np.abs(before))) > 2.0 / 3.0
 

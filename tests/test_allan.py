@@ -7,7 +7,7 @@ import pytest
 from trihedron import _core
 from trihedron.estimate.noise.allan import KINDS, TYPES, allan_deviation
 from trihedron.estimate.noise.streamed import stream_noise
-from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
+from twins_noise import running_sum_in_long_double, weighted_hadamard, weighted_variance
 
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
 
@@ -45,8 +45,10 @@ def test_every_kind_agrees_with_allantools(kind, oracle):
     x = rng.normal(size=20000) + 0.01 * np.cumsum(rng.normal(size=20000))
     clusters = [1, 2, 3, 7, 10, 33, 100, 511, 1000, 3000, 6000]
     curve = allan_deviation(x, 50.0, clusters, kind)
-    taus, deviation, _, _ = oracle(x, rate=50.0, data_type="freq", taus=curve.tau_s)
+    taus, deviation, _, n_terms = oracle(x, rate=50.0, data_type="freq", taus=curve.tau_s)
     assert len(taus) == len(clusters)
+    if kind == "overlapping":
+        assert curve.n_terms.tolist() == n_terms.tolist()
     # The oracle keeps the mean in its running sum: 1e-10 leaves room for its rounding, ours is far below.
     assert curve.deviation == pytest.approx(deviation, rel=1e-10)
 
@@ -81,8 +83,8 @@ def test_missing_readings_are_weighted_as_defined():
 
 
 @pytest.mark.parametrize("kind", ["overlapping", "non-overlapping", "hadamard"])
-@pytest.mark.parametrize("share", [0.3])
-def test_readings_lost_here_and_there_bias_neither_white_noise_nor_a_random_walk(share, kind):
+def test_readings_lost_here_and_there_bias_neither_white_noise_nor_a_random_walk(kind):
+    share = 0.3
     rng = np.random.default_rng(9)
     clusters = [1, 2, 5, 20, 100, 500]
     for make in (lambda: rng.normal(size=20_000), lambda: 0.02 * np.cumsum(rng.normal(size=20_000))):
@@ -179,14 +181,6 @@ def test_intervals_of_the_total_deviation_hold_the_allan_deviation_under_quantis
         inside += (curve.lower**2 <= truth) & (truth <= curve.upper**2)
     # 95 % of 200, four binomial errors of 1.5 % either way; before, 40 % at the longest.
     assert np.all(np.abs(inside / runs - 0.95) < 0.062), inside / runs
-
-
-def test_overlapping_means_every_start():
-    x = np.random.default_rng(3).normal(size=300).cumsum()
-    curve = allan_deviation(x, 1.0, [1, 2, 7, 50, 149, 150])
-    assert curve.n_terms.tolist() == [299, 297, 287, 201, 3, 1]
-    for m, deviation in zip(curve.clusters, curve.deviation, strict=True):
-        assert deviation**2 == pytest.approx(overlapping_variance(x, m), rel=1e-12)
 
 
 def test_chunks_give_what_the_whole_array_gives():

@@ -152,11 +152,6 @@ def test_the_top_level_is_the_agreed_one():
     assert found <= allowed, found - allowed
 
 
-def test_nothing_is_called_utils():
-    for path in [*PACKAGE.rglob("*"), *(ROOT / "rust").rglob("*")]:
-        assert path.stem not in {"utils", "helpers", "common", "misc"}, path
-
-
 def test_nothing_below_the_verbs_knows_who_composes_it():
     lookups = set()
     for path in PACKAGE.rglob("*.py"):
@@ -183,40 +178,6 @@ def test_only_the_rooms_that_make_numbers_use_the_core():
 def test_no_file_outgrows_its_reader():
     sources = [*PACKAGE.rglob("*.py"), *(ROOT / "rust").rglob("*.rs")]
     assert not {str(p.relative_to(ROOT)) for p in sources if len(p.read_text().splitlines()) > LONGEST_FILE}
-
-
-def test_arrays_are_named_in_one_place():
-    twice = re.compile(r"^(FloatArray|IntArray|BoolArray)\b.*= ", re.MULTILINE)
-    named = [path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py*") if path.suffix in {".py", ".pyi"}]
-    assert [str(p) for p in named if twice.search((PACKAGE / p).read_text())] == ["arrays.py"]
-
-
-def test_axes_are_named_in_one_place():
-    """`AXES` and `XYZ` of arrays.py; what a log or a device calls its columns is the matter of its reader."""
-    literal = re.compile(r"""(['"])(xyz|XYZ)\1|\(["'][xX]["'], ["'][yY]["'], ["'][zZ]["']\)""")
-    rooms = {"read", "capture"}
-    found = [p for p in PACKAGE.rglob("*.py") if p.name != "arrays.py" and p.relative_to(PACKAGE).parts[0] not in rooms]
-    assert not [str(p.relative_to(PACKAGE)) for p in found if literal.search(p.read_text(encoding="utf-8"))]
-
-
-def test_no_call_across_the_seam_takes_ten_arguments():
-    """Arrays that belong together go as one object; one that is made by keywords may name as many as it has."""
-    calls = [n for n in ast.walk(ast.parse((PACKAGE / "_core.pyi").read_text())) if isinstance(n, ast.FunctionDef)]
-    count = {
-        n.name: len([a for a in n.args.args if a.arg not in ("self", "cls")])
-        + (n.name != "__new__") * len(n.args.kwonlyargs)
-        for n in calls
-    }
-    assert not {name: n for name, n in count.items() if n > MOST_ARGUMENTS}
-
-
-def test_arrays_are_converted_in_one_file_of_the_seam():
-    seam = ROOT / "rust" / "python"
-    for path in seam.rglob("*.rs"):
-        again = re.findall(
-            r"\bfn (rows3|vector3|matrix3|matrices3|matrix|square|vectors|flat[13]|samples)\b", path.read_text()
-        )
-        assert path.name in {"arrays.rs", "simulate.rs"} or not again, f"{path.name} converts by its own {again}"
 
 
 def functions():
@@ -283,10 +244,6 @@ def test_equations_that_the_code_cites_are_in_the_documents():
         cited += len(numbers)
         assert numbers <= known, f"{path.relative_to(ROOT)} cites {sorted(numbers - known)}"
     assert cited > 40
-
-
-def test_no_two_documents_give_one_number_to_two_equations():
-    assert [number for number, times in stated().items() if times > 1] == []
 
 
 def test_the_documents_name_files_that_exist():

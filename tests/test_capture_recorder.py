@@ -40,7 +40,7 @@ def header(path):
 
 
 def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads(tmp_path):
-    recording = counts_recording(400, 200.0)
+    recording = counts_recording(200, 200.0)
     with Board(recording, "xsens-mtdata2", speed=1.0) as board:
         recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=0.0)
     times = np.concatenate([block.time_s for block in blocks])
@@ -48,7 +48,7 @@ def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads(tmp_path):
     assert back.n_samples == len(times) == recorder.count.tally.saved
     assert recorder.count.lost == 0
     # The start may be lost to the reader that was not there yet; what is saved is in steps of the board's clock.
-    assert back.n_samples >= 300
+    assert back.n_samples >= 100
     assert np.allclose(np.diff(back.time_s), 0.005, atol=1e-9)
     assert back.auxiliary.keys() >= {"host_s", "frame", "device_ticks"}
     assert header(tmp_path / "log.csv")["frames"].startswith(f"{back.n_samples} saved / 0 lost")
@@ -91,44 +91,33 @@ def test_losses_stand_in_the_log_where_they_were(tmp_path):
     assert times[-1] == pytest.approx(1.99, abs=1e-9)
 
 
-def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path):
-    link = tmp_path / "tty"
-    faults = Faults(disconnect_s=(0.4,), away_s=0.5)
-    with Board(counts_recording(240, 200.0), "lines", faults=faults, speed=1.0, link=link) as board:
-        recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=1.5)
-    text = (tmp_path / "log.csv").read_text()
-    assert "went away (unplugged)" in text
-    assert "is back at" in text
-    assert recorder.count.disconnections == 2  # the board leaves for good at the end
-    times = np.concatenate([block.time_s for block in blocks])
-    steps = np.diff(times)
-    assert np.all(steps > 0)
-    # The gap is as long as the board was away, to the pace at which a port is looked for again.
-    assert 0.4 < steps.max() < 1.2
-    assert np.sort(steps)[-2] < 0.02
-    assert trihedron.read(tmp_path / "log.csv").n_samples == len(times)
-
-
-@pytest.mark.parametrize("protocol", ["xio"])
-def test_frames_cut_by_unplugging_are_counted_by_the_device_counter(protocol, tmp_path):
-    link = tmp_path / "tty"
+def test_an_unplugged_board_goes_on_in_the_same_file_with_gaps_said_and_cut_frames_counted(tmp_path):
     faults = Faults(disconnect_s=(0.4, 0.8), away_s=0.3)
-    board = Board(counts_recording(360, 300.0), protocol, faults=faults, speed=1.0, link=link)
+    board = Board(counts_recording(360, 300.0), "xio", faults=faults, speed=1.0, link=tmp_path / "tty")
     # The port is open before the first byte: nothing is lost for want of a reader.
     source = open_source(board.port)
     with board:
-        make = decoder_factory("lines" if protocol == "lines" else protocol, column_namer())
+        make = decoder_factory("xio", column_namer())
         recorder = Recorder(source, make, tmp_path / "log.csv", wait_for_return_s=1.5)
         blocks = list(recorder)
-    saved = sum(len(block.time_s) for block in blocks)
+    text = (tmp_path / "log.csv").read_text()
+    assert "went away (unplugged)" in text
+    assert "is back at" in text
     assert recorder.count.disconnections == 3  # the last is for good
-    assert saved + recorder.count.lost == 360
+    times = np.concatenate([block.time_s for block in blocks])
+    assert len(times) + recorder.count.lost == 360
     # The index of every frame is the one that the device gave it, whatever was cut.
-    assert np.concatenate([block.index for block in blocks])[-1] == 359
+    assert blocks[-1].index[-1] == 359
+    steps = np.sort(np.diff(times))
+    assert steps[0] > 0
+    # Two gaps as long as the board was away, to the pace at which a port is looked for again.
+    assert 0.2 < steps[-2] < steps[-1] < 1.0
+    assert steps[-3] < 0.02
+    assert trihedron.read(tmp_path / "log.csv").n_samples == len(times)
 
 
 def test_the_baud_rate_is_found_by_itself():
-    with Board(counts_recording(1500, 250.0), "lines", speed=1.0, baud=57_600) as board:
+    with Board(counts_recording(1000, 250.0), "lines", speed=1.0, baud=57_600) as board:
         source, found = open_device(board.port)
         assert source.baud == 57_600
         assert found.protocol == "lines"
@@ -149,9 +138,8 @@ def test_two_clocks_are_fitted_along_the_earliest_arrivals():
     assert line.jitter_rms_s == pytest.approx(0.004, rel=0.1)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_device_clock_in_error_is_found_within_its_error_bar(seed):
-    rng = np.random.default_rng(seed)
+def test_a_device_clock_in_error_is_found_within_its_error_bar():
+    rng = np.random.default_rng(0)
     ratios = []
     for _ in range(30):
         fit = ClockFit()
@@ -260,26 +248,16 @@ def test_bad_input_is_refused_in_one_sentence_with_status_1(words, sentence, tmp
     assert not (tmp_path / "log.csv").exists()
 
 
-def test_a_silent_board_is_told_from_a_wrong_protocol():
+def test_a_silent_board_is_told_from_a_wrong_protocol_and_a_busy_port_is_named():
     import pty
 
     master, slave = pty.openpty()
     source = open_source(os.ttyname(slave))
+    with pytest.raises(CaptureError, match="in use by another program"):
+        open_source(os.ttyname(slave))
     with pytest.raises(CaptureError, match="not one byte came in"):
         find_protocol(source, baud=115_200, silence_s=0.5)
     source.close()
-    os.close(master)
-    os.close(slave)
-
-
-def test_a_busy_port_is_named_as_busy():
-    import pty
-
-    master, slave = pty.openpty()
-    first = open_source(os.ttyname(slave))
-    with pytest.raises(CaptureError, match="in use by another program"):
-        open_source(os.ttyname(slave))
-    first.close()
     os.close(master)
     os.close(slave)
 

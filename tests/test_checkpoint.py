@@ -53,8 +53,8 @@ def stop_after(monkeypatch, times):
     monkeypatch.setattr(Checkpoint, "keep", counted)
 
 
-@pytest.mark.parametrize("times", [3])
-def test_blocks_of_a_stopped_run_are_those_of_one_run(path, tmp_path, monkeypatch, times):
+def test_blocks_of_a_stopped_run_are_those_of_one_run(path, tmp_path, monkeypatch):
+    times = 3
     monkeypatch.setattr(streaming, "PIECE_ROWS", 700)
     kept = tmp_path / "pass"
     with monkeypatch.context() as patch:
@@ -77,9 +77,8 @@ def test_blocks_of_a_stopped_run_are_those_of_one_run(path, tmp_path, monkeypatc
     assert not kept.exists()
 
 
-@pytest.mark.parametrize("clusters", [None, [1, 7, 100, 65536, 70000, 300000]])
-@pytest.mark.parametrize("cut", [5])
-def test_an_allan_stream_goes_on_to_the_same_bits(clusters, cut):
+def test_an_allan_stream_goes_on_to_the_same_bits():
+    clusters, cut = [1, 7, 100, 65536, 70000, 300000], 5
     rng = np.random.default_rng(4)
     chunks = [0.1 + rng.standard_normal((k, 2)) for k in (200_000, 3, 262_144, 1, 150_000, 99_999)]
     states = []

@@ -78,9 +78,8 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
     said = refused(capsys, "calibrate", two)
     assert "two.csv" in said
     assert "poses" in said
-    rng = np.random.default_rng(1)
-    time_s = np.arange(3000) / 100.0
-    swing = 9.8 * np.sin(np.outer(time_s, [2.1, 3.3, 4.7])) + rng.normal(size=(3000, 3))
+    time_s = np.arange(1500) / 100.0
+    swing = 9.8 * np.sin(np.outer(time_s, [2.1, 3.3, 4.7])) + np.random.default_rng(1).normal(size=(1500, 3))
     moving = Recording(time_s, swing, 2.0 * np.cos(np.outer(time_s, [2.1, 3.3, 4.7])), 100.0)
     shaken = tmp_path / "shaken.csv"
     shaken.write_text(log_text(moving))

@@ -18,8 +18,6 @@ from trihedron.report.findings.wording import places
 ROOT = Path(__file__).parents[1]
 DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
 AT_REST = {"at-rest", "at-rest-counts"}
-# Names of variants, which are data: they stand in a diagnosis for machines.
-NAMES = re.compile(r"[, ]+ms|(accelerometer|gyro), per axis|second order|common scale")
 
 
 def ours():
@@ -41,6 +39,7 @@ def cases_of(effect):
 def test_every_effect_has_its_words_and_every_word_its_effect():
     assert set(CATALOGUE) == {effect.id for effect in ours()}
     assert all(entry.mechanism and entry.experiment for entry in CATALOGUE.values())
+    assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == set(CATALOGUE)
 
 
 def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
@@ -68,37 +67,6 @@ def test_every_reason_is_given_somewhere_and_with_its_places():
     assert set(given) == set(REASONS)
 
 
-def written(path):
-    """(line, text) of every string of a file that is no docstring or refusal; of one with places, the text between."""
-    tree = ast.parse(path.read_text())
-    skipped = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            skipped.add(id(node.value))
-        if isinstance(node, ast.Raise):  # a refusal speaks for itself
-            skipped |= {id(part) for part in ast.walk(node)}
-        if isinstance(node, ast.JoinedStr):
-            skipped |= {id(part) for part in ast.walk(node) if part is not node}
-            texts = [part.value for part in node.values if isinstance(part, ast.Constant)]
-            yield node.lineno, "".join(texts)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped:
-            yield node.lineno, node.value
-
-
-@pytest.mark.parametrize("room", ["effects", "rest", "against", "residuals"])
-def test_an_effect_writes_no_sentence(room):
-    files = sorted((DIAGNOSE / room).glob("*.py"))
-    assert files
-    prose = [
-        f"{path.name}:{line}: {text!r}"
-        for path in files
-        for line, text in written(path)
-        if " " in text.strip() and not NAMES.fullmatch(text.strip())
-    ]
-    assert prose == []
-
-
 class Own(Effect):
     """As a user's file adds one, but without an id of its own: it stays out of the catalogue."""
 
@@ -117,7 +85,3 @@ def test_an_effect_of_a_users_own_file_brings_its_own_words():
     assert own.separating_experiment() == "wait a fortnight"
     with pytest.raises(KeyError):
         own.told("no such case")
-
-
-def test_the_documents_list_the_effects_as_the_catalogue_has_them():
-    assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == set(CATALOGUE)

@@ -60,17 +60,15 @@ def assignments(text):
     return {m[1]: np.array(numbers(m[2])) for m in re.finditer(r"(\w+) = \{([^}]*)\};", text)}
 
 
-@pytest.mark.parametrize("handed", [1.0, -1.0])
-def test_python_snippet_runs_and_agrees(handed):
-    known = calibration("counts", handed)
+@pytest.mark.parametrize(("handed", "frame"), [(1.0, "lower"), (-1.0, "lower"), (1.0, "symmetric")])
+def test_python_snippet_runs_and_agrees(handed, frame):
+    known = in_frame(calibration("counts", handed), frame)
     scope = {}
     exec(export_calibration(known, "python"), scope)
-    np.testing.assert_allclose(
-        scope["correct"](READINGS, scope["S_ACCELEROMETER"], scope["B_ACCELEROMETER"]), corrected(known.accelerometer)
-    )
-    np.testing.assert_allclose(
-        scope["correct"](READINGS, scope["S_GYROSCOPE"], scope["B_GYROSCOPE"]), corrected(known.gyroscope)
-    )
+    for name, sensor in (("ACCELEROMETER", known.accelerometer), ("GYROSCOPE", known.gyroscope)):
+        np.testing.assert_allclose(
+            scope["correct"](READINGS, scope[f"S_{name}"], scope[f"B_{name}"]), corrected(sensor)
+        )
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
@@ -175,6 +173,12 @@ def test_kalibr_distorts_truth_into_the_readings(mirrored):
     measured = rate @ (gyro["M"] @ C).T + force @ (gyro["A"] @ C).T + gyro["b"]
     # The gyro that follows specific force reads S⁻¹ (ω + G f - b).
     np.testing.assert_allclose(measured, READINGS + force @ (np.linalg.inv(known.gyroscope.S) @ G).T, **ROUNDING)
+
+
+def test_a_symmetric_frame_is_turned_before_a_triangular_convention_is_written():
+    known = calibration("si")
+    M = yaml.safe_load(export_calibration(in_frame(known, "symmetric"), "kalibr", NOISE))["accelerometers"]["M"]
+    np.testing.assert_allclose(M, np.linalg.inv(known.accelerometer.S), **ROUNDING)
 
 
 def test_openvins_corrects_the_readings():
@@ -311,17 +315,9 @@ def test_pyins_distorts_truth_into_the_readings():
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
     options = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
-    alone = replace(known, gyroscope=None, covariance=np.zeros((12, 12)))
-    assert export_calibration(alone, target, options)
+    assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, options)
     serious = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "it did not settle.")
     assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, options)
-
-
-def test_a_symmetric_frame_is_turned_before_a_triangular_convention_is_written():
-    known = in_frame(calibration("si"), "symmetric")
-    M = np.array(yaml.safe_load(export_calibration(known, "kalibr", NOISE))["accelerometers"]["M"])
-    lower = in_frame(known, "lower")
-    np.testing.assert_allclose(M, np.linalg.inv(lower.accelerometer.S), **ROUNDING)
 
 
 def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path, capsys):
@@ -331,46 +327,19 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert {p.name for p in tmp_path.glob("*.calib")} == {"unit_acc.calib", "unit_gyro.calib"}
     assert main(["export", str(file), "--to", "imu_tk", "-o", str(tmp_path / "unit.calib")]) == 1
     assert "unit_acc.calib" in capsys.readouterr().err
+    # Several that are called alike take the names of their folders.
+    (tmp_path / "b").mkdir()
+    other = tmp_path / "b" / "c.json"
+    write_calibration(calibration("si"), other)
+    assert main(["export", str(file), str(other), "--to", "c", "-o", str(tmp_path / "out")]) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["b_c.c", f"{tmp_path.name}_c.c"]
+    assert main(["export", str(file), str(file), "--to", "c", "-o", str(tmp_path / "same")]) == 1
+    assert "names that differ" in capsys.readouterr().err
     assert main(["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb", "0.01 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err
 
 
-def test_several_calibrations_that_are_called_alike_take_the_names_of_their_folders(tmp_path, capsys):
-    files = []
-    for unit in ("a", "b"):
-        (tmp_path / unit).mkdir()
-        write_calibration(calibration("si"), tmp_path / unit / "cal.json")
-        files.append(str(tmp_path / unit / "cal.json"))
-    assert main(["export", *files, "--to", "c", "-o", str(tmp_path / "out")]) == 0
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a_cal.c", "b_cal.c"]
-    assert main(["export", files[0], files[0], "--to", "c", "-o", str(tmp_path / "same")]) == 1
-    assert "names that differ" in capsys.readouterr().err
-
-
-def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
-    rng = np.random.default_rng(3)
-    t = np.arange(60_000) / 100.0
-    readings = np.hstack(
-        [1e-2 * rng.standard_normal((len(t), 3)) + [0, 0, 9.81], 1e-3 * rng.standard_normal((len(t), 3))]
-    )
-    table = np.column_stack([t, readings])
-    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
-    np.savetxt(tmp_path / "rest.csv", table, delimiter=",", header=head, comments="", fmt="%.9g")
-    assert main(["allan", str(tmp_path / "rest.csv"), "--json", str(tmp_path / "allan.json")]) == 0
-    file = tmp_path / "c.json"
-    write_calibration(calibration("si"), file)
-    capsys.readouterr()
-    assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "allan.json")]) == 0
-    document = yaml.safe_load(capsys.readouterr().out)
-    # White noise of 1e-2 at 100 Hz is 1e-3 per √Hz; 60 000 samples know it to 0.3 %.
-    assert document["accelerometer_noise_density"] == pytest.approx(1e-3, rel=0.02)
-    assert document["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.02)
-    assert document["update_rate"] == pytest.approx(100.0, rel=1e-3)
-    assert main(["export", str(file), "--to", "kalibr", "--noise", str(file)]) == 1
-    assert "trihedron allan --json" in capsys.readouterr().err
-
-
-def test_the_list_of_targets_says_what_each_cannot_be_written_without(capsys):
+def test_the_list_of_targets_says_what_each_needs_and_files_out_of_order_are_refused(tmp_path, capsys):
     assert main(["export", "--to", "list"]) == 0
     listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()[1:])
     assert listed["kalibr*"] == "--noise --rate"
@@ -378,9 +347,6 @@ def test_the_list_of_targets_says_what_each_cannot_be_written_without(capsys):
     assert listed["c"] == "–"
     assert main(["export", "--to", "c"]) == 1
     assert "name a calibration file" in capsys.readouterr().err
-
-
-def test_a_log_in_place_of_a_calibration_is_told_the_order(tmp_path, capsys):
     (tmp_path / "log.csv").write_text("t,ax,ay,az\n0,0,0,9.8\n")
     assert main(["apply", str(tmp_path / "log.csv"), "cal.json"]) == 1
     assert "it comes before the log" in capsys.readouterr().err

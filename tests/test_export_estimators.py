@@ -7,6 +7,8 @@ import pytest
 import yaml
 
 from test_export import NOISE, READINGS, ROUNDING, calibration
+from trihedron.cli import main
+from trihedron.files.calibration import write_calibration
 from trihedron.files.formats import export_calibration
 
 RATE, STEPS = 200.0, 1000
@@ -89,3 +91,23 @@ def test_imu_calib_corrects_the_accelerometer_as_apply_does():
     p = yaml.safe_load(export_calibration(known, "imu_calib"))
     made = READINGS @ np.reshape(p["SM"], (3, 3)).T - p["bias"]
     np.testing.assert_allclose(made, READINGS @ known.accelerometer.S.T + known.accelerometer.b, **ROUNDING)
+
+
+def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    t = np.arange(20_000) / 100.0
+    table = np.column_stack([t, [0, 0, 9.81, 0, 0, 0] + np.repeat([1e-2, 1e-3], 3) * rng.standard_normal((len(t), 6))])
+    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    np.savetxt(tmp_path / "rest.csv", table, delimiter=",", header=head, comments="", fmt="%.9g")
+    assert main(["allan", str(tmp_path / "rest.csv"), "--json", str(tmp_path / "allan.json")]) == 0
+    file = tmp_path / "c.json"
+    write_calibration(calibration("si"), file)
+    capsys.readouterr()
+    assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "allan.json")]) == 0
+    document = yaml.safe_load(capsys.readouterr().out)
+    # White noise of 1e-2 at 100 Hz is 1e-3 per √Hz; 20 000 samples know it to 0.5 %.
+    assert document["accelerometer_noise_density"] == pytest.approx(1e-3, rel=0.02)
+    assert document["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.02)
+    assert document["update_rate"] == pytest.approx(100.0, rel=1e-3)
+    assert main(["export", str(file), "--to", "kalibr", "--noise", str(file)]) == 1
+    assert "trihedron allan --json" in capsys.readouterr().err

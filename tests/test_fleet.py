@@ -11,7 +11,6 @@ import pytest
 
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
-from trihedron.cli import main
 from trihedron.fleet import find_jobs, running, summarise
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
@@ -40,7 +39,7 @@ def done(logs, tmp_path_factory):
     return trihedron.fleet(logs, out, workers=0, diagnose=False, gravity_m_s2=G), out
 
 
-def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
+def test_every_log_has_its_row_and_file_the_bad_one_its_reason_and_the_device_that_changed_its_name(done):
     result, out = done
     table = polars.read_parquet(out / "fleet.parquet")
     assert table.height == 5
@@ -52,25 +51,14 @@ def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
     zero = table.filter(polars.col("status") == "done")["gyro_bias_x_rad_s"]
     # Zeros along the axis: -(M b) with scales within 2 % of one.
     np.testing.assert_allclose(sorted(-zero), sorted([0.01, 0.01, 0.015, 0.035]), rtol=0.05, atol=1e-3)
-
-
-def test_the_calibration_of_every_log_is_a_file_that_goes_into_another_programs(done, tmp_path):
-    _, out = done
+    # The calibration of every log is a file that goes into another program's.
     files = sorted((out / "calibrations").iterdir())
     assert [file.name[:12] for file in files] == [f"unit_{u}_log_{s}" for u in range(2) for s in range(2)]
     assert trihedron.read_calibration(files[0]).accelerometer.quality is not None
-    assert main(["export", *map(str, files), "--to", "xio", "-o", str(tmp_path / "out")]) == 0
-    assert len(list((tmp_path / "out").iterdir())) == 4
-
-
-def test_the_page_names_the_device_that_changed(done):
-    result, out = done
     moved = [(c.group, c.id) for c in result.summary.changes if c.significant]
     assert moved == [("unit_1", "gyro-bias")]
     page = (out / "fleet.html").read_text()
-    assert "unit_1" in page
-    assert "notes.txt" in page
-    assert "<svg" in page
+    assert all(said in page for said in ("unit_1", "notes.txt", "<svg"))
 
 
 def test_logs_that_are_done_are_not_done_again(logs, done, monkeypatch):
@@ -85,18 +73,16 @@ def test_logs_that_are_done_are_not_done_again(logs, done, monkeypatch):
     assert again.n_done == 4
 
 
-def test_other_bytes_options_or_devices_make_another_key(logs, tmp_path):
-    keys = {job.key for job in find_jobs(logs, {"gravity_m_s2": G})}
+def test_other_bytes_options_or_devices_make_another_key_and_devices_are_named_by_folder_or_expression(logs, tmp_path):
+    jobs = find_jobs(logs, {"gravity_m_s2": G})
+    keys = {job.key for job in jobs}
     assert len(keys) == 5
     assert not keys & {job.key for job in find_jobs(logs, {"gravity_m_s2": 9.8})}
     path = logs / "unit_0" / "log_0.csv"
     changed = tmp_path / "log_0.csv"
     changed.write_bytes(path.read_bytes() + b"\n")
     assert find_jobs(changed, {})[0].key != find_jobs(path, {})[0].key
-
-
-def test_devices_are_named_by_the_folder_or_by_an_expression(logs):
-    assert {job.serial for job in find_jobs(logs, {})} == {"unit_0", "unit_1"}
+    assert {job.serial for job in jobs} == {"unit_0", "unit_1"}
     assert {job.serial for job in find_jobs(logs, {}, serial=r"unit_(\d)")} == {"0", "1"}
     with pytest.raises(ValueError, match="one group"):
         find_jobs(logs, {}, serial="unit")
@@ -111,6 +97,8 @@ def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, mon
     from trihedron.api import calibrating
 
     path = logs / "unit_0" / "log_0.csv"
+    # Whole, with its diagnosis; whoever imports `calibrate` has then done so.
+    assert work(str(path), None, {"gravity_m_s2": G})["diagnosis"]["verdict"] == "consistent"
     with monkeypatch.context() as patch:
         patch.setattr(calibrating, "calibrate", defect)
         first = trihedron.fleet(path, tmp_path, workers=0, diagnose=False, gravity_m_s2=G)
@@ -188,12 +176,6 @@ def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_pat
         assert printable(text) == text
     names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
     assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
-
-
-def test_the_diagnosis_of_a_log_is_in_its_row(logs):
-    row = work(str(logs / "unit_0" / "log_0.csv"), None, {"gravity_m_s2": G})
-    assert row["status"] == "done"
-    assert row["diagnosis"]["verdict"] == "consistent"
 
 
 @pytest.mark.filterwarnings("ignore")

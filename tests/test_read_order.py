@@ -15,7 +15,7 @@ def overtaken(n, seed=0):
     return ordered[np.argsort(late, kind="stable")], ordered
 
 
-def test_rows_of_a_text_log_are_put_in_order(tmp_path):
+def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_path):
     given, ordered = overtaken(5000)
     path = tmp_path / "log.csv"
     np.savetxt(path, given, delimiter=",", header=",".join(NAMES), comments="", fmt="%.6f")
@@ -23,10 +23,6 @@ def test_rows_of_a_text_log_are_put_in_order(tmp_path):
     assert "time-backward" in {finding.code.value for finding in recording.findings}
     np.testing.assert_allclose(recording.accelerometer, ordered[:, 1:4], atol=1e-6)
     np.testing.assert_allclose(recording.gyroscope, ordered[:, 4:], atol=1e-6)
-
-
-def test_arrays_of_the_caller_stay_as_they_were():
-    given, ordered = overtaken(5000)
     force, rate = np.ascontiguousarray(given[:, 1:4]), np.ascontiguousarray(given[:, 4:])
     before = force.copy(), rate.copy()
     recording = trihedron.read({"t": given[:, 0].copy(), "acc": force, "gyr": rate})

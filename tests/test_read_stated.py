@@ -6,7 +6,7 @@ import pytest
 import test_read_in_silence as texts
 import trihedron
 from trihedron.read import ReadError, read_recording
-from trihedron.read.names import clock_said, is_rate, known_unit, parse_name
+from trihedron.read.names import clock_said, known_unit, parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -31,32 +31,31 @@ def doubts(recording):
         ("# timestamp unit: us\n", "timestamp", 1e6),
         ("", "ticks_25 us", 40000.0),
         ("", "ticks / 62.5 us", 16000.0),
+        ("", "ticks (1/32768 s)", 32768.0),
+        ("", "Zeit (h)", 1 / 3600),
     ],
 )
 def test_the_size_of_a_tick_is_taken_from_where_it_is_stated(tmp_path, remark, name, per_s):
-    recording = read_recording(written(tmp_path / "log.csv", np.rint(T * per_s).astype(int), f"{name},{NAMES}", remark))
+    recording = read_recording(
+        written(
+            tmp_path / "log.csv", np.rint(T * per_s).astype(int) if per_s > 1 else T * per_s, f"{name},{NAMES}", remark
+        )
+    )
     # Ticks of 62.5 us round the time to 3e-3 of a step.
     assert recording.rate_hz == pytest.approx(50.0, rel=1e-3)
     assert not doubts(recording)
+    # Of other times nothing is said.
+    assert not any(clock_said(*said) for said in (("start time", "5 s"), ("exposure time", "ms"), ("time", "25 us")))
 
 
-def test_remarks_about_other_times_are_no_tick():
-    assert not clock_said("start time", "5 s")
-    assert not clock_said("exposure time", "ms")
-    assert not clock_said("time", "25 us")
+OF_THE_RATE = ("# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz")
 
 
-@pytest.mark.parametrize("remark", ["# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz"])
-def test_a_remark_about_the_rate_is_known_by_its_words(tmp_path, remark):
+@pytest.mark.parametrize("remark", [*OF_THE_RATE, "# fs = 4 g", "# baud rate: 115200", "# i2c frequency: 400000"])
+def test_a_remark_about_the_rate_is_known_by_its_words_and_a_full_scale_is_none(tmp_path, remark):
     recording = read_recording(written(tmp_path / "log.csv", range(len(T)), f"n,{NAMES}", remark + "\n"))
-    assert recording.rate_hz == pytest.approx(50.0)
-
-
-@pytest.mark.parametrize("remark", ["# fs = 4 g", "# baud rate: 115200", "# i2c frequency: 400000"])
-def test_a_full_scale_and_other_rates_are_no_sampling_rate(tmp_path, remark):
-    recording = read_recording(written(tmp_path / "log.csv", range(len(T)), f"n,{NAMES}", remark + "\n"))
-    assert FindingCode.RATE_ASSUMED in doubts(recording)
-    assert not is_rate("baud rate")
+    assert (FindingCode.RATE_ASSUMED in doubts(recording)) == (remark not in OF_THE_RATE)
+    assert remark not in OF_THE_RATE or recording.rate_hz == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(
@@ -79,13 +78,9 @@ def test_a_unit_is_known_alike_in_names_remarks_and_options(sensor, text, unit):
         assert {parse_name(stem + form.format(text)).unit for form in (" [{}]", " ({})", "_{}", " / {}")} == {unit}
 
 
-def test_a_converters_name_with_a_unit_is_in_that_unit():
-    assert parse_name("gyroADC[0] dps").unit == "deg/s"
-    assert parse_name("gyroADC[0]").unit == "counts"
-
-
-def test_a_converter_gives_no_counts_of_microdegrees():
-    assert parse_name("gyro_x [microdps]").unit == "microdps"
+def test_a_converters_name_with_a_unit_is_in_that_unit_and_no_counts_of_microdegrees():
+    names = {"gyroADC[0] dps": "deg/s", "gyroADC[0]": "counts", "gyro_x [microdps]": "microdps"}
+    assert {name: parse_name(name).unit for name in names} == names
 
 
 def test_whole_seconds_and_nanoseconds_belong_together_above_a_row_of_units(tmp_path):

@@ -28,7 +28,7 @@ def log(rate_hz, unit_s, n=3000, poses=False, seed=1, whole=None):
 
 
 @pytest.mark.parametrize("poses", [False, True])
-@pytest.mark.parametrize("rate_hz", [1.0, 2.0, 4.0, 5.0])
+@pytest.mark.parametrize("rate_hz", [1.0, 4.0])
 def test_seconds_of_a_slow_log_are_not_read_as_milliseconds(tmp_path, rate_hz, poses):
     recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, 1.0, poses=poses)))
     assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)
@@ -41,19 +41,16 @@ def test_poses_that_change_within_a_row_tell_a_log_of_many_seconds_a_row(tmp_pat
     assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
 
 
-@pytest.mark.parametrize(("rate_hz", "unit_s"), [(100, 1e-3), (200, 1e-3), (500, 1e-3), (100, 1e-6), (1000, 1e-6)])
+@pytest.mark.parametrize(("rate_hz", "unit_s"), [(100, 1e-3), (500, 1e-3), (1000, 1e-6)])
 @pytest.mark.parametrize("poses", [False, True])
 def test_ticks_of_ordinary_rates_stay_what_they_are(tmp_path, rate_hz, unit_s, poses):
     recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, unit_s, 8000, poses)))
     assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)
 
 
-def test_milliseconds_at_1_khz_are_told_from_seconds_by_how_smoothly_gravity_turns(tmp_path):
-    recording = read_recording(write(tmp_path / "log.csv", log(1000.0, 1e-3, 20000, poses=True)))
-    assert recording.rate_hz == pytest.approx(1000, rel=1e-6)
-
-
-def test_a_step_of_one_at_rest_is_a_second_and_the_doubt_is_said(tmp_path):
+def test_a_step_of_one_is_a_second_at_rest_and_in_doubt_and_a_millisecond_where_gravity_turns_smoothly(tmp_path):
+    turning = read_recording(write(tmp_path / "log.csv", log(1000.0, 1e-3, 20000, poses=True)))
+    assert turning.rate_hz == pytest.approx(1000, rel=1e-6)
     found = finding(read_recording(write(tmp_path / "log.csv", log(1.0, 1.0))), FindingCode.TIME_UNIT_DETECTED)
     assert found.severity is Severity.SERIOUS  # a gyro's scale hangs on it
     assert "ms (1000 Hz)" in found.seen
@@ -69,7 +66,7 @@ def test_whole_seconds_that_a_hundred_rows_share_are_seconds_beyond_doubt(tmp_pa
     assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
 
 
-@pytest.mark.parametrize("rate_hz", [0.1, 0.5, 1.0, 5.0])
+@pytest.mark.parametrize("rate_hz", [0.1, 1.0])
 def test_a_named_unit_holds_at_any_rate(tmp_path, rate_hz):
     recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, 1.0), HEADER.replace("t,", "t_s,")))
     assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)

@@ -74,21 +74,16 @@ def session():
     ids=["hand", "short holds", "long holds", "jerky", "slow moves", "table turns"],
 )
 def test_every_true_hold_is_found_once(motion, least, grade):
-    for seed in (1, 2):
-        recording, truth = simulate(scenario(motion, grade), seed)
-        segments = segment_recording(recording)
-        assert segments.n_poses == len(truth.poses)
-        assert overlaps(segments, truth).min() > least
+    recording, truth = simulate(scenario(motion, grade), 1)
+    segments = segment_recording(recording)
+    assert segments.n_poses == len(truth.poses)
+    assert overlaps(segments, truth).min() > least
 
 
-def test_no_sample_of_a_move_is_averaged(session):
-    recording, truth = session
-    for found, true in zip(segment_recording(recording).poses, truth.poses, strict=True):
-        assert true.start <= found.start < found.stop <= true.stop
-
-
-def test_moves_join_neighbouring_holds_without_loss(session):
+def test_moves_join_neighbouring_holds_without_loss_and_none_of_their_samples_is_averaged(session):
     segments = segment_recording(session[0])
+    for found, true in zip(segments.poses, session[1].poses, strict=True):
+        assert true.start <= found.start < found.stop <= true.stop
     assert len(segments.moves) == segments.n_poses - 1
     for move in segments.moves:
         assert move.start == segments.poses[move.pose_before].stop
@@ -98,13 +93,8 @@ def test_moves_join_neighbouring_holds_without_loss(session):
 @pytest.mark.parametrize("only", ["accelerometer", "gyroscope"])
 def test_one_sensor_alone_finds_the_same_holds(session, only):
     recording, truth = session
-    alone = Recording(
-        time_s=recording.time_s,
-        accelerometer=recording.accelerometer if only == "accelerometer" else None,
-        gyroscope=recording.gyroscope if only == "gyroscope" else None,
-        rate_hz=recording.rate_hz,
-    )
-    segments = segment_recording(alone)
+    other = "gyroscope" if only == "accelerometer" else "accelerometer"
+    segments = segment_recording(replace(recording, **{other: None}))
     assert segments.n_poses == len(truth.poses)
     assert (segments.gyroscope_mean is None) == (only == "accelerometer")
 
@@ -112,20 +102,14 @@ def test_one_sensor_alone_finds_the_same_holds(session, only):
 def test_a_log_that_begins_in_motion_is_segmented_alike(session):
     recording, truth = session
     cut = truth.moves[0].start + 30
-    late = Recording(
-        recording.time_s[cut:] - recording.time_s[cut],
-        recording.accelerometer[cut:],
-        recording.gyroscope[cut:],
-        recording.rate_hz,
-        recording.accelerometer_unit,
-        recording.gyroscope_unit,
-    )
+    accelerometer, gyroscope = recording.accelerometer[cut:], recording.gyroscope[cut:]
+    late = Recording(recording.time_s[cut:] - recording.time_s[cut], accelerometer, gyroscope, 100.0)
     segments = segment_recording(late)
     assert segments.n_poses == len(truth.poses) - 1
     assert FindingCode.NO_INITIAL_POSE in codes(segments)
 
 
-@pytest.mark.parametrize("rate_deg_s", [0.3, 1.0, 5.0])
+@pytest.mark.parametrize("rate_deg_s", [0.3, 5.0])
 def test_a_slow_turn_about_gravity_is_not_stillness(rate_deg_s):
     steps = [Pose(8.0)]
     for face in FACES:
@@ -175,9 +159,7 @@ def test_a_pose_held_in_the_hand_is_told_from_a_table():
     along = int(np.abs(accelerometer[rows].mean(axis=0) - accelerometer.mean(axis=0)).argmax())
     accelerometer[rows] += 60.0 * tremor * (np.arange(3) != along)
     gyroscope[rows] += 60.0 * tremor
-    segments = segment_recording(
-        Recording(t, accelerometer, gyroscope, 100.0, recording.accelerometer_unit, recording.gyroscope_unit)
-    )
+    segments = segment_recording(replace(recording, accelerometer=accelerometer, gyroscope=gyroscope))
     assert segments.n_poses == 12
     assert [h.index for h in segments.poses if h.is_unsteady] == [6]
     assert FindingCode.POSE_UNSTEADY in codes(segments)
@@ -196,11 +178,7 @@ def test_missing_rows_and_gaps_in_time_cost_only_themselves(session):
     time_s = recording.time_s.copy()
     lost = truth.poses[4].start + 150
     time_s[lost:] += 1.2
-    segments = segment_recording(
-        Recording(
-            time_s, accelerometer, recording.gyroscope, 100.0, recording.accelerometer_unit, recording.gyroscope_unit
-        )
-    )
+    segments = segment_recording(Recording(time_s, accelerometer, recording.gyroscope, 100.0))
     assert segments.n_poses == len(truth.poses)
     assert np.isfinite(segments.accelerometer_mean).all()
 
@@ -208,9 +186,7 @@ def test_missing_rows_and_gaps_in_time_cost_only_themselves(session):
 def test_a_converter_coarser_than_the_noise_still_shows_the_poses():
     recording, truth = simulate(scenario(hand_session(12)), 2)
     coarse = [64.0 * np.round(a / 64.0) for a in (recording.accelerometer, recording.gyroscope)]
-    segments = segment_recording(
-        Recording(recording.time_s, *coarse, 100.0, recording.accelerometer_unit, recording.gyroscope_unit)
-    )
+    segments = segment_recording(Recording(recording.time_s, *coarse, 100.0))
     assert segments.n_poses == len(truth.poses)
     # Rounding without dither cannot be averaged away: the error of a mean stays near q/√12 = 18 counts or below.
     assert segments.gyroscope_sigma_mean.min() > 5.0
@@ -220,19 +196,14 @@ def test_axes_of_very_different_noise_are_weighed_alike(session):
     recording, truth = session
     rng = np.random.default_rng(6)
     gyroscope = recording.gyroscope + rng.normal(size=recording.gyroscope.shape) * [0.0, 30.0, 300.0]
-    louder = Recording(
-        recording.time_s, recording.accelerometer, gyroscope, 100.0, recording.accelerometer_unit,
-        recording.gyroscope_unit,
-    )  # fmt: skip
-    assert segment_recording(louder).n_poses == len(truth.poses)
+    assert segment_recording(replace(recording, gyroscope=gyroscope)).n_poses == len(truth.poses)
 
 
-def made_session(seed, noise_of):
-    """Twenty holds of known mean with smooth moves between, and the given noise on six channels."""
+def made_session(seed):
+    """Twenty holds of known mean with smooth moves between, and white noise on six channels."""
     rng = np.random.default_rng(seed)
     lengths = (100.0 * rng.uniform(2.4, 8.0, 20)).astype(int)
-    n_move = 150
-    u = np.linspace(0.0, 1.0, n_move)
+    u = np.linspace(0.0, 1.0, 150)
     shape = 6 * u**5 - 15 * u**4 + 10 * u**3
     parts, truth, pose = [], [], np.zeros(3)
     for k, length in enumerate(lengths):
@@ -244,36 +215,23 @@ def made_session(seed, noise_of):
             pose = new
         parts.append(np.hstack([np.tile(pose, (length, 1)), np.zeros((length, 3))]))
         truth.append([*pose, 0.0, 0.0, 0.0])
-    signal = np.vstack(parts)
-    noise = noise_of(rng, len(signal))
-    readings = signal + noise
-    return Recording(np.arange(len(readings)) / 100.0, readings[:, :3], readings[:, 3:], 100.0), np.array(truth), noise
-
-
-def white(rng, n):
-    return rng.normal(size=(n, 6))
-
-
-def standard_scores(noise_of, is_difference):
-    z = []
-    for seed in range(8):
-        recording, truth, _ = made_session(seed, noise_of)
-        segments = segment_recording(recording)
-        assert segments.n_poses == len(truth)
-        error = np.hstack([segments.accelerometer_mean, segments.gyroscope_mean]) - truth
-        sigma = np.hstack([segments.accelerometer_sigma_mean, segments.gyroscope_sigma_mean])
-        if is_difference:
-            error, sigma = np.diff(error, axis=0)[::2], np.hypot(sigma[1:], sigma[:-1])[::2]
-        z.append((error / sigma).ravel())
-    return np.concatenate(z)
+    readings = np.vstack(parts)
+    readings = readings + rng.normal(size=readings.shape)
+    return Recording(np.arange(len(readings)) / 100.0, readings[:, :3], readings[:, 3:], 100.0), np.array(truth)
 
 
 def test_error_bars_of_means_cover_under_white_noise():
-    z = standard_scores(white, is_difference=False)
-    n = len(z)
+    z = []
+    for seed in range(8):
+        recording, truth = made_session(seed)
+        segments = segment_recording(recording)
+        assert segments.n_poses == len(truth)
+        error = np.hstack([segments.accelerometer_mean, segments.gyroscope_mean]) - truth
+        z.append((error / np.hstack([segments.accelerometer_sigma_mean, segments.gyroscope_sigma_mean])).ravel())
+    z = np.concatenate(z)
     inside = int((np.abs(z) < 1.0).sum())
     # Slow terms cannot be excluded by a short log, so bars may be a few per cent long, never short.
-    assert inside >= stats.binom.ppf(0.001, n, stats.norm.cdf(1.0) - stats.norm.cdf(-1.0))
+    assert inside >= stats.binom.ppf(0.001, len(z), stats.norm.cdf(1.0) - stats.norm.cdf(-1.0))
     assert 0.8 < z.std() < 1.05
 
 
@@ -285,7 +243,7 @@ def test_a_log_that_never_rests_is_a_serious_finding():
     assert FindingCode.NOT_STATIC in codes(segments)
 
 
-@pytest.mark.parametrize("n", [1, 2, 10, 30, 60])
+@pytest.mark.parametrize("n", [1, 2, 60])
 def test_a_log_too_short_for_a_hold_is_a_finding_not_an_exception(n):
     rng = np.random.default_rng(n)
     short = Recording(np.arange(n) / 100.0, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), 100.0)

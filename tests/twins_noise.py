@@ -3,16 +3,6 @@
 import numpy as np
 
 
-def overlapping_variance(x, m):
-    """Mean of half the squared differences of neighbouring means, every start."""
-    x = np.asarray(x, dtype=np.longdouble)
-    terms = []
-    for k in range(len(x) - 2 * m + 1):
-        first, second = x[k : k + m], x[k + m : k + 2 * m]
-        terms.append((second.mean() - first.mean()) ** 2)
-    return float(np.mean(terms) / 2)
-
-
 def weighted_variance(x, m):
     """As above, means over the readings present; weight 2 c1 c2 / (m (c1 + c2))."""
     total = weight = 0.0
