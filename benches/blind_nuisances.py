@@ -29,8 +29,8 @@ import numpy as np
 import polars as pl
 
 import trihedron
-from blind_trial.running import command_line, tried, within
 from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, STRESSES, G, draw
+from trials import command_line, tried, within
 
 
 def trial(job):

@@ -29,8 +29,8 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from blind_trial.draw import grade_profile, moves_of, rows
-from blind_trial.running import command_line, tried, within
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
+from trials import command_line, tried, within
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.log import write_recording
 from trihedron.records import Recording

@@ -61,7 +61,7 @@ def subjects(rows: int) -> list[Subject]:
         Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", 1e-6),
         Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", 1e-6),
         Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", 1e-3),
-        Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
+        Subject("still", "Static detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
         Subject("read", text, "reading", "READ", rows, "s", 1.0, True),
     ]
 

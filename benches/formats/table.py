@@ -83,7 +83,7 @@ def main() -> int:
         target.write_text(
             "# Makers' layouts\n\nMade by `python benches/formats/table.py --write docs/reading-makers.md`: files laid "
             "out as each maker's program writes them (each generator of `tests/makers/` names the "
-            "document), read without a word from the user but what stands behind the name.\n\n" + text
+            "document), read without options except those given after the file's name.\n\n" + text
         )
     return int(wrong > 0)
 
