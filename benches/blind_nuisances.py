@@ -1,10 +1,10 @@
-"""Second blind trial: one flaw among the small faults of every real recording, from a generator of its own.
+"""Blind trial with nuisances: one flaw among the small faults of real recordings, from an independent generator.
 
     python benches/blind_nuisances.py --each 3 --seed 11            # every flaw three times, nuisances on
     python benches/blind_nuisances.py --each 2 --clean              # no nuisances
     python benches/blind_nuisances.py --only none --each 30         # nuisances alone
-    python benches/blind_nuisances.py --only none --each 20 --clean --stress walk   # a sound part whose bias walks
-    python benches/blind_nuisances.py --only none --triples 10 --seed 21        # three units told as one
+    python benches/blind_nuisances.py --only none --each 20 --clean --stress walk   # a healthy part, bias random walk
+    python benches/blind_nuisances.py --only none --triples 10 --seed 21        # three units given as one
 
 Each trial writes a log and, apart, the sealed answer; the diagnosis sees the log alone. ``--triples`` gives sessions of
 three units that share nothing as recordings of one: with flaw ``none`` it counts false names, with another one whether
@@ -115,7 +115,7 @@ N_RECORDINGS = 3
 
 
 def triple(job):
-    """What is said of three sessions of three units as if of one."""
+    """The diagnosis of three sessions of three units, given as those of one."""
     flaw, seed = job
     with tempfile.TemporaryDirectory() as folder:
         logs = [f"{folder}/{k}.csv" for k in range(N_RECORDINGS)]
@@ -124,7 +124,7 @@ def triple(job):
         try:
             found = trihedron.diagnose_sessions(logs, gravity_m_s2=G)
         except ValueError as error:
-            return {"said": f"refused: {str(error)[:100]}", "shared": False, "own": False}
+            return {"said": f"error: {str(error)[:100]}", "shared": False, "own": False}
     best = max((one.score for one in found.candidates), default=0.0)
     said = "; ".join(f"{e.id} {e.score:.1f} (agree: p {e.p_agree:.1g})" for e in found.effects)
     own = any(one.is_of_instrument for one in found.effects)
@@ -148,7 +148,7 @@ def main():
     parser.add_argument("--size", type=float, default=1.0)
     parser.add_argument("--clean", action="store_true", help="no nuisances")
     parser.add_argument("--without", action="append", default=[], help="leave this nuisance out, all else the same")
-    parser.add_argument("--stress", choices=STRESSES, help="what strains a sound instrument")
+    parser.add_argument("--stress", choices=STRESSES, help="what strains a healthy instrument")
     parser.add_argument("--only", action="append", choices=FLAWS)
     parser.add_argument("--triples", type=int, help="so many times three units as one, for each flaw")
     options = parser.parse_args()

@@ -9,7 +9,7 @@ of white error on a clock up to 100 ppm off; path: the same with position (0.3 m
 walk, drone, robot: motions of tests/reference_truths.py, two minutes, truths off by 0.1 to 2° over 4 to 40 s in the
 world or the body, clocks up to 50 ms and 300 ppm apart, walks of the bias; odd seeds have a g-sensitivity of data
 sheets' size, seeds 2 and 3 of every four a position. shaken: 5 Hz all along, so that two offsets of the clock fit, and
-a refusal is the right answer.
+an error is the right result.
 `--speed`: CPU of the fit beside 2.5 to 10 minutes of walk at 200 Hz, and of `calibrate` on a simulated session.
 """
 
@@ -117,8 +117,8 @@ def bias_over_time(trial, found, A):
     return ((found.bias.value[at] - true) / found.bias.sigma[at]).ravel()
 
 
-def told(kind, runs, n_refused, cpu_s):
-    print(f"{kind}: {len(runs)} runs, {n_refused} refused, {cpu_s:.0f} s CPU")
+def summarise(kind, runs, n_failed, cpu_s):
+    print(f"{kind}: {len(runs)} runs, {n_failed} failed, {cpu_s:.0f} s CPU")
     for name in dict.fromkeys(name for r in runs for name in r[0]):
         z = np.concatenate([r[0][name] for r in runs if name in r[0]])
         one, most = (100 * np.mean(np.abs(z) < k) for k in (1, 1.96))
@@ -160,7 +160,7 @@ def main():
     for kind in given.kinds.split(","):
         start = time.process_time()
         runs = [one_or_refused(KINDS[kind](given.seed + k)) for k in range(given.each)]
-        told(kind, [r for r in runs if r is not None], runs.count(None), time.process_time() - start)
+        summarise(kind, [r for r in runs if r is not None], runs.count(None), time.process_time() - start)
 
 
 if __name__ == "__main__":

@@ -61,11 +61,11 @@ def main() -> int:
             try:
                 r = read_layout(made, Path(folder))
             except ReadError as error:
-                rows.append(f"| {made.maker} | {name} | refused: {str(error)[-90:]} | | | | REFUSED |")
+                rows.append(f"| {made.maker} | {name} | error: {str(error)[-90:]} | | | | NOT READ |")
                 wrong += 1
                 continue
-        told = verdict(made, r)
-        wrong += told != "as written"
+        found = verdict(made, r)
+        wrong += found != "as written"
         units = []
         if r.accelerometer is not None:
             units.append(r.accelerometer_unit.value)
@@ -75,7 +75,7 @@ def main() -> int:
         codes = sorted({f.code.value for f in r.findings if f.severity.value == gravest != "note"})
         grave = gravest + (f": {', '.join(codes)}" if codes else "")
         counts = f"{r.rows_in_file} = {r.rows_read} + {r.rows_reported}"
-        rows.append(f"| {made.maker} | {name} | {counts} | {r.rate_hz:.5g} | {', '.join(units)} | {grave} | {told} |")
+        rows.append(f"| {made.maker} | {name} | {counts} | {r.rate_hz:.5g} | {', '.join(units)} | {grave} | {found} |")
     text = HEAD + "\n".join(rows) + f"\n\n{len(rows)} layouts, {wrong} not as written.\n"
     print(text)
     if "--write" in sys.argv:

@@ -31,8 +31,8 @@ STRESSES = {
     "soft": {"disturbed-pose"},
     "temperature": set(),
 }
-"""What strains a sound instrument, with what may be said of it: biases that walk strongly, 1/f noise as consumer parts
-have it (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
+"""What strains a healthy instrument, with the effects that may be named: a strong bias random walk, 1/f noise of
+consumer parts (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
 
 
 def _signed(rng, low, high, size=3):
