@@ -67,7 +67,7 @@ def judged(answer, said, crash, seconds):
     out |= {"verdict": said["verdict"], "ids": ids, "z": coverage(answer, said["calibration"]["extended"]),
             "z_linear": coverage(answer, said["calibration"]["baseline"]),
             "left": [d["domain"] for d in said["remaining"] if d["disagrees"]],
-            "confounded": [e["confounded_with"] for e in effects], "worthless": worthless(effects)}  # fmt: skip
+            "confounded": [e["confounded_with"] for e in effects]}  # fmt: skip
     beside = set().union(STRESSES.get(answer["stress"], ()), *(ALLOWED_BESIDE[n] for n in answer["nuisances"]))
     false = [i for i in ids if i != flaw and i not in beside and i not in ALSO_RIGHT.get(flaw, ())]
     out["false"] = false
@@ -85,12 +85,6 @@ def judged(answer, said, crash, seconds):
         # A range whose end no reading of the log reaches is no flaw of that log.
         score = "silent" if answer.get("visible", LEAST_CLIPPED) >= LEAST_CLIPPED else "hidden"
     return out | {"score": score}
-
-
-def worthless(effects):
-    """Effects whose every parameter has a sigma above its value."""
-    return [e["id"] for e in effects
-            if e["parameters"] and all(p["std"] > abs(p["value"]) for p in e["parameters"])]  # fmt: skip
 
 
 def coverage(answer, model):
@@ -147,7 +141,6 @@ def main():
     parser.add_argument("--each", type=int, default=3)
     parser.add_argument("--size", type=float, default=1.0)
     parser.add_argument("--clean", action="store_true", help="no nuisances")
-    parser.add_argument("--without", action="append", default=[], help="leave this nuisance out, all else the same")
     parser.add_argument("--stress", choices=STRESSES, help="what strains a healthy instrument")
     parser.add_argument("--only", action="append", choices=FLAWS)
     parser.add_argument("--triples", type=int, help="so many times three units as one, for each flaw")
@@ -159,7 +152,7 @@ def main():
         shared, own = (sum(r[key] for r in results) for key in ("shared", "own"))
         print(f"{len(results)} triples: {shared} share an effect, {own} called the instrument's")
         return
-    how = (options.size, not options.clean, options.stress, options.without)
+    how = (options.size, not options.clean, options.stress)
     jobs = [(flaw, options.seed * 100_000 + k * 100 + i, *how) for k in range(options.each) for i, flaw in flaws]
     report(tried(trial, [job for job in jobs if options.only_seed in (None, job[1])], options, line))
 
@@ -173,8 +166,7 @@ def report(results):
         if k != "hidden"
     ]
     print(f"\n{n} visible trials, {hidden} hidden: {', '.join(shares)}")
-    print(f"trials with a mechanism that is not there: {sum(bool(r.get('false')) for r in results)}; "
-          f"an effect with no value above its sigma: {sum(bool(r.get('worthless')) for r in results)}")  # fmt: skip
+    print(f"trials with a mechanism that is not there: {sum(bool(r.get('false')) for r in results)}")
     seen = [r for r in results if r.get("z")]
     answered = [r for r in seen if r["score"] in ("right", "shared", "nuisance first")]
     for sensor in ("accelerometer", "gyroscope"):

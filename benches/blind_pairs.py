@@ -3,11 +3,11 @@
     python benches/blind_pairs.py --pairs 60 --seed 1             # every kind in turn
     python benches/blind_pairs.py --kind surplus --pairs 20
 
-Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one parameter changed
-(bias, scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the
-simulation, or both; noise twice as large; a coarser ADC. Each pair is held against its log (``--against``) or, for one kind in
-three, against a calibration made from the simulated log (``--calibration``). An effect that was not drawn is
-false; a group of parameters whose true difference exceeds five of its standard errors must be found.
+Kinds: the same unit in another session; a nominal simulation of the part; another unit; one parameter changed (bias,
+scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
+both; noise twice as large; a coarser ADC. Each pair is diagnosed with ``--against`` or, for one kind in three, with
+``--calibration`` made from the simulated log. An effect that was not drawn is false; a group of parameters whose true
+difference exceeds five of its standard errors must be found.
 
 Each pair goes through a folder: the generator writes ``simulation.csv``, ``recording.csv`` and ``sealed.json``; the
 diagnosis sees the two logs alone and its result goes to ``found.json``; only then the seal is opened.

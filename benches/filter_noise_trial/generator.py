@@ -1,6 +1,6 @@
 """Drones, cars and walks: strapped sensors with known vibration, residual calibration error, bias random walk and
-warming, and a truth of attitude and position whose own error is known too. Independent of the package: the parts of an error
-over a horizon are computed here.
+warming, and a truth of attitude and position whose own error is known too. Independent of the package: the parts of an
+error over a horizon are computed here.
 """
 
 from dataclasses import dataclass
