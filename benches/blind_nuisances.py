@@ -13,42 +13,27 @@ values that differ are called the instrument's.
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
-import os
 import tempfile
-import time
-import warnings
 from collections import Counter
 from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import polars as pl
 
 import trihedron
 from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, STRESSES, G, draw
-from trials import command_line, tried, within
+from trials import command_line, sealed, tried, within
 
 
 def trial(job):
-    columns, answer = draw(*job)
+    columns, truth = draw(*job)
     with tempfile.TemporaryDirectory() as folder:
-        log, seal = Path(folder) / "log.csv", Path(folder) / "answer.json"
+        log = f"{folder}/log.csv"
         pl.DataFrame(columns).write_csv(log)
-        seal.write_text(json.dumps(answer))
-        start = time.process_time()
-        try:
-            with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
-                warnings.simplefilter("ignore")
-                said = trihedron.diagnose(str(log), gravity_m_s2=G).to_dict()
-            crash = ""
-        except Exception as error:  # a crash is a result of the trial
-            said, crash = None, f"{type(error).__name__}: {str(error)[:90]}"
-        answer = json.loads(seal.read_text())
-        return judged(answer, said, crash, time.process_time() - start)
+        said, crash, seconds, truth = sealed(
+            Path(folder), truth, lambda: trihedron.diagnose(log, gravity_m_s2=G).to_dict()
+        )
+    return judged(truth, said, crash, seconds)
 
 
 LEAST_CLIPPED = 1

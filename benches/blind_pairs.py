@@ -10,14 +10,12 @@ both; noise twice as large; a coarser ADC. Each pair is diagnosed with ``--again
 difference exceeds five of its standard errors must be found.
 
 Each pair goes through a folder: the generator writes ``simulation.csv``, ``recording.csv`` and ``sealed.json``; the
-diagnosis sees the two logs alone and its result goes to ``found.json``; only then the seal is opened.
+diagnosis sees the two logs alone, and the seal is opened afterwards.
 """
 
 from __future__ import annotations
 
-import json
 import tempfile
-import warnings
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +28,7 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from blind_trial.draw import grade_profile, moves_of, rows
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
-from trials import command_line, tried, within
+from trials import command_line, sealed, tried, within
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.log import write_recording
 from trihedron.records import Recording
@@ -165,33 +163,25 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     return out
 
 
-def ask(folder: Path, gravity: float, by_file: bool) -> None:
-    """The answer to the two logs, written down before the seal is opened."""
+def ask(folder: Path, gravity: float, by_file: bool) -> dict[str, Any]:
+    """The diagnosis of the two logs."""
     recording, simulated = (trihedron.read(folder / f"{name}.csv") for name in ("recording", "simulation"))
     if by_file:
         known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
-        found = trihedron.diagnose(recording, calibration=known)
-    else:
-        found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
-    (folder / "found.json").write_text(json.dumps(found.to_dict()))
+        return trihedron.diagnose(recording, calibration=known).to_dict()
+    return trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity).to_dict()
 
 
 def trial(pair: Pair) -> dict[str, Any]:
-    warnings.simplefilter("ignore")
-    result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        simulated, recording, gravity, answer = make(pair)
+        simulated, recording, gravity, truth = make(pair)
         write_recording(simulated, folder / "simulation.csv")
         write_recording(recording, folder / "recording.csv")
-        (folder / "sealed.json").write_text(json.dumps(answer))
-        try:
-            ask(folder, gravity, pair.by_file)
-        except Exception as error:  # a crash is a result
-            return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": {}}
-        document = json.loads((folder / "found.json").read_text())
-        answer = json.loads((folder / "sealed.json").read_text())
-    return {**result, **scored(pair, document, answer)}
+        said, crash, _, truth = sealed(folder, truth, lambda: ask(folder, gravity, pair.by_file))
+    result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": crash}
+    failed = {"right": False, "false": [], "z": {}}
+    return result | (failed if said is None else scored(pair, said, truth))
 
 
 def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import json
+import os
+import time
+import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
@@ -37,6 +44,20 @@ def tried(
             if options.json:
                 options.json.write_text(json.dumps(results))
     return results
+
+
+def sealed(folder: Path, truth: Result, ask: Callable[[], Result]) -> tuple[Result | None, str, float, Result]:
+    """The result of ``ask``, or its crash in words, processor seconds, and the truth, sealed in a file until then."""
+    seal = folder / "sealed.json"
+    seal.write_text(json.dumps(truth))
+    said, crash, start = None, "", time.process_time()
+    try:
+        with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+            warnings.simplefilter("ignore")
+            said = ask()
+    except Exception as error:  # a crash is a result of the trial
+        crash = f"{type(error).__name__}: {str(error)[:90]}"
+    return said, crash, time.process_time() - start, json.loads(seal.read_text())
 
 
 def within(z: Any) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -12,7 +10,7 @@ import numpy as np
 
 import trihedron
 from blind_trial.draw import Job, make
-from trials import Result, share
+from trials import Result, sealed, share
 
 SCORES = ("right", "confounded", "second", "missed", "wrong")
 
@@ -21,18 +19,12 @@ def trial(job: Job) -> Result:
     """Draw, seal, diagnose, open the seal."""
     recording, gravity, answer = make(job)
     with tempfile.TemporaryDirectory() as folder:
-        seal = Path(folder) / "answer.json"
-        seal.write_text(json.dumps(answer))
-        start = time.perf_counter()
-        try:
-            said = trihedron.diagnose(recording, gravity_m_s2=gravity).to_dict()
-            crash = ""
-        except Exception as error:  # a crash is a result too: the worst one
-            said, crash = {"verdict": "crash", "effects": [], "domains": []}, repr(error)[:200]
-        seconds = time.perf_counter() - start
-        sealed = json.loads(seal.read_text())
+        said, crash, seconds, answer = sealed(
+            Path(folder), answer, lambda: trihedron.diagnose(recording, gravity_m_s2=gravity).to_dict()
+        )
+    said = said or {"verdict": "crash", "effects": [], "domains": []}
     result = {
-        **sealed, "verdict": said["verdict"], "crash": crash, "seconds": seconds,
+        **answer, "verdict": said["verdict"], "crash": crash, "seconds": seconds,
         "found": [e["id"] for e in said["effects"]], "confounded": [e["confounded_with"] for e in said["effects"]],
         "disagrees": [d["domain"] for d in said["domains"] if d["disagrees"]],
         "parameters": [e["parameters"] for e in said["effects"]],
