@@ -20,9 +20,9 @@ import numpy as np
 
 from blind_trial.draw import GRADES, Job
 from blind_trial.foreign import FOREIGN
-from blind_trial.running import Result, command_line, tried
-from blind_trial.score import confusion, summary, trial
+from blind_trial.score import table, trial
 from blind_trial.sizes import SIZES
+from trials import Result, command_line, tried
 
 
 def drawn(options: argparse.Namespace) -> list[Job]:
@@ -47,12 +47,11 @@ def drawn(options: argparse.Namespace) -> list[Job]:
 
 def line(result: Result) -> str:
     """One trial in one line, with the seed that repeats it."""
-    worst = max((abs(v) for _, v in result["z"]), default=0.0)
     also = f" also {result['also']}" if result["also"] else ""
     said = " ".join(f"{e}{c or ''}" for e, c in zip(result["found"], result["confounded"], strict=True))
     return (
         f"  {result['label']:26s} {result['grade']:9s}{result['score']:11s}{result['verdict']:16s} {said or '-'}{also} "
-        f"| {','.join(result['disagrees'])} | z {worst:.1f} | {result['seconds']:.1f} s | seed {result['seed']} "
+        f"| {','.join(result['disagrees'])} | {result['seconds']:.1f} s | seed {result['seed']} "
         f"{result['crash']}"
     )
 
@@ -74,11 +73,7 @@ def main() -> None:
     def shown(result: Result) -> str:
         return line(result) if options.verbose or result["score"] not in ("right", "confounded") else ""
 
-    results = tried(trial, jobs, options, shown)
-    print()
-    print(confusion([r for r in results if r["label"] != "healthy"]))
-    print()
-    print(summary(results))
+    print("\n" + table(tried(trial, jobs, options, shown)))
 
 
 if __name__ == "__main__":

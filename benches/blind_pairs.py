@@ -3,21 +3,19 @@
     python benches/blind_pairs.py --pairs 60 --seed 1             # every kind in turn
     python benches/blind_pairs.py --kind surplus --pairs 20
 
-Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one number moved (zero,
+Kinds: the same unit in another session; a nominal simulation of the part; another unit; one parameter changed (bias,
 scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
-both; noise twice as large; a coarser ADC. Each pair is held against its log (``--against``) or, for one kind in
-three, against a calibration made from the simulated log (``--calibration``). A name said of nothing that was drawn is
-false; a group of numbers whose true difference exceeds five of its own stated errors must be found.
+both; noise twice as large; a coarser ADC. Each pair is diagnosed with ``--against`` or, for one kind in three, with
+``--calibration`` made from the simulated log. An effect that was not drawn is false; a group of parameters whose true
+difference exceeds five of its standard errors must be found.
 
 Each pair goes through a folder: the generator writes ``simulation.csv``, ``recording.csv`` and ``sealed.json``; the
-question is asked of the two logs alone and its answer written to ``found.json``; only then the seal is opened.
+diagnosis sees the two logs alone, and the seal is opened afterwards.
 """
 
 from __future__ import annotations
 
-import json
 import tempfile
-import warnings
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,8 +27,8 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from blind_trial.draw import grade_profile, moves_of, rows
-from blind_trial.running import command_line, tried, within
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
+from trials import command_line, sealed, tried, within
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.log import write_recording
 from trihedron.records import Recording
@@ -68,7 +66,7 @@ def channels(S: Any, b: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[Any, Any]:
-    """One number moved, in the direction in which the instrument is made: raw = S⁻¹(truth - b)."""
+    """One parameter changed, in the distort direction: raw = S⁻¹(truth - b)."""
     sign = rng.choice((-1.0, 1.0), 3) * rng.uniform(0.5, 1.5, 3)
     if kind == "accel-bias":
         accel = replace(accel, b=rows(np.array(accel.b) + 0.03 * sign))
@@ -165,37 +163,29 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     return out
 
 
-def ask(folder: Path, gravity: float, by_file: bool) -> None:
-    """The answer to the two logs, written down before the seal is opened."""
+def ask(folder: Path, gravity: float, by_file: bool) -> dict[str, Any]:
+    """The diagnosis of the two logs."""
     recording, simulated = (trihedron.read(folder / f"{name}.csv") for name in ("recording", "simulation"))
     if by_file:
         known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
-        found = trihedron.diagnose(recording, calibration=known)
-    else:
-        found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
-    (folder / "found.json").write_text(json.dumps(found.to_dict()))
+        return trihedron.diagnose(recording, calibration=known).to_dict()
+    return trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity).to_dict()
 
 
 def trial(pair: Pair) -> dict[str, Any]:
-    warnings.simplefilter("ignore")
-    result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        simulated, recording, gravity, answer = make(pair)
+        simulated, recording, gravity, truth = make(pair)
         write_recording(simulated, folder / "simulation.csv")
         write_recording(recording, folder / "recording.csv")
-        (folder / "sealed.json").write_text(json.dumps(answer))
-        try:
-            ask(folder, gravity, pair.by_file)
-        except Exception as error:  # a crash is a result
-            return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": {}}
-        document = json.loads((folder / "found.json").read_text())
-        answer = json.loads((folder / "sealed.json").read_text())
-    return {**result, **scored(pair, document, answer)}
+        said, crash, _, truth = sealed(folder, truth, lambda: ask(folder, gravity, pair.by_file))
+    result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": crash}
+    failed = {"right": False, "false": [], "z": {}}
+    return result | (failed if said is None else scored(pair, said, truth))
 
 
 def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:
-    """Groups whose level is a convention once one of these effects stands (the temperature that a zero is of)."""
+    """Groups whose level is a convention once one of these effects stands (the temperature to which a bias belongs)."""
     by_id = {effect.id: effect.confounded_with for effect in catalogue()}
     return {group for _, name, _ in effects for group in by_id.get(name, ())}
 
@@ -208,7 +198,7 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     effects = [(e["in"], e["id"], e["confounded_with"]) for e in document["effects"]]
     # Also of an effect that both logs have, which is no difference.
     is_open = left_open([*effects, ("", answer["effect"], [])])
-    # A linear file of a log with an effect has taken it up: its numbers are right for that log and true of no unit.
+    # A linear calibration of a log with an effect absorbs it: its parameters fit that log and belong to no unit.
     is_bent = pair.by_file and answer["kind"] in ("surplus", "both")
     for group, values in answer["numbers"].items():
         said = [p for p in document["parameters"] if p["id"] == group]
@@ -223,8 +213,7 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
             must.add(group)
     side = {"missing": "recording", "surplus": "model"}.get(answer["kind"], "")
     if pair.by_file:
-        # A linear calibration holds no effect: of the recording's it knows none, of its log's it has taken up what it
-        # could in its numbers.
+        # A linear calibration has no effects: it absorbs those of its own log in its parameters.
         side = "recording" if answer["kind"] in ("missing", "both") else ""
         may |= set(GROUPS) if answer["kind"] == "surplus" else set()
     false = [g for g in said_groups if g in GROUPS and g not in may and not (g == "accel-scale" and "gravity" in may)]

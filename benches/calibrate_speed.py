@@ -1,7 +1,7 @@
 """`calibrate` or `diagnose` with reading: warm in one process, and cold as a command; wall and processor time.
 
 python benches/calibrate_speed.py --accel xsens_acc.txt --gyro xsens_gyro.txt --gravity 9.81744 [--rounds 12]
-python benches/calibrate_speed.py LOG --gravity 9.81, or --poses 100 for a simulated log
+python benches/calibrate_speed.py LOG --gravity 9.81
 python benches/calibrate_speed.py ... --diagnose        [OPENBLAS_NUM_THREADS=1 as the command sets it]
 
 Prints best and median. The command runs on compiled Python, as an installation leaves it: the first run fills a cache
@@ -18,12 +18,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import replace
-from pathlib import Path
 
 import trihedron
-from trihedron.files.log import write_recording
-from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 
 def cold(command: str, words: list[str], cache: str) -> tuple[float, float]:
@@ -43,14 +39,9 @@ def main() -> None:
     parser.add_argument("--accel")
     parser.add_argument("--gyro")
     parser.add_argument("--gravity", type=float, default=9.80665)
-    parser.add_argument("--poses", type=int)
     parser.add_argument("--rounds", type=int, default=12)
     parser.add_argument("--diagnose", action="store_true")
     given = parser.parse_args()
-    if given.poses:
-        given.log = f"{tempfile.mkdtemp()}/poses.csv"
-        scenario = replace(scenario_by_name("hand-session"), motion=hand_session(given.poses))
-        write_recording(simulate(scenario, 1)[0], Path(given.log))
     pair = {"accelerometer_path": given.accel, "gyroscope_path": given.gyro}
     words = ["--accel", given.accel, "--gyro", given.gyro] if given.log is None else [given.log]
 

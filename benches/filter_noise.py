@@ -4,7 +4,7 @@
 
 Each run draws for both sensors N, K, vibration that follows a throttle and a scale matrix that is off, for the gyro
 g-sensitivity and a bias that follows the temperature, and a truth with white and slow (Matérn-3/2) error
-(filter_noise_trial/); the noise at rest is told with 5 % of error. NEES is that of the held-out half: 3 is right.
+(filter_noise_trial/); the static noise is given with 5 % of error. NEES is cross-validated over halves: 3 is right.
 `--euroc FOLDER` takes the recorded flights instead, with the data sheet's values as static ones; `--backwards` predicts
 the angles of the first half of each from the second as well.
 """
@@ -57,8 +57,8 @@ def one(seed, kind, seconds):
 
 
 def known(sensor):
-    """What a static log would have said."""
-    N = Bounded(sensor.told_N, sensor.told_N * np.exp(-0.1), sensor.told_N * np.exp(0.1))
+    """What a static log would give."""
+    N = Bounded(sensor.static_N, sensor.static_N * np.exp(-0.1), sensor.static_N * np.exp(0.1))
     return StaticNoise(N, Bounded(sensor.K, 0.5 * sensor.K, 2 * sensor.K))
 
 
@@ -83,10 +83,10 @@ def simulated(given):
         runs.append((kind, one(given.seed + k, kind, given.seconds)))
         if (k + 1) % 10 == 0 or k + 1 == given.runs:
             for sensor in ("gyroscope", "accelerometer"):
-                told(sensor, [(kind, *found[sensor]) for kind, found in runs])
+                summarise(sensor, [(kind, *found[sensor]) for kind, found in runs])
 
 
-def told(sensor, runs):
+def summarise(sensor, runs):
     print(f"{len(runs)} runs, {sensor}")
     for kind in (*KINDS, "all"):
         some = [r for r in runs if kind in (r[0], "all")]
@@ -128,11 +128,11 @@ def backwards(path, motion, asked):
     later = [one.part(first, len(one.time_s)) for one, first in held]
     for named, taught_by, test in (("second from first", half, held), ("first from second", later, half)):
         fitted, _ = independent_or_not(taught_by, informed(ANGLE, stretches, ADIS16448), ANGLE)
-        # Parts of their own: a filter that begins there knows nothing of the other half.
+        # Separate parts: a filter that begins there has no estimate from the other half.
         parts = test if test is held else [(one, 0) for one in test]
         every = [consistency(parts, fitted, ADIS16448, h) for h in asked.horizons_s]
-        told = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f}" for c in every if c is not None)
-        print(f"{path.name.split('.')[0]} {named}: NEES {told}", flush=True)
+        shown = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f}" for c in every if c is not None)
+        print(f"{path.name.split('.')[0]} {named}: NEES {shown}", flush=True)
 
 
 def main():

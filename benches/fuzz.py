@@ -1,12 +1,12 @@
-"""The attack: mutated input files and command lines, for as long as you like; docs/evidence.md quotes it.
+"""Fuzzing: mutated input files and command lines, for as long as you like; docs/evidence.md quotes it.
 
 python benches/fuzz.py inputs 100000 [SEED]     every reader of a file that is ours or binary
 python benches/fuzz.py formats 5000 [SEED]      logs of other formats: libraries', JSON, folders, makers' text
-python benches/fuzz.py commands 5000 [SEED]     command lines, in forked children of one loaded process
+python benches/fuzz.py commands 5000 [SEED]     command lines, in child processes of one loaded process
 
 Every case is made from SEED and its number alone; `case inputs|formats|commands NUMBER [SEED]` repeats it. A failure is
-a traceback, an exception that is no refusal, an internal error, text of a panic, a control character on a terminal,
-a wait of more than ten seconds, rows that are not accounted for, an input harmed or a file left.
+a traceback, an exception other than `ValueError`, an internal error, text of a panic, a control character on a
+terminal, a wait of more than ten seconds, rows that are not accounted for, an input harmed or a file left.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from nuisance_trial.hand import minimum_jerk
+from motion import minimum_jerk
 from trihedron.records import Recording
 from trihedron.segment import segment_recording
 

@@ -99,7 +99,7 @@ fn poisson(c: &mut Criterion) {
     }
 }
 
-/// A million uneven steps: the last attitude, all of them, and blocks of still detection.
+/// A million uneven steps: the last attitude, all of them, and blocks of static detection.
 fn long_logs(c: &mut Criterion) {
     let n = 1_000_001_u32;
     let time: Vec<f64> = (0..n)

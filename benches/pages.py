@@ -46,7 +46,7 @@ def logs(folder: Path) -> list[str]:
 def beside_a_tracker(folder: Path, gain: float, shaken: float) -> tuple[str, str]:
     """A log of a body that rocks for two minutes, and a tracker whose world frame drifts by a tenth of a degree.
 
-    The noise at rest is that of the static hour; ``gain`` is the gyro's, ``shaken`` the noise that vibration adds in
+    Its noise is that of the static hour; ``gain`` is the gyro's, ``shaken`` the noise that vibration adds in
     motion, as a part of the angular rate.
     """
     rng = np.random.default_rng(7)

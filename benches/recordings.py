@@ -1,6 +1,6 @@
-"""Every public set of recordings, causes withheld (the recordings are not part of the repository).
+"""Every public set of recordings, gravity the only input (the recordings are not part of the repository).
 
-python benches/recordings.py calibrate FOLDER [WORD ...]   poses, residuals, held-out gravity; what was published
+python benches/recordings.py calibrate FOLDER [WORD ...]   residuals, cross-validated errors, published parameters
 python benches/recordings.py diagnose FOLDER [WORD ...]    the table of docs/diagnosis-real.md
 """
 
@@ -9,7 +9,6 @@ import os
 import sys
 import time
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -60,18 +59,18 @@ def recordings(folder: Path):
 
 
 def calibrated(name, arguments, gravity):
-    """One line of a calibration: time with reading, norm residual, held-out gravity prediction, verdict."""
+    """One line of a calibration: time with reading, norm residual, cross-validated errors, verdict."""
     began = time.perf_counter()
     try:
         result = trihedron.calibrate(trihedron.read(**arguments), gravity_m_s2=gravity)
     except ValueError as error:
-        return f"{name}: refused: {error}"
+        return f"{name}: error: {error}"
     seconds = time.perf_counter() - began
     quality, gyroscope = result.accelerometer.quality, result.gyroscope
     angles = None if gyroscope is None else gyroscope.quality.held_out_angle_deg
     angle = f"{np.sqrt(np.nanmean(angles**2)):7.3f} °" if angles is not None else "–"
     held = "–" if quality.held_out_rms is None else f"{1e3 * quality.held_out_rms:.2f} mm/s²"
-    verdict = "good" if result.is_trustworthy else "not to be trusted"
+    verdict = "OK" if result.is_trustworthy else "not to be trusted"
     norms = f"{1e3 * quality.rms_dof:5.2f} mm/s² {held:>10s} {1e3 * quality.floor:4.2f} mm/s²"
     return f"{name:26s} {seconds:5.2f} s {result.segments.n_poses:5d} {norms} {angle:>9s}  {verdict}"
 
@@ -91,62 +90,44 @@ def of(arguments, gravity):
 def as_row(name, d, why, seconds):
     """One line of the table."""
     if d is None:
-        return f"| {name} | – | refused: {why.split(': ', 1)[-1]} | | | | {seconds:.0f} s |"
+        return f"| {name} | – | error: {why.split(': ', 1)[-1]} | | | | {seconds:.0f} s |"
     ids, sizes, held = [], [], []
     for e in d.effects:
         also = f" (or {', '.join(e.confounded_with)})" if e.confounded_with else ""
         ids.append(e.id + also)
-        told = [p for p in e.parameters if p.std > 0.0] or list(e.parameters)
-        big = max(told, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
+        sized = [p for p in e.parameters if p.std > 0.0] or list(e.parameters)
+        big = max(sized, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
         codes = "".join(f", {p.name} {p.value:.9g}" for p in e.parameters if p.name.startswith("raw_"))
         sizes.append("–" if big is None else f"{big.name} {big.value:.3g} ± {big.std:.1g} {big.unit}{codes}")
         h = e.held_out[0] if e.held_out else None
         held.append("–" if h is None else f"{h.domain} {h.chi2_per_dof_before:.2g} → {h.chi2_per_dof_after:.2g}")
     left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)
     related = "".join(f"; relation: {', '.join(one.depends_on)}" for one in d.relations)
-    told = "; ".join(ids) + related
-    return (f"| {name} | {d.segments.n_poses} | {d.verdict}{': ' if told else ''}{told} | {'; '.join(sizes)} "
+    named = "; ".join(ids) + related
+    return (f"| {name} | {d.segments.n_poses} | {d.verdict}{': ' if named else ''}{named} | {'; '.join(sizes)} "
             f"| {'; '.join(held)} | {left or '–'} | {seconds:.0f} s |")  # fmt: skip
 
 
 def against_published(folder: Path) -> None:
-    """Print what was published next to what is found."""
-    sessions = {name: (arguments, gravity) for name, arguments, gravity in recordings(folder)}
-    arguments, gravity = sessions["xsens_mti"]
+    """Print the parameters published for the Xsens log beside what is found."""
+    name, arguments, gravity = next(recordings(folder))
     result = trihedron.calibrate(trihedron.read(**arguments), gravity_m_s2=gravity, method="separate")
-    published = json.loads((folder / "xsens_mti/published_imu_tk.json").read_text())
-    accelerometer, gyroscope = result.accelerometer, result.gyroscope
-    zero = -np.linalg.solve(accelerometer.S, accelerometer.b) - published["acc"]["bias"]
-    for name, sensor, key in (("accelerometer", accelerometer, "acc"), ("gyro", gyroscope, "gyro")):
+    published = json.loads((folder / f"{name}/published_imu_tk.json").read_text())
+    for sensor, key in ((result.accelerometer, "acc"), (result.gyroscope, "gyro")):
         theirs = np.array(published[key]["misalignment"]) @ np.diag(published[key]["scale"])
         # Lengths of columns do not depend on the frame.
         ratio = np.linalg.norm(sensor.S, axis=0) / np.linalg.norm(theirs, axis=0) - 1.0
-        print(f"xsens_mti {name} scale: {100 * np.abs(ratio).max():.3f} % from the published one at most")
-    residual = 1e3 * accelerometer.quality.rms_dof
-    print(f"xsens_mti accelerometer zero: {np.abs(zero).max():.1f} counts; residual {residual:.2f} mm/s²")
-    for k in range(3):
-        arguments, gravity = sessions[f"mpu9150 unit {k}"]
-        quality = trihedron.calibrate(
-            trihedron.read(**arguments), gravity_m_s2=gravity, method="separate"
-        ).accelerometer.quality
-        print(f"mpu9150 unit {k}: chi-square {quality.chi2 / quality.dof:.2f} per degree of freedom ({quality.dof})")
-    for k, said in ((1, 0.57), (2, 1.17), (3, 1.39)):
-        arguments, gravity = sessions[f"kim run {k}"]
-        recording = trihedron.read(**arguments)
-        segments = trihedron.segment(recording)
-        alike = replace(segments, accelerometer_sigma_mean=np.full((segments.n_poses, 3), 1e-3))
-        found = [
-            trihedron.calibrate(recording, segments=s, gravity_m_s2=gravity, method="separate").accelerometer.quality
-            for s in (alike, segments)
-        ]
-        values = ", ".join(f"{1e3 * quality.rms_dof:.2f}" for quality in found)
-        print(f"kim {k}: {values} mm/s² (poses alike, weighed), published {said}; {found[0].dof} degrees of freedom")
+        print(f"{name} {key} scale: {100 * np.abs(ratio).max():.3f} % from the published one at most")
+    bias = -np.linalg.solve(result.accelerometer.S, result.accelerometer.b) - published["acc"]["bias"]
+    print(f"{name} accelerometer bias: {np.abs(bias).max():.1f} counts from the published one at most")
 
 
 def main() -> None:
     what, folder, words = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
     if what == "diagnose":
-        print("| set | poses | verdict: effects in order | parameter | cross-validated, χ² per row | remains | CPU |")
+        print(
+            "| set | poses | verdict: effects in order | parameter | cross-validated, χ² per row | unexplained | CPU |"
+        )
         print("|---|---|---|---|---|---|---|")
     else:
         print("recording                     time poses   residual   cross-val.   noise   gravity  verdict")

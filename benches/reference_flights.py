@@ -1,10 +1,9 @@
-"""A g-sensitivity put into recordings with references: in which is it named, singly and jointly?
+"""A g-sensitivity added to recordings with references: in which is it named, alone and jointly?
 
     python benches/reference_flights.py LOG TRUTH [LOG TRUTH ...] [--inject full|one|none] [--joint] [--gravity 9.807]
 
-Logs in SI. `full`: nine numbers of about 0.1 °/s/g (seed 5); `one`: 0.1 °/s/g of the gyro's x along the accelerometer's
-y alone. Printed: the scores, from which size the reference would show one, and how far estimates lie from what was put
-in, in σ.
+Logs in SI. `full`: nine elements of about 0.1 °/s/g (seed 5); `one`: 0.1 °/s/g of gyro X along accelerometer Y alone.
+Printed: the scores, from which size the reference would show one, and the errors of the estimates in σ.
 """
 
 import argparse

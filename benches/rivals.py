@@ -1,4 +1,4 @@
-"""Our hot paths beside what else there is, on the same data in one run: medians, ratios, peak memory.
+"""Our hot paths compared with other libraries, on the same data in one run: medians, ratios, peak memory.
 
 python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 
@@ -61,7 +61,7 @@ def subjects(rows: int) -> list[Subject]:
         Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", 1e-6),
         Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", 1e-6),
         Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", 1e-3),
-        Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
+        Subject("still", "Static detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
         Subject("read", text, "reading", "READ", rows, "s", 1.0, True),
     ]
 
@@ -119,10 +119,10 @@ def measure(subject: Subject, rounds: int) -> dict[str, dict[str, float]]:
             command = [sys.executable, __file__, "--worker", subject.key, "--method", name, "--rows", str(subject.n)]
             done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
             if done.returncode and name.startswith("trihedron"):
-                # Nothing else may stand in the place of ours.
+                # Without ours there is nothing to compare with.
                 sys.exit(f"{name}: {done.stderr.strip()}")
             if done.returncode:
-                print(f"  {name}: left out ({done.stderr.strip().splitlines()[-1][:120]})", file=sys.stderr)
+                print(f"  {name}: excluded ({done.stderr.strip().splitlines()[-1][:120]})", file=sys.stderr)
                 del seen[name]
                 continue
             seen[name].append(json.loads(done.stdout.strip().splitlines()[-1]))
@@ -180,7 +180,7 @@ def main() -> None:
                 kept.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n")
     if options.write:
         measured = [(subject, results[subject.key]) for subject in subjects(rows) if subject.key in results]
-        # A reader must know how far to trust a median.
+        # How far a median can be trusted depends on the load.
         how = f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}."
         parts = [*(table(*pair) for pair in measured), how]
         put(ROOT / "docs/evidence.md", "rivals", "\n\n".join(parts))

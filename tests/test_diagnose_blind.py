@@ -23,14 +23,20 @@ def test_healthy_sessions_are_consistent_at_the_stated_rate(sessions):
 
 
 @pytest.mark.parametrize(
-    ("effect", "grade", "seed"),
-    [("gyro-thermal-bias", "tactical", 2), pytest.param("lever-arm", "adis", 4, marks=pytest.mark.slow)],
+    ("effect", "size", "grade", "seed"),
+    [
+        ("gyro-thermal-bias", "per_k", "tactical", 2),
+        pytest.param("lever-arm", "arm_m", "adis", 4, marks=pytest.mark.slow),
+    ],
 )
-def test_a_drawn_flaw_is_named_with_its_size(effect, grade, seed):
+def test_a_drawn_flaw_is_named_with_its_size(effect, size, grade, seed):
     result = trial(Job((effect,), grade, seed))
     assert result["score"] == "right"
-    # Up to six numbers with honest errors: 4 sigma is passed by chance once in 2600.
-    assert max(abs(z) for _, z in result["z"]) < 4.0
+    found = result["parameters"][result["found"].index(effect)]
+    assert len(found) >= 3
+    # Three values: 4 sigma is passed by chance once in 5000.
+    for parameter, true in zip(found, result["sizes"][effect][size], strict=False):
+        assert abs(parameter["value"] - true) < 4.0 * parameter["std"], parameter["name"]
 
 
 def test_an_answer_behind_a_saturation_that_is_true_is_right_and_behind_another_it_is_not():

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from blind_trial.foreign import FOREIGN
-from blind_trial.sealed import sealed_parameters
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
 from trihedron.records import Recording
 from trihedron.simulate import Scenario, hand_session, simulate
@@ -103,7 +102,6 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
         "label": job.label, "effects": list(job.effects), "foreign": job.foreign, "grade": job.grade,
         "seed": job.seed, "scale": job.scale, "sizes": sizes, "expected_domains": expected,
         "also": true_saturations(recording, scenario, job.effects),
-        "parameters": {e: sealed_parameters(e, sizes[e], scenario, recording, truth) for e in job.effects},
     }  # fmt: skip
     return recording, truth.gravity_m_s2, answer
 

@@ -33,7 +33,7 @@ class Foreign:
     def added_to(
         self, log: Recording, truth: Truth, scenario: Scenario, session: Any, rng: np.random.Generator, scale: float
     ) -> Recording:
-        """The log of an instrument that also does this; readings are put back on the LSB grid."""
+        """The log of an instrument that also does this; readings are rounded to the LSB again."""
         part = getattr(scenario, self.sensor)
         directions, gain = sense_axes(part.S, self.sensor)
         motion = truth.angular_rate_rad_s if self.sensor == "gyroscope" else truth.specific_force_m_s2
@@ -78,7 +78,7 @@ def rate_product(_truth: Truth, along: FloatArray, noise: float, rng: np.random.
 
 
 def turn_memory(truth: Truth, along: FloatArray, noise: float, rng: np.random.Generator) -> FloatArray:
-    """The zero of one gyro remembers which way it last turned: a readout with play. Only accelerometers have that."""
+    """The bias of one gyro depends on which way it last turned: a readout with play. Only accelerometers have that."""
     k = int(rng.integers(3))
     out, state = np.zeros_like(along), 1.0
     for part in truth.segments:
@@ -105,7 +105,7 @@ def scale_by_force(truth: Truth, along: FloatArray, noise: float, rng: np.random
 
 
 def magnetic(truth: Truth, _along: FloatArray, noise: float, rng: np.random.Generator) -> FloatArray:
-    """Gyro zeros follow the Earth's field (magnets in the readout): horizontal, so that no force tells it."""
+    """Gyro biases follow the Earth's field (magnets in the readout): horizontal, so that no force resembles it."""
     w, x, y, z = truth.attitude.T
     heading = float(rng.uniform(0, 2 * np.pi))
     # A horizontal unit vector of the level frame, seen from the body: rows of the matrix body to level.
@@ -127,7 +127,7 @@ def cross_product(truth: Truth, along: FloatArray, noise: float, rng: np.random.
 
 
 FOREIGN: dict[str, Foreign] = {
-    # A zero that jumps from pose to pose is wrong in the moves between them too: angles of a gyro, speeds of a mass.
+    # A bias that jumps from pose to pose is wrong in the moves between them too: angles of a gyro, speeds of a mass.
     "gyro-telegraph": Foreign("gyroscope", ("static-gyro", "moves"), popcorn),
     "accel-telegraph": Foreign("accelerometer", ("static-accel", "dynamics"), popcorn),
     "gyro-rate-product": Foreign("gyroscope", ("moves",), rate_product),

@@ -25,7 +25,7 @@ FACTORS = {
     "timestamps": ("exact", "late", "milliseconds", "lost rows"),
     "drift": ("none", "accelerometer", "gyro"),
     "support": ("rigid", "settling"),
-    "outlier": ("none", "bumped pose"),
+    "outlier": ("none", "disturbed pose"),
     "delay_s": (0.0, 0.001),
 }
 """Levels of every factor, the healthy ones of a consumer's session among them."""

@@ -1,6 +1,6 @@
 """How a body is moved: rates in closed form on a fine grid, attitudes by products of small rotations.
 
-The body is turned by a hand (minimum jerk, or Gaussian bumps whose tails go on where nobody sees them), or on a table
+The body is turned by a hand (minimum jerk, or a Gaussian rate, whose tails extend into the poses), or on a table
 at a constant rate. Nothing here is taken from ``trihedron.simulate``.
 """
 
@@ -109,7 +109,7 @@ def attitude(up, heading):
 
 
 def speed(law, u):
-    """Rate law on u in (0, 1), integral one."""
+    """Rate of a move on u in (0, 1), integral one."""
     if law == "minimum-jerk":
         return 30.0 * u**2 * (1.0 - u) ** 2
     if law == "gaussian":

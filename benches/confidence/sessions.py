@@ -15,7 +15,7 @@ def directions(n, rng):
     known = [np.array(d, dtype=float) / np.linalg.norm(d) for d in EDGES + FACES]
     chosen = [known[k] for k in rng.permutation(18)[: min(n, 18)]]
     if n < 18:
-        # Spread: the choice whose poses determine nine numbers best among some.
+        # Spread: the choice whose poses determine nine parameters best among some.
         best = -np.inf
         for _ in range(60):
             tried = [known[k] for k in rng.permutation(18)[:n]]

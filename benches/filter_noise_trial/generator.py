@@ -1,12 +1,14 @@
-"""Drones, cars and walks: strapped sensors with known vibration, calibration left over, bias walk and warming, and a
-truth of attitude and position whose own error is known too. Numpy and scipy only: the parts of an error over a horizon
-are written out here once more.
+"""Drones, cars and walks: strapped sensors with known vibration, residual calibration error, bias random walk and
+warming, and a truth of attitude and position whose own error is known too. Independent of the package: the parts of an
+error over a horizon are computed here.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+from motion import running_product
 
 HZ, TRACK_HZ, G = 100, 50, 9.81
 KINDS = ("drone", "car", "walk")
@@ -29,10 +31,10 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Sensor:
-    """White density at rest as told, and with vibration as it is [SI/√Hz]; walk [SI/√s]; mean square [rad², (m/s)²] by
-    horizon and cause."""
+    """Static white density as given, and with vibration as it is [SI/√Hz]; random walk [SI/√s]; mean square
+    [rad², (m/s)²] by horizon and cause."""
 
-    told_N: float
+    static_N: float
     N: float
     K: float
     parts: dict[float, dict[str, float]]
@@ -57,16 +59,6 @@ def rates(rng, kind, t):
     return step + 0.4 * smooth(rng, n, 0.03, 0.3)
 
 
-def turned(w):
-    """Attitudes (n + 1) of rates (n, 3), products of all steps so far by doubling."""
-    q = Rotation.concatenate([Rotation.identity(), Rotation.from_rotvec(w / HZ)])
-    reach = 1
-    while reach < len(q):
-        q = Rotation.concatenate([q[:reach], q[:-reach] * q[reach:]])
-        reach *= 2
-    return q
-
-
 def slow_error(rng, time, sigma, tau):
     """(k, 3) a Matérn-3/2 process by its exact steps."""
     h, lam = time[1] - time[0], np.sqrt(3) / tau
@@ -86,7 +78,7 @@ def drawn(seed, kind, seconds, horizons):
     rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, 1 / HZ)
     w = rates(rng, kind, t)
-    C = turned(w)
+    C = running_product(np.vstack([np.zeros(3), w / HZ]))
     N, K, V, sigma = np.exp(rng.uniform(np.log([1e-4, 3e-6, 3e-4, 5e-4]), np.log([4e-4, 1e-4, 2e-3, 5e-3])))
     V = V if kind == "drone" else 0.3 * V
     tau, white, steady = rng.uniform(3, 15), 3e-4, 2e-3
@@ -141,7 +133,7 @@ def drawn(seed, kind, seconds, horizons):
 
 
 def noise(rng, N, V, K, throttle):
-    """(n, 3) white at rest, white that follows the throttle, and a walk."""
+    """(n, 3) static white noise, white noise that follows the throttle, and a random walk."""
     size = (len(throttle), 3)
     white = np.sqrt(N**2 + V**2 * throttle)[:, None] * np.sqrt(HZ) * rng.normal(size=size)
     return white + K / np.sqrt(HZ) * np.cumsum(rng.normal(size=size), axis=0)

@@ -88,7 +88,7 @@ def main() -> int:
             path.parent.mkdir(exist_ok=True)
             path.write_text(text(of, parts, rng), encoding="utf-8")
             answer, why = outcome(path, of, parts)
-            kind = "open" if of.open_for else "told"
+            kind = "open" if of.open_for else "complete"
             tally[f"{kind} {answer}"] += 1
             if kind == "open" and answer != "right":
                 first, first_why = answer, why
@@ -100,10 +100,10 @@ def main() -> int:
                 print(k, kind, answer, why[:500], "\n   ", *(f"{a}={v}" for a, v in vars(of).items()), flush=True)
             else:
                 path.unlink()
-    told = sum(v for key, v in tally.items() if key.startswith("told"))
+    complete = sum(v for key, v in tally.items() if key.startswith("complete"))
     wrong = sum(v for key, v in tally.items() if key.endswith("wrong"))
     print(dict(sorted(tally.items())))
-    print(f"{said.count} layouts: {wrong} wrong with confidence; of {told} that say enough {tally['told right']} right")
+    print(f"{said.count} layouts: {wrong} wrong, trusted; of {complete} complete {tally['complete right']} right")
     return 1 if wrong else 0
 
 

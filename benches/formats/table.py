@@ -61,11 +61,11 @@ def main() -> int:
             try:
                 r = read_layout(made, Path(folder))
             except ReadError as error:
-                rows.append(f"| {made.maker} | {name} | refused: {str(error)[-90:]} | | | | REFUSED |")
+                rows.append(f"| {made.maker} | {name} | error: {str(error)[-90:]} | | | | NOT READ |")
                 wrong += 1
                 continue
-        told = verdict(made, r)
-        wrong += told != "as written"
+        found = verdict(made, r)
+        wrong += found != "as written"
         units = []
         if r.accelerometer is not None:
             units.append(r.accelerometer_unit.value)
@@ -75,7 +75,7 @@ def main() -> int:
         codes = sorted({f.code.value for f in r.findings if f.severity.value == gravest != "note"})
         grave = gravest + (f": {', '.join(codes)}" if codes else "")
         counts = f"{r.rows_in_file} = {r.rows_read} + {r.rows_reported}"
-        rows.append(f"| {made.maker} | {name} | {counts} | {r.rate_hz:.5g} | {', '.join(units)} | {grave} | {told} |")
+        rows.append(f"| {made.maker} | {name} | {counts} | {r.rate_hz:.5g} | {', '.join(units)} | {grave} | {found} |")
     text = HEAD + "\n".join(rows) + f"\n\n{len(rows)} layouts, {wrong} not as written.\n"
     print(text)
     if "--write" in sys.argv:
@@ -83,7 +83,7 @@ def main() -> int:
         target.write_text(
             "# Makers' layouts\n\nMade by `python benches/formats/table.py --write docs/reading-makers.md`: files laid "
             "out as each maker's program writes them (each generator of `tests/makers/` names the "
-            "document), read without a word from the user but what stands behind the name.\n\n" + text
+            "document), read without options except those given after the file's name.\n\n" + text
         )
     return int(wrong > 0)
 

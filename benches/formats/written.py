@@ -148,7 +148,7 @@ def table_of(of: Layout, parts: list[Session], rng: Rng) -> tuple[list[str], lis
 
 
 def woven(of: Layout, names: list[str], one: list[tuple[str, ...]], two: list[tuple[str, ...]]) -> Any:
-    """Rows of two devices in one stream, with a column that tells them apart where the layout has one."""
+    """Rows of two devices in one stream, with a column that separates them where the layout has one."""
     length = {"blocks": len(one), "bursts": 4}.get(of.devices, 1)
     marked = of.devices in ("id column", "blocks", "bursts")
     rows: list[tuple[str, ...]] = []

@@ -31,15 +31,15 @@ STRESSES = {
     "soft": {"disturbed-pose"},
     "temperature": set(),
 }
-"""What strains a sound instrument, with what may be said of it: biases that walk strongly, 1/f noise as consumer parts
-have it (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
+"""What strains a healthy instrument, with the effects that may be named: a strong bias random walk, 1/f noise of
+consumer parts (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
 
 
 def _signed(rng, low, high, size=3):
     return rng.uniform(low, high, size) * rng.choice([-1.0, 1.0], size)
 
 
-def draw(flaw, seed, size=1.0, nuisances=True, stress=None, without=()):
+def draw(flaw, seed, size=1.0, nuisances=True, stress=None):
     """``(columns of the log, answer)`` of one trial."""
     rng = np.random.default_rng(seed)
     rate_hz = float(rng.choice([20.0, 50.0, 62.5, 100.0, 100.0, 200.0, 250.0, 500.0, 1000.0]))
@@ -51,7 +51,7 @@ def draw(flaw, seed, size=1.0, nuisances=True, stress=None, without=()):
     pose_s = float(np.clip(most / n_poses - move_s, 1.2, pose_s))
     n_poses = max(10, min(n_poses, int(most / (pose_s + move_s))))
     here = {name: nuisances and bool(rng.random() < 0.65) for name in NUISANCES}
-    here |= dict.fromkeys(without, False) | ({"soft": True} if stress == "soft" else {})
+    here |= {"soft": True} if stress == "soft" else {}
     how = {
         "soft": rng.uniform(0.0005, 0.003) if here["soft"] else 0.0,
         "jolt": rng.uniform(0.3, 3.0) if here["jolt"] else 0.0,

@@ -1,17 +1,14 @@
-"""Motion of a body through poses: five unlike laws of the hand, supports that give, poses that get bumped."""
+"""Motion of a body through poses: five courses of a move, soft supports, disturbed poses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 
-
-def minimum_jerk(x):
-    """Quintic: rate and acceleration vanish at both ends."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+from motion import minimum_jerk
 
 
 def trapezoid(x):
@@ -30,7 +27,7 @@ def lognormal(x):
     width, middle = 0.35, 0.32
     raw = ndtr(np.log(x / middle) / width)
     last = ndtr(np.log(1.0 / middle) / width)
-    # The tail is brought to rest by a smooth window over the last fifth.
+    # A smooth window over the last fifth ends the tail.
     out = raw / last
     blend = minimum_jerk((x - 0.8) / 0.2)
     return out * (1.0 - blend) + blend
@@ -46,7 +43,7 @@ def overshoot(x):
     return 1.12 * minimum_jerk(x / 0.7) - 0.12 * minimum_jerk((x - 0.65) / 0.35)
 
 
-LAWS = (minimum_jerk, trapezoid, lognormal, two_strokes, overshoot)
+COURSES = (minimum_jerk, trapezoid, lognormal, two_strokes, overshoot)
 
 
 @dataclass
@@ -61,25 +58,16 @@ class Motion:
 
 def rotations(vectors):
     """(n, 3, 3) rotation matrices of (n, 3) rotation vectors."""
-    angle = np.linalg.norm(vectors, axis=1)
-    k = vectors / np.maximum(angle, 1e-300)[:, None]
-    K = np.zeros((len(vectors), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -k[:, 2], k[:, 1], -k[:, 0]
-    K -= K.transpose(0, 2, 1)
-    s, c = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
-    return np.eye(3) + s * K + c * (K @ K)
+    return Rotation.from_rotvec(vectors).as_matrix()
 
 
 def random_pose(rng):
-    q = rng.normal(size=4)
-    q /= np.linalg.norm(q)
-    w, v = q[0], q[1:]
-    angle = 2.0 * np.arctan2(np.linalg.norm(v), w)
-    return rotations((v / np.linalg.norm(v) * angle)[None])[0]
+    w, x, y, z = rng.normal(size=4)
+    return Rotation.from_quat([x, y, z, w]).as_matrix()
 
 
 def session(rng, fine_hz, n_poses, pose_s, move_s, how):
-    """A session of poses and moves; ``how`` says what the support and the hand do besides."""
+    """A session of poses and moves; ``how``: what the support and the hand do besides."""
     parts_t, parts_C, parts_p, poses, bumps = [], [], [], [], []
     now, C, p = 0.0, random_pose(rng), np.zeros(3)
     bumped = set(rng.choice(n_poses, how["bumps"], replace=False).tolist()) if how["bumps"] else set()
@@ -119,30 +107,20 @@ def session(rng, fine_hz, n_poses, pose_s, move_s, how):
         n = int(move_s * rng.uniform(0.7, 1.4) * fine_hz)
         x = np.arange(n) / n
         goal = random_pose(rng)
-        turn = rotation_vector(goal @ C.T)
+        turn = Rotation.from_matrix(goal @ C.T).as_rotvec()
         other = rng.normal(size=3) * 0.4
-        law, law2 = LAWS[rng.integers(5)], LAWS[rng.integers(5)]
-        # A detour about another axis, out and back, makes the axis of rotation wander.
-        detour = np.sin(np.pi * law2(x)) ** 2
+        course, course2 = COURSES[rng.integers(5)], COURSES[rng.integers(5)]
+        # A detour about another axis, out and back, changes the axis of rotation.
+        detour = np.sin(np.pi * course2(x)) ** 2
         parts_t.append(now + x * n / fine_hz)
-        path = rotations(detour[:, None] * other) @ rotations(law(x)[:, None] * turn) @ C
+        path = rotations(detour[:, None] * other) @ rotations(course(x)[:, None] * turn) @ C
         parts_C.append(path)
         step = rng.normal(size=3) * how["reach"]
-        lift = np.sin(np.pi * law2(x)) ** 2
-        parts_p.append(p + law(x)[:, None] * step + lift[:, None] * rng.normal(size=3) * 0.5 * how["reach"])
+        lift = np.sin(np.pi * course2(x)) ** 2
+        parts_p.append(p + course(x)[:, None] * step + lift[:, None] * rng.normal(size=3) * 0.5 * how["reach"])
         now += n / fine_hz
         C, p = rotations(turn[None])[0] @ C, p + step
     return Motion(np.concatenate(parts_t), np.concatenate(parts_C), np.concatenate(parts_p), poses), bumps
-
-
-def rotation_vector(R):
-    """(3,) rotation vector of one matrix."""
-    angle = np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))
-    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    size = np.linalg.norm(axis)
-    if size < 1e-7:
-        return np.zeros(3)
-    return axis / size * angle
 
 
 def body_signals(motion, fine_hz, gravity):
