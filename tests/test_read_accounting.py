@@ -62,8 +62,8 @@ def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     (found,) = scale_findings(S, RateUnit.DEG_S)
     assert found.severity is Severity.SERIOUS
     assert found.numbers["scale_ratio"] == pytest.approx(0.01, rel=0.01)
-    assert scale_findings(100.0 * S, RateUnit.DEG_S) == []
-    assert scale_findings(S, RateUnit.COUNTS) == []
+    assert list(scale_findings(100.0 * S, RateUnit.DEG_S)) == []
+    assert list(scale_findings(S, RateUnit.COUNTS)) == []
 
 
 def test_two_files_account_for_the_rows_of_both(tmp_path):

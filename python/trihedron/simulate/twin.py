@@ -22,7 +22,7 @@ from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion.attitude import attitude_with_up, shortest_turn
+from trihedron.simulate.motion.attitude import attitude_with_up, shortest_turn, unit
 from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, Step
 from trihedron.simulate.readout import Adc, matrix3, sense_axes, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
@@ -87,7 +87,7 @@ def _motion(
     force = correct(readings[0], calibration.accelerometer.S, calibration.accelerometer.b)
     rate = correct(readings[1], gyro.S, gyro.b)
     poses = segments.poses
-    ups = [_unit(force[pose.samples()].mean(axis=0)) for pose in poses]
+    ups = [unit(force[pose.samples()].mean(axis=0)) for pose in poses]
     still = [rate[pose.samples()].mean(axis=0) for pose in poses]
     g = calibration.gravity_m_s2
     begin = [float(time_s[pose.start]) for pose in poses]
@@ -163,7 +163,7 @@ def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: Float
     """
     for _ in range(3):
         R = _matrices(_attitudes(rate, start, duration_s))
-        c = shortest_turn(_unit(R[-1] @ up), np.array([0.0, 0.0, 1.0])) / duration_s
+        c = shortest_turn(unit(R[-1] @ up), np.array([0.0, 0.0, 1.0])) / duration_s
         rate = rate + R.transpose(0, 2, 1) @ c
     return rate
 
@@ -194,10 +194,6 @@ def _filled(raw: FloatArray) -> FloatArray:
         good = np.isfinite(raw[:, k])
         out[:, k] = np.interp(index, index[good], raw[good, k])
     return out
-
-
-def _unit(v: FloatArray) -> FloatArray:
-    return v / np.linalg.norm(v)
 
 
 # Motion beyond a sensor's range, extrapolated from the readings before and after it.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +128,9 @@ def measure_moves(
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
-    in_log, links = _edges_and_links(_moves_of(recording, segments))
+    moves = _moves_of(recording, segments)
+    in_log = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
+    links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
     rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
     reading, bias = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
@@ -227,12 +228,6 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
-
-
-def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
-    edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
-    links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
-    return edges, links
 
 
 def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:

@@ -9,7 +9,7 @@ session apart, a step at one place, an even trend; else scatter.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,11 +26,8 @@ RIDGE = 1e-9
 """Variance added to the diagonal, relative to the mean variance, so that a singular covariance can be inverted."""
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    kind: ChangeKind
-    place: int
-    column: FloatArray
+Candidate = tuple[ChangeKind, int, FloatArray]
+"""Kind of a change, the session at which it begins, and its course over the sessions (n,)."""
 
 
 def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[Change, ...]:
@@ -63,19 +60,15 @@ def _change(sessions: Sequence[Session], name: str) -> Change:
     weights = np.array([_weight(session, picked, drift) for session in sessions])
     names = tuple(PARAMETERS[k].name for k in picked)
     p_value, values, weights, name, names = _as_gravity(name, names, values, weights)
-    best, rest_p = _best(values, weights, name)
-    kind: ChangeKind = best.kind if best is not None else "differs"
-    if best is not None and len(sessions) > 2 and rest_p < MIN_REST_P and not _stands_out(values, weights, best):
+    (kind, place, column), rest_p = _best(values, weights, name)
+    if len(sessions) > 2 and rest_p < MIN_REST_P and not _stands_out(values, weights, column):
         kind = "scatter"
-    size, std = np.zeros(len(names)), np.zeros(len(names))
-    where = ""
-    if best is not None and kind != "scatter":
-        coefficients, covariance = _solved(values, weights, best.column)
-        size, std = coefficients[len(names) :], np.sqrt(np.diag(covariance)[len(names) :])
-        where = sessions[best.place].name if kind != "trend" else ""
-    elif kind == "scatter":
         size = values.std(axis=0, ddof=1)
         std = np.sqrt(np.mean([np.diag(np.linalg.inv(w)) for w in weights], axis=0))
+    else:
+        coefficients, covariance = _solved(values, weights, column)
+        size, std = coefficients[len(names) :], np.sqrt(np.diag(covariance)[len(names) :])
+    where = "" if kind in ("scatter", "trend") else sessions[place].name
     unit = PARAMETERS[picked[0]].unit
     return Change(
         name, sessions[0].group, kind, where, names, tuple(map(float, size)), tuple(map(float, std)), unit,
@@ -123,35 +116,35 @@ def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
     return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), 1e-300)
 
 
-def _candidates(n: int) -> Iterator[_Candidate]:
+def _candidates(n: int) -> Iterator[Candidate]:
     """Candidates for n sessions: one session apart, then steps with two or more on either side, then an even trend."""
     if n == 2:
-        yield _Candidate("differs", 1, np.array([0.0, 1.0]))
+        yield "differs", 1, np.array([0.0, 1.0])
         return
     for k in range(n):
-        yield _Candidate("apart", k, np.eye(n)[k])
+        yield "apart", k, np.eye(n)[k]
     for k in range(2, n - 1):
-        yield _Candidate("step", k, (np.arange(n) >= k).astype(np.float64))
+        yield "step", k, (np.arange(n) >= k).astype(np.float64)
     if n > 3:
-        yield _Candidate("trend", 0, np.linspace(-0.5 * (n - 1), 0.5 * (n - 1), n))
+        yield "trend", 0, np.linspace(-0.5 * (n - 1), 0.5 * (n - 1), n)
 
 
-def _best(values: FloatArray, weights: FloatArray, name: str) -> tuple[_Candidate | None, float]:
+def _best(values: FloatArray, weights: FloatArray, name: str) -> tuple[Candidate, float]:
     """The candidate with the least H after it, and the p-value of that rest."""
     n, k = values.shape
-    left = [(_left(values, weights, candidate.column), candidate) for candidate in _candidates(n)]
+    left = [(_left(values, weights, candidate[2]), candidate) for candidate in _candidates(n)]
     least, best = min(left, key=lambda pair: pair[0])
     dof = k * (n - 2)
     return best, 1.0 if dof <= 0 else _p(least, dof, name, n)
 
 
-def _stands_out(values: FloatArray, weights: FloatArray, best: _Candidate) -> bool:
+def _stands_out(values: FloatArray, weights: FloatArray, column: FloatArray) -> bool:
     """Whether a change exceeds the scatter of the rest (F test), corrected for the number of candidates."""
     n, k = values.shape
     dof = k * (n - 2)
     if n < 4:
         return False
-    before, after = _left(values, weights, None), _left(values, weights, best.column)
+    before, after = _left(values, weights, None), _left(values, weights, column)
     ratio = ((before - after) / k) / max(after / dof, 1e-300)
     return fdtrc(k, dof, ratio) * len(list(_candidates(n))) < MIN_REST_P
 
