@@ -38,16 +38,10 @@ Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
     factor, unit = shown(residuals.unit)
-    sides = [
-        (
-            "linear model" if has_effects else "fitted model",
-            residuals.time_before_s,
-            residuals.before,
-            residuals.sigma_before,
-            residuals.names_before,
-        ),
-        ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after, residuals.names_after),
-    ][: 2 if has_effects else 1]
+    r, first = residuals, "linear model" if has_effects else "fitted model"
+    sides = [(first, r.time_before_s, r.before, r.sigma_before, r.names_before)]
+    if has_effects:
+        sides.append(("with the effects", r.time_after_s, r.after, r.sigma_after, r.names_after))
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
     times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])
     start, end = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)

@@ -170,10 +170,10 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
     for k, channel in enumerate(map(channel_in_print, seen.channels)):
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
+        where = [f"{label.split(' [')[0]} {plain_number(a)} {unit_x}" for a in x]
         told = [
-            f"{said(f'{seen.kind} {n}, {channel}', float(v), unit)}, "
-            f"{label.split(' [')[0]} {plain_number(float(a))} {unit_x}"
-            for n, (a, v) in enumerate(zip(x, data, strict=True), start=1)
+            f"{said(f'{seen.kind} {n}, {channel}', v, unit)}, {at}"
+            for n, (at, v) in enumerate(zip(where, data, strict=True), 1)
         ]
         marks.append(Points(x, data, told, None, f"{channel}: without the effects", colour))
         # Tilt errors are angles between vectors: their difference is not the explained part.

@@ -46,9 +46,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     if summary.n_diagnosed:
         sections.append(Section("Physics that devices share", tuple(_physics(summary))))
     if summary.repeated:
-        sections.append(
-            Section("How devices differ" if len(devices) > 1 else "How the logs differ", tuple(_spread(summary)))
-        )
+        heading = "How devices differ" if len(devices) > 1 else "How the logs differ"
+        sections.append(Section(heading, tuple(_spread(summary))))
     if summary.outliers or summary.repeated:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
@@ -160,9 +159,8 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
     seconds = [log.seconds for log in summary.logs if log.seconds is not None]
     if seconds:
-        facts.append(
-            ("work", f"{plain_number(sum(seconds), 3)} s in all, {plain_number(max(seconds), 2)} s the longest log")
-        )
+        longest = f"{plain_number(max(seconds), 2)} s the longest log"
+        facts.append(("work", f"{plain_number(sum(seconds), 3)} s in all, {longest}"))
     return tuple(facts)
 
 
@@ -187,16 +185,11 @@ def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
 def _physics(summary: FleetSummary) -> list[Block]:
     if not summary.effects:
         return [Paragraph(f"No effect beyond the linear model was accepted in {how_many(summary.n_diagnosed, 'log')}.")]
-    n = summary.n_devices_diagnosed
-    rows = [
-        (
-            effect.id,
-            f"{effect.n_logs} of {summary.n_diagnosed}",
-            f"{effect.n_devices} of {n}",
-            f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %",
-        )
-        for effect in summary.effects
-    ]
+    rows = []
+    for effect in summary.effects:
+        logs = f"{effect.n_logs} of {summary.n_diagnosed}"
+        devices = f"{effect.n_devices} of {summary.n_devices_diagnosed}"
+        rows.append((effect.id, logs, devices, f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %"))
     return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows), "Effects by device")]
 
 

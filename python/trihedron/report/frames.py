@@ -46,9 +46,7 @@ def made_by(library: str, columns: Columns) -> Any:
     except ModuleNotFoundError:
         raise RefusedError(f"{library} is not installed: pip install {library}.") from None
     # Copies: polars warns about read-only NumPy arrays, and both libraries then own the data.
-    owned = {
-        name: np.array(values) if isinstance(values, np.ndarray) else list(values) for name, values in columns.items()
-    }
+    owned = {name: np.array(of) if isinstance(of, np.ndarray) else list(of) for name, of in columns.items()}
     return frames.DataFrame(owned)
 
 

@@ -32,6 +32,9 @@ from trihedron.units import mm_s2_from_m_s2
 
 CLOSE = 0.01
 """Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
+_INNOVATIONS = """Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of \
+such means lie when the noise model is right."""
+_CORRECTED = "Corrected minus reference specific force of every pose."
 
 
 def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
@@ -97,10 +100,6 @@ def _limits(seen: Consistency) -> str:
     return f"{plain_number(seen.nis_low)} to {plain_number(seen.nis_high)}"
 
 
-_INNOVATIONS = """Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of \
-such means lie when the noise model is right."""
-
-
 def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> list[Section]:
     facts = (
         ("poses", f"{outcome.n_poses} in known attitudes"),
@@ -123,11 +122,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands.",
             partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
         ),
-        Picture(
-            "residual",
-            "Corrected minus reference specific force of every pose.",
-            partial(residual_chart, outcome.residual_m_s2),
-        ),
+        Picture("residual", _CORRECTED, partial(residual_chart, outcome.residual_m_s2)),
     ]
     return [
         Section("Result", (Facts(facts), *(_constants_table(a, outcome.accelerometer.raw_unit) for a in outcome.axes))),

@@ -31,18 +31,14 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
     panels = []
     for k, name in enumerate(CONSTANT_NAMES):
         last, sigma = float(track.constants[-1, k]), track.sigma[:, k]
-        lines = [
-            Line(pose, found.constants[:, k], *METHODS[found.method])
-            for found in axis.tracks
-            if found.method in METHODS
-        ]
+        tracks = [found for found in axis.tracks if found.method in METHODS]
+        lines = [Line(pose, found.constants[:, k], *METHODS[found.method]) for found in tracks]
         batch = [Level(y=float(c[k]), colour="ink", is_dashed=True, name="batch") for c, _ in axis.batch.values()]
         of = unit if name == "U0" else f"{unit}/(m/s²)"
         y = Scale(f"{name} [{of}]", of, limits=_frame([t.constants[:, k] for t in axis.tracks], sigma, last))
         band = Band(pose, last - 3 * sigma, last + 3 * sigma, "3 σ of the filter")
-        panels.append(
-            Panel(Scale("poses", whole=True, limits=(1, max(2, len(pose)))), y, (band, *batch, *lines), height_px=150)
-        )
+        x = Scale("poses", whole=True, limits=(1, max(2, len(pose))))
+        panels.append(Panel(x, y, (band, *batch, *lines), height_px=150))
     return Chart(tuple(panels), columns=2, is_linked=False)
 
 

@@ -254,9 +254,8 @@ def _short_names(names: Sequence[str]) -> tuple[str, ...]:
 
 def _compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
     """(n,) variance of parameter ``k`` for comparing recordings: that of each plus the mean drift of its group."""
-    drift = {
-        group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in {s.group for s in sessions}
-    }
+    groups = {s.group for s in sessions}
+    drift = {group: np.mean([s.drift[k] for s in sessions if s.group == group]) for group in groups}
     return np.array([max(s.covariance[k, k] + drift[s.group], 0.0) for s in sessions])
 
 
