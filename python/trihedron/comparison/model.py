@@ -213,8 +213,10 @@ def _as_given(given: Calibration, recording: Recording, segments: Segments) -> S
     checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
 
     def of(domain: Domain, error: FloatArray, noise: FloatArray | None, unit: str) -> list[StageDomain]:
+        if not len(error):
+            return []
         chi2 = None if noise is None else float(np.mean((error / noise) ** 2))
-        return [StageDomain(domain, float(np.sqrt(np.mean(error**2))), chi2, unit)] if len(error) else []
+        return [StageDomain(domain, float(np.sqrt(np.mean(error**2))), chi2, unit)]
 
     return Stage(
         "as-given",

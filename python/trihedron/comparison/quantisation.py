@@ -103,8 +103,10 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
         ratio = ratio_of(made.measured(), seen.measured())
         is_off = ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > LEAST_RATIO
         remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {ratio.value:.2g} times the recording's."
-        said = (ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off, remark if is_off else "")
-        yield NoiseDifference(sensor, axis, "Q", *values, *said)
+        yield NoiseDifference(
+            sensor, axis, "Q", *values, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off,
+            remark if is_off else "",
+        )  # fmt: skip
         return
     difference = abs(made.quantisation - seen.quantisation)
     p_value = math.erfc(difference / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))

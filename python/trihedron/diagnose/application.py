@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context, sensor_axes
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
@@ -38,40 +38,7 @@ class SignalMissing(RefusedError):
 class SampleContext(Context):
     """Context of an effect that is compensated: every sample is a point; poses and moves are not known."""
 
-    recording: Recording = field(kw_only=True)
-    given_force: FloatArray = field(kw_only=True)
-    given_rate: FloatArray = field(kw_only=True)
-    accel_S: FloatArray = field(kw_only=True)
-    gyro_S: FloatArray = field(kw_only=True)
     reference: Mapping[str, float] = field(kw_only=True)
-
-    @property
-    def n_points(self) -> int:
-        return len(self.given_force)
-
-    @property
-    def moves(self) -> tuple[slice, ...]:
-        return (slice(0, self.n_points),)
-
-    @cached_property
-    def time_s(self) -> FloatArray:
-        return self.recording.time_s
-
-    @property
-    def force(self) -> FloatArray:
-        return self.given_force
-
-    @property
-    def rate(self) -> FloatArray:
-        return self.given_rate
-
-    @cached_property
-    def accel_axes(self) -> FloatArray:
-        return sensor_axes(self.accel_S)
-
-    @cached_property
-    def gyro_axes(self) -> FloatArray:
-        return sensor_axes(self.gyro_S)
 
     @cached_property
     def angular_acceleration(self) -> FloatArray:
@@ -128,15 +95,16 @@ def compensate(
     zero = np.zeros((recording.n_samples, 3))
     read_f = zero if raw_f is None else raw_f @ S_f.T + b_f
     read_w = zero if raw_w is None else raw_w @ S_w.T + b_w
-    obs = cast(Observations, SimpleNamespace(recording=recording, raw_rate=raw_w, raw_force=raw_f, n_poses=0))
+    t, every = recording.time_s, np.arange(recording.n_samples)
+    obs = SimpleNamespace(recording=recording, time_s=t, pose_time_s=t[:0], raw_rate=raw_w, raw_force=raw_f, n_poses=0)
+    state = SimpleNamespace(accel_S=S_f, gyro_S=S_w)
     left_out: dict[str, str] = {}
     known = {effect.id: effect for effect in catalogue()}
     force, rate = read_f, read_w
     for _ in range(N_ITERATIONS):
-        context = SampleContext(
-            obs, cast(Fit, None), recording=recording, given_force=force, given_rate=rate, accel_S=S_f, gyro_S=S_w,
-            reference=references,
-        )  # fmt: skip
+        path = SimpleNamespace(force=force, rate=rate, move_slices=(slice(0, len(every)),), point_samples=every)
+        fitted = SimpleNamespace(path=path, state=state)
+        context = SampleContext(cast(Observations, obs), cast(Fit, fitted), reference=references)
         force, rate = read_f, read_w
         for entry in effects:
             variant = _variant(entry, known, context, left_out)

@@ -55,7 +55,7 @@ class Context:
     @cached_property
     def time_s(self) -> FloatArray:
         """(points,) middle of each pose, time of each sample."""
-        times: FloatArray = self.obs.time_s[self.fitted.path.point_samples].copy()
+        times = self.obs.time_s[self.fitted.path.point_samples]
         times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
 
@@ -110,12 +110,12 @@ class Context:
     @cached_property
     def accel_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
-        return sensor_axes(self.fitted.state.accel_S)
+        return _sensor_axes(self.fitted.state.accel_S)
 
     @cached_property
     def gyro_axes(self) -> FloatArray:
         """(3, 3) columns: change of corrected rate when gyro j alone reads 1 rad/s more along its own axis."""
-        return sensor_axes(self.fitted.state.gyro_S)
+        return _sensor_axes(self.fitted.state.gyro_S)
 
     @cached_property
     def axis_force(self) -> FloatArray:
@@ -280,7 +280,7 @@ class Context:
         return out
 
 
-def sensor_axes(S: FloatArray) -> FloatArray:
+def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
     return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
 

@@ -10,13 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.session.aliasing import GAP
 
 EITHER = 0.5
 """Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
 BLOCK = 1 << 16
 """Rows processed together, to bound the memory of intermediate arrays in a long log."""
-GAP = 1.5
-"""A step longer than this many usual ones has lost samples: no second difference is taken across it."""
 
 
 def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatArray:
@@ -24,6 +23,7 @@ def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatAr
     if share == 0.0:
         return readings
     steps = np.diff(time_s)
+    # No second difference is taken across lost samples.
     is_whole = steps < GAP * np.median(steps)
     out = np.array(readings)
     for start in range(1, len(out) - 1, BLOCK):

@@ -100,8 +100,8 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
     scatter = 0.0 if along is None else expected_scatter(recording.accelerometer, spans, along[0])
-    of_gyro = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
-    return SessionNoise(sigmas[0], densities[0], *of_gyro, variances, along, scatter, of_rate)
+    rate_sigma, rate_density = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
+    return SessionNoise(sigmas[0], densities[0], rate_sigma, rate_density, variances, along, scatter, of_rate)
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:

@@ -77,12 +77,13 @@ class FittedModel:
 def model_of_calibration(calibration: Calibration) -> FittedModel:
     """A calibration as given. It contains no bias change between sessions: the comparison uses the recording's."""
     accel, gyro = calibration.accelerometer, calibration.gyroscope
-    of_gyro = (None, None, "") if gyro is None else (gyro.S, gyro.b, gyro.raw_unit)
+    S_w, b_w, unit_w = (None, None, "") if gyro is None else (gyro.S, gyro.b, gyro.raw_unit)
     covariance = np.array(calibration.covariance, dtype=np.float64)
     if not np.any(covariance):
         numbers = [accel.S.ravel(), accel.b] + ([] if gyro is None else [gyro.S.ravel(), gyro.b])
         covariance = np.diag((PUBLISHED_DIGITS * np.concatenate(numbers)) ** 2)
-    return FittedModel(accel.S, accel.b, accel.raw_unit, *of_gyro, covariance, np.zeros(3), np.zeros(3))
+    nothing = np.zeros(3)
+    return FittedModel(accel.S, accel.b, accel.raw_unit, S_w, b_w, unit_w, covariance, nothing, nothing)
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
@@ -95,19 +96,20 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
         raise RefusedError("a diagnosis is compared by its covariance, and this one carries none")
-    accel, gyro = (
+    (S_f, b_f, unit_f), (S_w, b_w, unit_w) = (
         (None, None, "") if side is None else (np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]))
         for side in (fit.accelerometer, fit.gyroscope)
     )
-    assert accel[0] is not None
-    assert accel[1] is not None
+    assert S_f is not None
+    assert b_f is not None
     covariance = np.array(fit.covariance)
     widened = np.ones(len(covariance))
     widened[:12] = np.sqrt(_excess(tests, "static-accel"))
     widened[12:21] = np.sqrt(max(_excess(tests, "moves"), _excess(tests, "dynamics")))
     covariance *= np.outer(widened, widened)
     of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
-    return FittedModel(accel[0], accel[1], accel[2], *gyro, covariance, _floor(diagnosis, "accelerometer"), of_gyro)
+    of_accel = _floor(diagnosis, "accelerometer")
+    return FittedModel(S_f, b_f, unit_f, S_w, b_w, unit_w, covariance, of_accel, of_gyro)
 
 
 def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.within_poses import find_lines
 from trihedron.records.diagnosis import EffectParameter
@@ -18,30 +19,23 @@ class PeriodicInterference(DirectEffect):
     is_of_samples = True
 
     def find(self, context: Context) -> Evidence | None:
-        lines = find_lines(context.obs)
-        if not lines:
-            return None
         # Long poses resolve lines of a hundredth of the noise: such a line is named where it disagrees in its domain
         # and improves the prediction of held-out readings.
-        lines = [line for line in lines if line.has_size and line.power_after < line.power_before]
+        lines = [line for line in find_lines(context.obs) if line.has_size and line.rms_after < line.rms_before]
         if not lines:
             return None
         strongest = min(lines, key=lambda line: line.p_value)
         same = [line for line in lines if abs(line.frequency_hz - strongest.frequency_hz) < line.resolution_hz]
         parameters = [EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz")]
-        state = context.fitted.state
         for line in same:
-            S = state.accel_S if line.channel[0] == "a" else state.gyro_S
-            scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[line.axis]))
-            unit = "m/s^2" if line.channel[0] == "a" else "rad/s"
+            sensor, axis = divmod(line.index, 3)
+            scale, unit = float(context.si_per_raw(sensor)[axis]), SENSORS[sensor].unit
             parameters.append(
                 EffectParameter(f"amplitude_{line.channel}", line.amplitude * scale, line.amplitude_sigma * scale, unit)
             )
         where = Where(tuple(line.channel for line in same), (), (), (strongest.frequency_hz,))
-        held = HeldOut(
-            "within-static", strongest.power_before, strongest.power_after, strongest.rms_before, strongest.rms_after,
-            "raw",
-        )  # fmt: skip
+        before, after, noise = strongest.rms_before, strongest.rms_after, strongest.noise
+        held = HeldOut("within-static", (before / noise) ** 2, (after / noise) ** 2, before, after, "raw")
         return Evidence(
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
             self.told("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),

@@ -29,9 +29,7 @@ class Empirical(Effect):
 
     id = ""
 
-    def variants(self, context: Context) -> list[Variant]:
-        """None: the search builds them."""
-        del context
+    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
         return []
 
 

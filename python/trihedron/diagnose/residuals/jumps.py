@@ -75,7 +75,7 @@ def jumps_in_poses(obs: Observations) -> Jumps:
     steps = [_steps(_block_means(obs, raw, which)) for raw in sides]
     found = [_jumps(own, steps[1 - k] if len(steps) > 1 else None, k, which) for k, own in enumerate(steps)]
     accel, gyro = (*found, none, none)[:2]
-    return Jumps(*((a, b) for a, b in zip(accel, gyro, strict=True)))
+    return Jumps((accel.p_value, gyro.p_value), (accel.ratio, gyro.ratio), (accel.poses, gyro.poses))
 
 
 class _Found(NamedTuple):

@@ -39,20 +39,23 @@ COHERENT = 4.0
 
 @dataclass(frozen=True)
 class Line:
-    """A spectral line of one channel; powers are relative to the noise around it, amplitude in raw units."""
+    """A spectral line of one channel (0 to 5); amplitude, ``noise`` around it and held-out rms in raw units."""
 
-    channel: str
-    axis: int
+    index: int
     frequency_hz: float
     frequency_sigma_hz: float
     resolution_hz: float
     amplitude: float
     amplitude_sigma: float
     p_value: float
-    power_before: float
-    power_after: float
+    noise: float
     rms_before: float
     rms_after: float
+
+    @property
+    def channel(self) -> str:
+        """Name of the channel."""
+        return CHANNELS[self.index]
 
     @property
     def share(self) -> float:
@@ -184,7 +187,7 @@ def _refine(
             break
         stretch *= 3.0
     amplitude = float(np.hypot(*_sinusoid(t, x, best_f)))
-    noise = np.sqrt(density)
+    noise = float(np.sqrt(density))
     sigma = float(noise * np.sqrt(2.0 / len(t)))
     if amplitude < COHERENT * sigma:
         # Not coherent through the recording: the line is real, its amplitude is that of single poses.
@@ -194,10 +197,7 @@ def _refine(
     left = x[rest] - _basis(t[rest], best_f) @ _sinusoid(t[early], x[early], best_f)
     before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean(left**2)))
     frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / max(amplitude, 1e-300) / np.sqrt(2.0))
-    return Line(
-        CHANNELS[c], c % 3, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300),
-        (before / noise) ** 2, (after / noise) ** 2, before, after,
-    )  # fmt: skip
+    return Line(c, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300), noise, before, after)
 
 
 def _wandering(
@@ -229,10 +229,8 @@ def _wandering(
     before, after = np.sqrt(sums / max(n, 1))
     sigma = noise * float(np.sqrt(2.0 / lengths.sum()))
     of_frequency = float(resolution / max(np.sqrt(lengths.sum() / lengths.mean()), 1.0))
-    return Line(
-        CHANNELS[c], c % 3, f, of_frequency, resolution, amplitude, sigma, max(p, 1e-300), float((before / noise) ** 2),
-        float((after / noise) ** 2), float(before), float(after),
-    )  # fmt: skip
+    found = (amplitude, sigma, max(p, 1e-300), noise, float(before), float(after))
+    return Line(c, f, of_frequency, resolution, *found)
 
 
 def _basis(t: FloatArray, f: float) -> FloatArray:
