@@ -20,7 +20,15 @@ _CANDIDATES = ("s", "ms", "us", "ns")
 PLAUSIBLE_HZ = (0.02, 20000.0)
 _SLOW_TICKS = -1.0
 """Log odds of ticks below 2 Hz: such logs use seconds; a slow tick counter is rarer than one 1000 times faster."""
-_BANDS = ((0.2, -5.0), (0.7, -3.0), (2.0, -1.0), (10.0, -1.5), (900.0, 0.0), (2100.0, -0.5), (2500.0, -1.5))
+_BANDS: tuple[tuple[float, float], ...] = (
+    (0.2, -5.0),
+    (0.7, -3.0),
+    (2.0, -1.0),
+    (10.0, -1.5),
+    (900.0, 0.0),
+    (2100.0, -0.5),
+    (2500.0, -1.5),
+)
 _BANDS += ((math.inf, -3.0),)
 """Log odds of a rate below each bound: loggers run between 10 Hz and 1 kHz, some at 1 Hz, hardly any below 0.2 Hz."""
 _FRACTIONS = {"s": 0.0, "ms": -1.5, "us": -4.0, "ns": -6.0}
