@@ -61,7 +61,7 @@ def adc_step(readings: FloatArray) -> float:
     if step or len(levels) < TESTABLE or REPEATS * len(levels) > n:
         return step
     parts = [_core.levels_of(part) for part in np.array_split(seen, PARTS)]
-    steps = [_core.adc_grid(*part) for part in parts if len(part[0]) > TESTABLE]
+    steps = [_core.adc_grid(*part) or 0.0 for part in parts if len(part[0]) > TESTABLE]
     return float(np.median(steps)) if steps and all(steps) else 0.0
 
 

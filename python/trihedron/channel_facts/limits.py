@@ -1,8 +1,8 @@
 """Range limits of an ADC or a sensor, detected from extreme values of readings, never from a nominal range. No other
 module searches for them.
 
-Two kinds of evidence make a value a limit, each rare enough in healthy readings: clipped peaks, and codes that are read
-more often than those before them.
+Three kinds of evidence make a value a limit, each rare enough in healthy readings: clipped peaks, noise that ends
+abruptly, and codes that are read more often than those before them.
 A channel that stands still while all others stand still too is no evidence: it is a pose, or a constant rate.
 """
 
@@ -21,6 +21,17 @@ from trihedron.probability import chdtrc
 from trihedron.quantiles import median
 from trihedron.records.channel_facts import Limit
 
+NOISE_ALONE = 20.0
+"""Standard deviations of the noise that contain all readings of a static log; less motion than that counts as none."""
+CARRIED = 0.5
+"""Noise over LSB from which it moves readings from one code to the next: below, a pose or a constant value looks like a
+limit."""
+ABRUPT = 0.6
+"""A tail of noise thins out: this share of the readings within 1.5 LSB of an extreme, on it, indicates clipping."""
+BESIDE = 1.5
+FEWEST_CUT, LEAST_SHARE = 10, 1e-3
+"""Readings on it, and their share of all, that this test needs."""
+
 BY_CHANCE = 1e-6
 """False-alarm probability of readings that crowd on the outermost code of a sensor."""
 DITHERED = 1.5
@@ -30,6 +41,15 @@ REACHES = (1, 3, 40)
 the first few more often than those far below, a quick one all equally often."""
 UNREAD = 1.0 / 3.0
 """Expected readings of a code where none of its neighbours was read."""
+
+
+def is_cut_noise(end: End) -> bool:
+    """Whether the noise of a static log ends abruptly: a tail thins out towards its end, clipped noise does not."""
+    if end.dither <= CARRIED * end.step or end.span > NOISE_ALONE * end.noise:
+        return False
+    if end.count <= max(FEWEST_CUT, LEAST_SHARE * len(end.readings)):
+        return False
+    return end.count > ABRUPT * (end.count + end.near(BESIDE * end.step))
 
 
 def crowded_together(ends: list[End]) -> list[End]:
@@ -131,7 +151,8 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
         return False
     is_word = is_end_of_word(end.value, end.step)
     is_known = is_word or any(_is_same_code(end, other) for other in lasting if other is not end)
-    return is_cut(end, is_known=is_known, is_word=is_word) or _chance([end]) < BY_CHANCE
+    is_peak = is_cut(end, is_known=is_known, is_word=is_word)
+    return is_peak or is_cut_noise(end) or _chance([end]) < BY_CHANCE
 
 
 def _is_same_code(one: End, other: End) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,54 +24,17 @@ from trihedron.read.errors import (
 )
 from trihedron.read.text.layout import MISSING, Layout, detect
 
-
-@dataclass(frozen=True, eq=False)
-class RowsOnDisk:
-    """An array (n, k) of numbers in a file; ``by_columns`` means column-major order."""
-
-    path: Path
-    shape: tuple[int, int]
-    dtype: np.dtype[Any]
-    offset: int
-    by_columns: bool
-
-    def read(self, start: int, stop: int) -> npt.NDArray[Any]:
-        """Rows ``[start, stop)`` as an array (stop - start, k) in the file's data type.
-
-        Raises
-        ------
-        ReadError
-            When the file was truncated meanwhile, or the system cannot read it.
-        """
-        n, width = self.shape
-        start, stop = min(max(start, 0), n), min(stop, n)
-        rows = max(stop - start, 0)
-        try:
-            with self.path.open("rb") as stream:
-                if not self.by_columns:
-                    return self._taken(stream, start * width, rows * width).reshape(rows, width)
-                out = np.empty((rows, width), self.dtype)
-                for k in range(width):
-                    out[:, k] = self._taken(stream, k * n + start, rows)
-                return out
-        except OSError as error:
-            raise from_os_error(self.path, error) from None
-
-    def _taken(self, stream: Any, first: int, count: int) -> npt.NDArray[Any]:
-        stream.seek(self.offset + first * self.dtype.itemsize)
-        part = np.fromfile(stream, dtype=self.dtype, count=count)
-        if len(part) < count:
-            raise ReadError(f"{self.path}: the file became shorter while it was read; copy it again.")
-        return part
+Rows = Callable[[int, int, tuple[int, ...]], npt.NDArray[Any]]
+"""Function that reads rows ``[start, stop)`` of some columns as an array (stop - start, columns)."""
 
 
-def rows_on_disk(path: Path) -> RowsOnDisk:
-    """The rows of a .npy file.
+def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
+    """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type.
 
     Raises
     ------
     ReadError
-        When the file is damaged, or its array is not a table of numbers.
+        When the file is damaged, or its array is not a table of numbers; from the function, when it was truncated.
     """
     try:
         with path.open("rb") as stream:
@@ -83,7 +46,50 @@ def rows_on_disk(path: Path) -> RowsOnDisk:
         raise ReadError(f"{path}: this .npy file is damaged ({first_line(error)}); write it again.") from None
     if dtype.kind not in "iuf" or len(shape) != len(("rows", "columns")):
         raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {dtype} {shape}.")
-    return RowsOnDisk(path, (shape[0], shape[1]), dtype, offset, by_columns)
+    n, width = shape
+
+    def taken(stream: Any, first: int, count: int) -> npt.NDArray[Any]:
+        stream.seek(offset + first * dtype.itemsize)
+        part = np.fromfile(stream, dtype=dtype, count=count)
+        if len(part) < count:
+            raise ReadError(f"{path}: the file became shorter while it was read; copy it again.")
+        return part
+
+    def read(start: int, stop: int, columns: tuple[int, ...]) -> npt.NDArray[Any]:
+        try:
+            with path.open("rb") as stream:
+                if by_columns:
+                    return np.column_stack([taken(stream, k * n + start, stop - start) for k in columns])
+                part = taken(stream, start * width, (stop - start) * width).reshape(-1, width)
+        except OSError as error:
+            raise from_os_error(path, error) from None
+        return part if columns == tuple(range(width)) else np.ascontiguousarray(part[:, columns])
+
+    return n, width, read
+
+
+def _rows_of_parquet(path: Path, converted: TextOnDisk | None) -> tuple[int, int, Rows]:
+    """As :func:`_rows_of_array`, of a Parquet table, or of that to which a text was ``converted``."""
+    import polars
+
+    def table() -> polars.LazyFrame:
+        # A converted text is deleted with its object, which stays with this function.
+        return polars.scan_parquet(path if converted is None else converted.path)
+
+    with errors_of_polars(path, "this Parquet file is damaged"):
+        n_rows = int(table().select(polars.len()).collect().item())
+        n_columns = len(table().collect_schema())
+
+    def read(start: int, stop: int, columns: tuple[int, ...]) -> npt.NDArray[Any]:
+        with errors_of_polars(path, "this Parquet file is damaged"):
+            names = table().collect_schema().names()
+            wanted = table().select([names[c] for c in columns])
+            part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
+        if len(part) < stop - start or part.dtype.kind not in "iuf":
+            raise ReadError(f"{path}: rows {start} to {stop} of this Parquet file are not all numbers; write it again.")
+        return part
+
+    return n_rows, n_columns, read
 
 
 HEAD_BYTES = 1 << 16
@@ -172,42 +178,23 @@ class ChunkedLog:
     n_rows: int
     roles: tuple[str, ...]
     columns: tuple[int, ...]
-    on_disk: RowsOnDisk | None = None
-    table: TextOnDisk | None = None
-    """For a text: the Parquet table that is read instead."""
+    read: Rows
 
     def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
         """Yield arrays (k, columns) in order from row ``first`` on, in the file's data type."""
         for start in range(first, self.n_rows, rows):
-            yield self._part(start, min(start + rows, self.n_rows))
+            yield self.read(start, min(start + rows, self.n_rows), self.columns)
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
         """Rows ``[start, stop)`` as float64 (stop - start, columns)."""
+        start, stop = min(max(start, 0), self.n_rows), min(stop, self.n_rows)
         if stop <= start:
             return np.empty((0, len(self.columns)))
-        return np.asarray(self._part(start, stop), dtype=np.float64)
+        return np.asarray(self.read(start, stop, self.columns), dtype=np.float64)
 
     def whole(self) -> npt.NDArray[np.float64]:
         """All rows (n, columns)."""
-        return self._part(0, self.n_rows)
-
-    def _part(self, start: int, stop: int) -> npt.NDArray[Any]:
-        if self.on_disk is not None:
-            part = self.on_disk.read(start, stop)
-            picked = list(self.columns)
-            return part if picked == list(range(part.shape[1])) else np.ascontiguousarray(part[:, picked])
-        import polars
-
-        with errors_of_polars(self.path, "this Parquet file is damaged"):
-            table = polars.scan_parquet(self.path if self.table is None else self.table.path)
-            names = table.collect_schema().names()
-            wanted = table.select([names[c] for c in self.columns])
-            part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
-        if len(part) < stop - start or part.dtype.kind not in "iuf":
-            raise ReadError(
-                f"{self.path}: rows {start} to {stop} of this Parquet file are not all numbers; write it again."
-            )
-        return part
+        return self.read(0, self.n_rows, self.columns)
 
 
 def open_chunks(path: Path, columns: str) -> ChunkedLog:
@@ -225,19 +212,11 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
             magic = stream.read(6)
     except OSError as error:
         raise from_os_error(path, error) from None
-    on_disk = text = None
     if magic == b"\x93NUMPY":
-        on_disk = rows_on_disk(path)
-        n_rows, n_columns = on_disk.shape
+        n_rows, n_columns, read = _rows_of_array(path)
     else:
-        import polars
-
         refuse_after_fork(path)
-        text = None if magic[:4] == b"PAR1" else TextOnDisk(path)
-        with errors_of_polars(path, "this Parquet file is damaged"):
-            table = polars.scan_parquet(path if text is None else text.path)
-            n_rows = int(table.select(polars.len()).collect().item())
-            n_columns = len(table.collect_schema())
+        n_rows, n_columns, read = _rows_of_parquet(path, None if magic[:4] == b"PAR1" else TextOnDisk(path))
     words = [word.strip().lower() for word in columns.split(",")]
     if len(words) != n_columns:
         raise ReadError(f"{path}: --columns names {len(words)} columns, the file has {n_columns}; '-' leaves one out.")
@@ -248,4 +227,4 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     roles = tuple(words[i] for i in picked)
     if not picked or len(set(roles)) < len(roles):
         raise ReadError(f"--columns: give each of {' '.join(ROLES)} at most once, and one of them.")
-    return ChunkedLog(path, n_rows, roles, picked, on_disk, text)
+    return ChunkedLog(path, n_rows, roles, picked, read)

@@ -108,9 +108,5 @@ def _attitudes(
         is_radians = role in found and "rad" in (table.names or ())[found[role]].lower()
         angles[role] = degrees_from_radians(1.0) * values if is_radians else values
     return PoseTable.from_angles(
-        angles["pitch"],
-        angles["roll"],
-        gravity_m_s2=gravity_m_s2,
-        sigma_angle_deg=sigma_angle_deg,
-        source=str(file),
+        angles["pitch"], angles["roll"], gravity_m_s2=gravity_m_s2, sigma_angle_deg=sigma_angle_deg, source=str(file)
     )

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.probability import bdtrc
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 
@@ -43,48 +42,21 @@ def refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int
             )
 
 
-MOST_LOOKED_AT = 100_000
-"""Rows compared with earlier ones, enough to measure a chance of equal readings of one in ten thousand."""
-LAGS = (2, 3, 4, 5)
-"""Rows back at which equality by chance is measured: beyond the possible copy, but near enough for the same pose."""
-BEYOND_CHANCE = 1e-6
-"""p-value below which equal readings with equal timestamps are copies."""
-BEYOND_COUNT = 2.0
-"""Smallest ratio to the number expected by chance: neighbours are slightly more alike than rows farther apart."""
 USUALLY = 0.5
-"""If this share of the rows that repeat a timestamp also repeat its readings, all of the latter are copies."""
+"""Share of the rows with an equal timestamp that must repeat its readings too, so that these are copies."""
 
 
 def copied_rows(
     columns: Sequence[FloatArray], time_s: FloatArray, rows: npt.NDArray[np.signedinteger]
 ) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) that repeat timestamp and readings of the previous sample more often than by chance.
+    """Samples (k,) that repeat timestamp and readings of the previous sample, if most that repeat its timestamp do.
 
     ``columns`` are the readings (rows of the table), ``rows`` (n,) the table row of each sample. Samples timestamped on
-    arrival share timestamps, and coarse codes in a pose share readings, so two samples may share both. The probability
-    that readings are equal by chance is measured two to five samples back, where none can be a copy.
+    arrival share timestamps, and coarse codes in a pose share readings, so two samples may share both; seldom most do.
     """
     again = np.flatnonzero(np.diff(time_s) == 0) + 1
-    is_alike = _alike(columns, rows, again, 1)
-    n_alike = int(np.count_nonzero(is_alike))
-    if n_alike == 0 or n_alike >= USUALLY * len(again):
-        return again[is_alike]
-    looked_at = again[:: max(len(again) // MOST_LOOKED_AT, 1)]
-    looked_at = looked_at[looked_at >= LAGS[-1]]
-    seen = sum(int(np.count_nonzero(_alike(columns, rows, looked_at, lag))) for lag in LAGS)
-    chance = (seen + 0.5) / (len(looked_at) * len(LAGS) + 1.0)
-    is_chance = n_alike <= BEYOND_COUNT * chance * len(again)
-    if is_chance or bdtrc(n_alike - 1.0, float(len(again)), chance) > BEYOND_CHANCE:
-        return again[:0]
-    return again[is_alike]
-
-
-def _alike(
-    columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger], samples: npt.NDArray[np.signedinteger], lag: int
-) -> npt.NDArray[np.bool_]:
-    """Whether every reading of these samples equals that of the sample ``lag`` earlier."""
-    out = np.ones(len(samples), dtype=bool)
+    is_alike = np.ones(len(again), dtype=bool)
     for values in columns:
         if len(values):
-            out &= values[rows[samples]] == values[rows[samples - lag]]
-    return out
+            is_alike &= values[rows[again]] == values[rows[again - 1]]
+    return again[is_alike] if np.count_nonzero(is_alike) >= USUALLY * len(again) else again[:0]

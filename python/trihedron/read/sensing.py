@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -73,8 +73,8 @@ def judge_accelerometer(
         against = _contradiction_accelerometer(unit, norm, is_given=given is not None)
         return Judged(unit, _stated("accelerometer", unit, against, is_given=given is not None))
     unit, code, case = _unit_at_rest(norm, is_whole=whole)
-    numbers = {"unit": unit.value} if case in ("mg-or-gal", "accelerometer-at-rest") else {}
-    return Judged(unit, (Finding.of(code, case, rest_norm=norm, **numbers),))
+    values: dict[str, Any] = {"unit": unit.value} if case in ("mg-or-gal", "accelerometer-at-rest") else {}
+    return Judged(unit, (Finding.of(code, case, rest_norm=norm, **values),))
 
 
 def _unit_at_rest(norm: float, *, is_whole: bool) -> tuple[AccelerationUnit, FindingCode, str]:
@@ -154,7 +154,7 @@ def judge_gyroscope(
     return Judged(unit, (_by_turning(FindingCode.UNIT_CONTRADICTED, "gyro-no-unit", unit, turning),))
 
 
-def _by_turning(code: FindingCode, case: str, unit: RateUnit, turning: Turning, **values: bool) -> Finding:
+def _by_turning(code: FindingCode, case: str, unit: RateUnit, turning: Turning, **values: Any) -> Finding:
     return Finding.of(
         code,
         case,

@@ -13,7 +13,7 @@ from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
-from trihedron.read.clock.unit import TICKS, counts_rows
+from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, mapping_of, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -197,6 +197,13 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
 
 
+def _witness(table: Table, chosen: Columns) -> Witness:
+    """Readings that limit the time between rows, in file order (the first part of a long log)."""
+    axes = [table.columns[c][:WITNESS_ROWS] for c in chosen.accelerometer or ()]
+    readings = np.stack(axes, axis=1) if axes and all(map(len, axes)) else None
+    return Witness(readings, None if chosen.temperature is None else table.columns[chosen.temperature])
+
+
 def settled(sensors: Sensors) -> Sensors:
     """The sensors on the clock that timestamps, counter and motion determine; unchanged if that is done already."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
@@ -238,14 +245,13 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
             findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given))
         if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
-        axes = [table.columns[c][:WITNESS_ROWS] for c in chosen.accelerometer or ()]
         clock = build_clock(
             with_arrivals(table, chosen.time),
             chosen.time,
             named,
             given,
             chosen.nanoseconds,
-            np.stack(axes, axis=1) if axes and all(map(len, axes)) else None,
+            _witness(table, chosen),
             table.is_private,
         )
         findings += clock.findings

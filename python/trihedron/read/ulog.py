@@ -147,12 +147,7 @@ def _check_definitions(path: Path) -> None:
 
 
 def _table(
-    path: Path,
-    data: dict[str, Any],
-    topic: str,
-    sha256: str,
-    onboard: Onboard | None,
-    findings: tuple[Finding, ...],
+    path: Path, data: dict[str, Any], topic: str, sha256: str, onboard: Onboard | None, findings: tuple[Finding, ...]
 ) -> Table:
     # The timestamp of the sample if the log has it; `timestamp` is that of publishing the message.
     timestamp = _timestamp(data)

@@ -221,7 +221,7 @@ class LineFedDecoder(ABC):
     def _take(self, lines: list[bytearray]) -> list[Frame]:
         return [frame for line in lines if (frame := self.frame_of(bytes(line))) is not None]
 
-    def reject(self, line: bytes | str, *, is_corrupt: bool = True) -> None:
+    def reject(self, line: bytes | bytearray | str, *, is_corrupt: bool = True) -> None:
         """Count a line without its line feed as skipped, and as corrupt unless it is a message of another kind."""
         self.corrupt += is_corrupt
         self.skipped_bytes += len(line) + 1

@@ -59,8 +59,8 @@ class LinesDecoder(LineFedDecoder):
     """
 
     name = "lines"
-    learned = ("columns", "clock_modulus", "tick_s", "_separator", "_n", "_time", "_counter", "_keep", "_per_unit")
-    learned += ("_monitor", "_pattern")
+    learned: tuple[str, ...] = ("columns", "clock_modulus", "tick_s", "_separator", "_n", "_time", "_counter")
+    learned += ("_keep", "_per_unit", "_monitor", "_pattern")
 
     def __init__(self, name_columns: NameColumns = name_by_position) -> None:
         super().__init__()

@@ -17,11 +17,7 @@ _LAST_KIND = 0x5F
 _G, _DEGREES = 16.0 / 32768, 2000.0 / 32768
 _DAY_MS = 86_400_000
 
-_COLUMNS = (
-    *(f"acc_{axis} [g]" for axis in "xyz"),
-    *(f"gyr_{axis} [deg/s]" for axis in "xyz"),
-    "temperature [degC]",
-)
+_COLUMNS = (*(f"acc_{axis} [g]" for axis in "xyz"), *(f"gyr_{axis} [deg/s]" for axis in "xyz"), "temperature [degC]")
 
 
 class WitMotionDecoder(FramedDecoder):

@@ -16,10 +16,7 @@ _INERTIAL = 0x80 + ord("I")
 _BODY = struct.Struct("<xQ6f")
 _TEXT = ",".join(["%.9g"] * 6)
 _ESCAPE = b"\xdb"
-_COLUMNS = (
-    *("gyr_x [deg/s]", "gyr_y [deg/s]", "gyr_z [deg/s]"),
-    *("acc_x [g]", "acc_y [g]", "acc_z [g]"),
-)
+_COLUMNS = (*("gyr_x [deg/s]", "gyr_y [deg/s]", "gyr_z [deg/s]"), *("acc_x [g]", "acc_y [g]", "acc_z [g]"))
 _LARGEST = 1e5
 """Limit in deg/s or g: no sensor has that range, but a flipped bit in the exponent of a float exceeds it."""
 

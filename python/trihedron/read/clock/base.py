@@ -10,7 +10,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import in_order, order_of_rows, unwrap
 from trihedron.read.clock.rate import steps_of
-from trihedron.read.clock.unit import seconds_of, time_unit
+from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -19,6 +19,7 @@ _SHORTEST_STEP_S = 1e-9
 """Smallest mean step of a log [s]; no ADC samples faster."""
 _LONGEST_S = 3.2e9
 """Longest duration of a log [s]: a century."""
+NOBODY = Witness()
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +38,13 @@ def build_clock(
     named: str,
     given: str | None,
     nanoseconds: int | None = None,
-    accelerometer: FloatArray | None = None,
+    witness: Witness = NOBODY,
     in_place: bool = False,
 ) -> Clock:
     """Seconds from a time column, or from whole seconds and a column of ``nanoseconds`` beside them.
 
-    ``accelerometer`` (n, 3) are readings in row order whose rotation limits the time between rows where the unit is not
-    stated. With ``in_place`` the clock may overwrite the column, which must not be used afterwards.
+    ``witness`` contains readings that limit the time between rows, for use where the unit is not stated. With
+    ``in_place`` the clock may overwrite the column, which must not be used afterwards.
 
     Raises
     ------
@@ -84,7 +85,7 @@ def build_clock(
     if order is not None:
         raw = in_order(raw, order, np.empty(len(order)))
         rows = order if rows is None else rows[order]
-    unit = time_unit(raw, named, given, wraps, accelerometer, findings)
+    unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = seconds_of(unit)
     span = (raw[-1] - raw[0]) * scale
     if len(raw) > 1 and span < _SHORTEST_STEP_S * (len(raw) - 1):

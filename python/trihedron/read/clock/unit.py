@@ -1,10 +1,10 @@
-"""The unit of a time column: given, named, or inferred from step, digits, length and rotation."""
+"""The unit of a time column: given, named, or inferred from step, digits, length and readings."""
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,15 @@ _CANDIDATES = ("s", "ms", "us", "ns")
 PLAUSIBLE_HZ = (0.02, 20000.0)
 _SLOW_TICKS = -1.0
 """Log odds of ticks below 2 Hz: such logs use seconds; a slow tick counter is rarer than one 1000 times faster."""
-_BANDS = ((0.2, -5.0), (0.7, -3.0), (2.0, -1.0), (10.0, -1.5), (900.0, 0.0), (2100.0, -0.5), (2500.0, -1.5))
+_BANDS: tuple[tuple[float, float], ...] = (
+    (0.2, -5.0),
+    (0.7, -3.0),
+    (2.0, -1.0),
+    (10.0, -1.5),
+    (900.0, 0.0),
+    (2100.0, -0.5),
+    (2500.0, -1.5),
+)
 _BANDS += ((math.inf, -3.0),)
 """Log odds of a rate below each bound: loggers run between 10 Hz and 1 kHz, some at 1 Hz, hardly any below 0.2 Hz."""
 _FRACTIONS = {"s": 0.0, "ms": -1.5, "us": -4.0, "ns": -6.0}
@@ -36,6 +44,8 @@ in the second 100 rad/s², a shock."""
 USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(3.0), -3.0
 """Usual time of a session's fastest 20 degrees (90 degrees in 1.5 s), the spread of its logarithm, and the lowest log
 odds, because slow rotation in a chamber has no limit."""
+FASTEST_KELVIN_S = 5.0
+"""Fastest change of temperature [K/s] of a part in its case; a chamber reaches 0.1 K/s."""
 _TURN_DEG, _SIDE = 20.0, 5
 _NEARLY_ALL = 0.95
 _SURE = 3.9
@@ -48,6 +58,14 @@ TICKS = "tick"
 _TICK = re.compile(r"(1\s*/\s*)?(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(k?hz|s|ms|us|µs|ns)", re.IGNORECASE)
 _LONG = {"min": 60.0, "minutes": 60.0, "h": 3600.0, "hours": 3600.0}
 _MOST_ROWS = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Readings in row order that limit the time between rows: (n, 3) and (n,), or ``None``."""
+
+    accelerometer: FloatArray | None = None
+    temperature: FloatArray | None = None
 
 
 def parse_time_unit(text: str) -> str:
@@ -73,12 +91,7 @@ def seconds_of(unit: str) -> float:
 
 
 def time_unit(
-    raw: FloatArray,
-    named: str,
-    given: str | None,
-    wraps: bool,
-    accelerometer: FloatArray | None,
-    findings: list[Finding],
+    raw: FloatArray, named: str, given: str | None, wraps: bool, witness: Witness, findings: list[Finding]
 ) -> str:
     """Unit of timestamps (n,) in order: given, named, from their date, or the most likely, stated as a finding."""
     if given is not None:
@@ -101,7 +114,7 @@ def time_unit(
     if dated:
         choice, sure = dated[0], True
     elif possible:
-        scores = _scores(raw, usual, possible, accelerometer)
+        scores = _scores(raw, usual, possible, witness)
         ranked = sorted(possible, key=lambda u: -scores[u])
         choice = ranked[0]
         sure = len(ranked) == 1 or scores[choice] - scores[ranked[1]] > _SURE
@@ -116,10 +129,11 @@ def time_unit(
     return choice
 
 
-def _scores(raw: FloatArray, usual: float, possible: list[str], accelerometer: FloatArray | None) -> dict[str, float]:
+def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness) -> dict[str, float]:
     """Log odds of every possible unit."""
     fractions = _has_fractions(raw)
-    rest_to_rest, any_turn = _quickest_turns(accelerometer)
+    rest_to_rest, any_turn = _quickest_turns(witness.accelerometer)
+    kelvin = _quickest_warming(witness.temperature)
     scores = {}
     for unit in possible:
         row_s = usual * SECONDS[unit]
@@ -133,6 +147,8 @@ def _scores(raw: FloatArray, usual: float, possible: list[str], accelerometer: F
             score += _IMPOSSIBLE if rest_to_rest * row_s < QUICKEST_TURN_S else _HASTY
         if any_turn is not None and any_turn * row_s > USUAL_TURN_S:
             score += max(-0.5 * (math.log(any_turn * row_s / USUAL_TURN_S) / _TURN_SPREAD) ** 2, _SLOWEST)
+        if kelvin is not None and kelvin / row_s > FASTEST_KELVIN_S:
+            score += _IMPOSSIBLE
         scores[unit] = score
     return scores
 
@@ -171,6 +187,18 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
     if accelerometer is None:
         return None, None
     return _core.quickest_turns(accelerometer[:_MOST_ROWS], _SIDE, math.radians(_TURN_DEG))
+
+
+def _quickest_warming(temperature: FloatArray | None) -> float | None:
+    """Largest change of temperature [K/row] between fiftieths of the log, over which thermometer noise averages out."""
+    if temperature is None or len(temperature) < 500:
+        return None
+    n = len(temperature) // 50
+    parts = temperature[: n * 50].reshape(50, n)
+    if not np.isfinite(parts).any(axis=1).all():
+        return None
+    blocks = np.nanmean(parts, axis=1)
+    return float(np.abs(np.diff(blocks)).max() / n)
 
 
 def _statement(usual: float, choice: str, sure: bool, possible: list[str], tick_s: dict[str, float]) -> Finding:

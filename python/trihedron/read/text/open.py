@@ -91,5 +91,6 @@ def _of_records(
         kinds=sorted(counts.items(), key=lambda kv: -kv[1])[:12],
         rows_left_out=left,
     )
-    first, second = (replace(table, sensor=kind) for kind, table in tables.items())
+    first = replace(tables["accelerometer"], sensor="accelerometer")
+    second = replace(tables["gyroscope"], sensor="gyroscope")
     return replace(first, rows_in_file=first.n_in_file + left, findings=(*first.findings, note)), second

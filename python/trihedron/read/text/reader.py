@@ -297,10 +297,7 @@ class TextReader:
             self.n_left_out += len(remarks)
             self.findings.append(
                 Finding.of(
-                    FindingCode.ROWS_LEFT_OUT,
-                    "remarks",
-                    rows_left_out=len(remarks),
-                    line=self.line(int(remarks[0])),
+                    FindingCode.ROWS_LEFT_OUT, "remarks", rows_left_out=len(remarks), line=self.line(int(remarks[0]))
                 )
             )
         columns: list[FloatArray] = []
