@@ -113,26 +113,17 @@ def _common(
 
 def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]) -> dict[str, Any]:
     """Extensions of the calibration file beside S and b (docs/calibration-file.md)."""
+    named = ("name", "group", "sha256", "temperature_degc")
     out: dict[str, Any] = {
         **kept,
-        "sessions": [
-            {
-                "name": s.name,
-                "group": s.group,
-                "sha256": s.sha256,
-                "temperature_degc": s.temperature_degc,
-            }
-            for s in model.sessions
-        ],
+        "sessions": [{name: getattr(session, name) for name in named} for session in model.sessions],
         "repeatability": [
             {
-                "id": one.parameter.id,
-                "name": one.parameter.name,
-                "unit": one.parameter.unit,
+                **{name: getattr(one.parameter, name) for name in ("id", "name", "unit")},
                 "value": one.value,
                 "std": one.std,
-                "within": None if one.within is None else vars(one.within),
-                "between": None if one.between is None else vars(one.between),
+                "within": one.within and vars(one.within),
+                "between": one.between and vars(one.between),
             }
             for one in model.repeated
         ],
@@ -146,13 +137,8 @@ def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]
             "axis_signs": anchor.signs,
             "triad": anchor.triad,
             "terms": [
-                {
-                    "id": term.id,
-                    "order": term.order,
-                    "coefficients": term.coefficients,
-                    "hysteresis": term.hysteresis,
-                    "remaining": [one.sd for one in term.remaining],
-                }
+                {name: getattr(term, name) for name in ("id", "order", "coefficients", "hysteresis")}
+                | {"remaining": [one.sd for one in term.remaining]}
                 for term in model.thermal.terms
             ],
         }
@@ -184,14 +170,8 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     out += [_changed(change, model) for change in model.changes if change.significant]
     temperatures = [s.temperature_degc for s in model.sessions if math.isfinite(s.temperature_degc)]
     if model.thermal is None and len(temperatures) > 1 and np.ptp(temperatures) > WIDE_RANGE_DEGC:
-        out.append(
-            Finding.of(
-                FindingCode.TEMPERATURE_DRIVEN,
-                low_degc=min(temperatures),
-                high_degc=max(temperatures),
-                span_degc=np.ptp(temperatures),
-            )
-        )
+        low, high = min(temperatures), max(temperatures)
+        out.append(Finding.of(FindingCode.TEMPERATURE_DRIVEN, low_degc=low, high_degc=high, span_degc=high - low))
     return tuple(out)
 
 

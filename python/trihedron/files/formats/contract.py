@@ -96,27 +96,21 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
 
     Refused when it is for counts and the LSB is not given.
     """
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
-    unit = acceleration_to_si(AccelerationUnit(accel.raw_unit))
-    if unit is None:
-        unit = acceleration_lsb_to_si(options.accel_lsb) if options.accel_lsb else None
-        _known(unit, target, "accelerometer", "--accel-lsb", "0.061 mg")
-    accel = _rescaled(accel, unit or 1.0)
-    if gyro is not None:
-        unit = rate_to_si(RateUnit(gyro.raw_unit))
-        if unit is None:
-            unit = rate_lsb_to_si(options.gyro_lsb) if options.gyro_lsb else None
-            _known(unit, target, "gyroscope", "--gyro-lsb", "0.0305 deg/s")
-        gyro = _rescaled(gyro, unit or 1.0)
-    return replace(calibration, accelerometer=accel, gyroscope=gyro)
-
-
-def _known(unit: float | None, target: str, sensor: str, option: str, example: str) -> None:
-    if unit is None:
-        raise RefusedError(
-            f"{target} expects {sensor} readings in SI and this calibration maps counts: say the size of a count that "
-            f"its driver assumes with {option} '{example}', or export to c, rust or python."
-        )
+    made = {}
+    for name, sensor in named_sensors(calibration):
+        if name == "accelerometer":
+            unit, lsb = acceleration_to_si(AccelerationUnit(sensor.raw_unit)), options.accel_lsb
+            lsb_to_si, said = acceleration_lsb_to_si, "--accel-lsb '0.061 mg'"
+        else:
+            unit, lsb = rate_to_si(RateUnit(sensor.raw_unit)), options.gyro_lsb
+            lsb_to_si, said = rate_lsb_to_si, "--gyro-lsb '0.0305 deg/s'"
+        if unit is None and not lsb:
+            raise RefusedError(
+                f"{target} expects {name} readings in SI and this calibration maps counts: say the size of a count "
+                f"that its driver assumes with {said}, or export to c, rust or python."
+            )
+        made[name] = _rescaled(sensor, lsb_to_si(lsb) if unit is None else unit)
+    return replace(calibration, **made)  # type: ignore[arg-type]
 
 
 def _rescaled(sensor: SensorCalibration, unit: float) -> SensorCalibration:
