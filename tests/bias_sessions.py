@@ -10,6 +10,7 @@ import numpy as np
 from trihedron.diagnose.rest.process import BiasReadings
 
 STEP_S = 0.25
+POSE_S, MOVE_S = 6.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -17,8 +18,6 @@ class Session:
     """What is drawn. Sizes are rms over the session in the unit of the biases (°/s), per axis."""
 
     n_poses: int = 25
-    pose_s: float = 6.0
-    move_s: float = 4.0
     noise: float = 0.004
     """Standard error of a whole pose's mean, white."""
     stated: float = 1.0
@@ -29,11 +28,6 @@ class Session:
     """Integrated walk."""
     swing: float = 0.0
     """Two swings of a temperature nobody logged."""
-    bump: float = 0.0
-    gravity: float = 0.0
-    """rms of what follows gravity."""
-    thermal: float = 0.0
-    """rms of what follows a logged temperature that swings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +51,8 @@ def draw(session: Session, seed: int) -> Zeros:
     """One session."""
     rng = np.random.default_rng(seed)
     h = session.n_poses
-    poses = session.pose_s * rng.uniform(0.8, 1.3, h)
-    moves = session.move_s * rng.uniform(0.6, 1.6, h)
+    poses = POSE_S * rng.uniform(0.8, 1.3, h)
+    moves = MOVE_S * rng.uniform(0.6, 1.6, h)
     begin = np.cumsum(np.r_[0.0, (poses + moves)[:-1]])
     clock = np.arange(0.0, begin[-1] + poses[-1] + STEP_S, STEP_S)
     n, x = len(clock), clock / clock[-1]
@@ -66,29 +60,23 @@ def draw(session: Session, seed: int) -> Zeros:
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     temperature = _unit(np.sin(2 * np.pi * rng.uniform(0.7, 1.3) * x + rng.uniform(0, 6)) + 0.5 * x)
     hidden = _unit(np.sin(2 * np.pi * rng.uniform(1.2, 2.2) * x + rng.uniform(0, 6)))
-    coupling = rng.normal(0, 1, (3, 3))
-    along_u = up @ coupling.T
-    along_u = session.gravity * (along_u - along_u.mean(axis=0)) / along_u.std(axis=0)
     values, sigma = [], []
-    for axis in range(3):
+    for _ in range(3):
         path = np.zeros(n)
         # Scaled by their expected rms: a walk scaled by its own would be tamer than a walk.
         path += session.walk * np.cumsum(rng.normal(size=n)) / np.sqrt(n / 6)
         wave = np.cumsum(np.cumsum(rng.normal(size=n)) + rng.normal() * n**0.5)
         path += session.smooth * wave / np.sqrt(n**3 * (1 / 30 + 1 / 12))
         path += session.swing * hidden * rng.choice((-1, 1))
-        path += session.thermal * temperature * rng.choice((-1, 1))
         row, errors = [], []
         middles, lengths, pose = [], [], []
         for i in range(h):
-            jump = session.scatter * rng.normal() + along_u[i, axis]
-            if session.bump and i == h // 3:
-                jump += session.bump
+            jump = session.scatter * rng.normal()
             for half in (0, 1):
                 a = begin[i] + half * poses[i] / 2
                 t = np.arange(a, a + poses[i] / 2, STEP_S / 5)
                 inside = np.interp(t, clock, path) + jump
-                true = session.noise * np.sqrt(2.0 * session.pose_s / poses[i])
+                true = session.noise * np.sqrt(2.0 * POSE_S / poses[i])
                 row.append(inside.mean() + true * rng.normal())
                 errors.append(true * session.stated)
                 middles.append(a + poses[i] / 4)

@@ -35,7 +35,7 @@ def rates_of(C):
     return np.vstack([w[:1], w, w[-1:]])
 
 
-def hand(rng, seconds, reach=1.2, rest_s=2.0):
+def hand(rng, seconds, rest_s=2.0):
     """A hand that turns all ways: sums of slow sines on three Euler angles, beginning and ending at rest."""
     t = np.arange(0, seconds, 1 / FINE_HZ)
     gate = np.clip(np.minimum(t - rest_s, seconds - rest_s - t) / 2.0, 0, 1)
@@ -45,7 +45,7 @@ def hand(rng, seconds, reach=1.2, rest_s=2.0):
         f, a = rng.uniform(0.05, 0.7, 5), rng.uniform(0.3, 1.0, 5)
         p = rng.uniform(0, 2 * np.pi, 5)
         x = sum(ai * np.sin(2 * np.pi * fi * t + pi) for ai, fi, pi in zip(a, f, p, strict=True))
-        angles.append(reach * gate * x / 1.5)
+        angles.append(1.2 * gate * x / 1.5)
     C = turn(2, angles[0]) @ turn(1, 0.7 * angles[1]) @ turn(0, angles[2])
     # The hand's own way, some decimetres at most.
     spectrum = np.fft.rfft(rng.normal(size=(len(t), 3)), axis=0)
@@ -65,7 +65,6 @@ class Unit:
     gyro_noise: float = 0.05
     accel_noise: float = 0.02
     g_sensitivity: np.ndarray | None = None
-    cubic: np.ndarray | None = None
     is_fine: bool = False  # a unit of tactical grade: instants instead of averages, no steps, a hundredth of the walk
 
 
@@ -86,15 +85,16 @@ def read_gyro(rng, u, rate, force, step):
         k = np.arange(n) * step + step // 2
         w, f = 0.5 * (rate[k - 1] + rate[k]), 0.5 * (force[k - 1] + force[k])
     out = w @ u.M.T + u.c
-    scale = np.linalg.norm(u.M, axis=1)
     if u.g_sensitivity is not None:
         out = out + (f @ u.g_sensitivity.T) @ u.M.T
-    if u.cubic is not None:
-        own = (w @ u.M.T) / scale
-        out = out + scale * u.cubic * own**3
     out = out + u.gyro_noise * np.degrees(1) * 0.5 * rng.normal(size=out.shape)
     # A zero that wanders a little: a walk of 0.03 °/s in a minute, about its mean over the session.
-    walk = scale * np.radians(0.03) * np.cumsum(rng.normal(size=out.shape), axis=0) / np.sqrt(60 * FINE_HZ / step)
+    walk = (
+        np.linalg.norm(u.M, axis=1)
+        * np.radians(0.03)
+        * np.cumsum(rng.normal(size=out.shape), axis=0)
+        / np.sqrt(60 * FINE_HZ / step)
+    )
     if u.is_fine:
         return out + 0.01 * (walk - walk.mean(axis=0))
     return np.round((out + walk - walk.mean(axis=0)) * 8) / 8
@@ -141,7 +141,7 @@ class Trial:
     walked: np.ndarray | None = None
 
 
-def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, earth=None, rest_s=2.0, **more):
+def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, earth=None, rest_s=2.0, **more):
     """A hand before an optical tracker; ``earth`` is the Earth's rate along the tracker's axes [rad/s]."""
     rng = np.random.default_rng(seed)
     u = unit(rng, **more)
@@ -152,8 +152,7 @@ def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, eart
         w = w + np.einsum("nji,j->ni", C, earth)
     gyro, accelerometer = read_gyro(rng, u, w, f, 10), read_accelerometer(rng, u, f, 10)
     lead, ppm = rng.uniform(-3, 3), rng.uniform(-100, 100)
-    k = np.arange(0, len(t), FINE_HZ // track_hz)
-    k = k[t[k] > 1.0]
+    k = np.arange(FINE_HZ + 10, len(t), 10)
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     seen = jittered(C[k], rng, np.radians(sigma_deg))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None

@@ -1,5 +1,6 @@
 """One short session with everything that commands read: made once, copied wherever a test wants to harm it."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -60,18 +61,11 @@ def _made(folder: Path) -> None:
     quietly("calibrate", log, "--gravity", G, "-o", str(known))
     quietly("allan", str(folder / "rest.csv"), "--json", str(folder / "noise.json"))
     quietly("diagnose", log, "--gravity", G, "--json", str(folder / "diagnosis.json"))
-    untrusted = folder / "untrusted.json"
-    text = known.read_text()
-    finding = (
-        '"findings": [{"code": "not-observable", "severity": "serious", "seen": "Scale 3 is not determined.", '
-        '"cause": "", "action": "", "numbers": {}}],\n "was": ['
-    )
-    import json
-
-    document = json.loads(text.replace('"findings": [', finding, 1))
-    del document["was"]
+    document = json.loads(known.read_text())
+    finding = {"code": "not-observable", "severity": "serious", "seen": "Scale 3 is not determined."}
+    document["findings"] = [finding | {"cause": "", "action": "", "numbers": {}}]
     document["is_trustworthy"] = False
-    untrusted.write_text(json.dumps(document))
+    (folder / "untrusted.json").write_text(json.dumps(document))
 
 
 def made_elsewhere() -> Path:

@@ -13,14 +13,11 @@ B_A = np.array([0.54, -0.62, 0.40])
 SIX = np.array([1, -1, 2, -2, 3, -3])
 
 
-def direction(faces) -> np.ndarray:
-    faces = np.asarray(faces)
-    return np.sign(faces)[:, None] * np.eye(3)[np.abs(faces) - 1]
-
-
 def face_readings(faces, sigma: float, seed: int, tilt_deg: float = 0.0) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    up = direction(faces) + np.radians(tilt_deg) * rng.standard_normal((len(faces), 3))
+    faces = np.asarray(faces)
+    up = np.sign(faces)[:, None] * np.eye(3)[np.abs(faces) - 1]
+    up = up + np.radians(tilt_deg) * rng.standard_normal(up.shape)
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return G * up @ S_A.T + B_A + sigma * rng.standard_normal(up.shape)
 
@@ -29,19 +26,14 @@ def codes(findings):
     return {finding.code for finding in findings}
 
 
-def test_exact_faces_give_the_exact_model_in_any_order():
-    faces = np.array([3, -1, 2, 1, -3, -2])
-    sensor, findings = calibrate_faces(face_readings(faces, 0.0, 0), 1e-3, G, raw_unit="m/s^2")
+def test_exact_faces_give_the_exact_model_in_any_order_and_the_variances_of_the_formula():
+    faces, sigma = np.array([3, -1, 2, 1, -3, -2]), 2e-3
+    sensor, findings = calibrate_faces(face_readings(faces, 0.0, 0), sigma, G, raw_unit="m/s^2")
     S_a, b_a = other_form(sensor.S, sensor.b)
     # Linear algebra on numbers of order ten.
     np.testing.assert_allclose(S_a, S_A, atol=1e-13)
     np.testing.assert_allclose(b_a, B_A, atol=1e-12)
     assert not findings
-
-
-def test_reported_variances_are_those_of_the_formula():
-    sigma = 2e-3
-    sensor, _ = calibrate_faces(face_readings(SIX, 0.0, 0), sigma, G, raw_unit="m/s^2")
     # Back to the inverse form, in which the formula is stated: var S_a = σ²/2g², var b_a = σ²/6.
     jacobian = other_form_jacobian(sensor.S, sensor.b)
     variance = np.diag(jacobian @ sensor.covariance @ jacobian.T)
@@ -114,16 +106,13 @@ def test_the_error_bars_of_tilted_faces_cover_the_truth(n):
     assert 0.89 < inside / n < 1.0
 
 
-def test_an_axis_documented_the_wrong_way_round_is_reported():
+def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_called_m_s2_questioned():
     mirrored = face_readings(SIX, 1e-3, 4) * [-1, 1, 1]
     sensor, findings = calibrate_faces(mirrored, 1e-3, G, raw_unit="m/s^2", up=list(SIX))
     assert np.linalg.det(sensor.S) < 0
     assert FindingCode.LEFT_HANDED in codes(findings)
     _, silent = calibrate_faces(mirrored, 1e-3, G, raw_unit="m/s^2")
     assert FindingCode.LEFT_HANDED not in codes(silent)
-
-
-def test_a_log_in_g_called_m_s2_is_questioned():
     _, findings = calibrate_faces(face_readings(SIX, 1e-3, 5) / 9.80665, 1e-4, G, raw_unit="m/s^2")
     assert FindingCode.SCALE_NOT_NOMINAL in codes(findings)
 

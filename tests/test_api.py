@@ -1,10 +1,8 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
-import copy
 import dataclasses
 import doctest
 import inspect
-import json
 import pickle
 import re
 import subprocess
@@ -12,7 +10,6 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-import polars as pl
 import pytest
 from matplotlib.figure import Figure
 
@@ -32,52 +29,13 @@ def result(recording):
     return trihedron.calibrate(recording, latitude_deg=60.0)
 
 
-@pytest.fixture(scope="module")
-def results(recording, result):
-    rest = {"t": np.arange(6000) / 100, "acc": np.random.default_rng(0).normal([0, 0, 9.8], 0.02, (6000, 3))}
-    return [
-        recording,
-        trihedron.segment(recording),
-        result,
-        result.calibration,
-        trihedron.verify(result, trihedron.simulate("hand-session", 4)[0]),
-        trihedron.check(recording),
-        trihedron.diagnose(recording, gravity_m_s2=9.819),
-        trihedron.kalman(recording, latitude_deg=60.0),
-        trihedron.allan(rest),
-        trihedron.allan_deviation(rest["acc"], 100.0),
-    ]
-
-
 def test_import_loads_neither_numpy_nor_anything_else_heavy():
     code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
 
 
-def test_results_are_plain_types_frames_figures_and_pieces_of_html(results):
-    for one in results:
-        json.dumps(one.to_dict(), allow_nan=False)
-        assert isinstance(one.to_dataframe(), pl.DataFrame)
-        assert isinstance(one.plot(), Figure)
-        page = one._repr_html_()
-        # A notebook holds many: small, no picture inside, nothing that runs.
-        assert len(page) < 8000
-        assert "<script" not in page
-        assert "<img" not in page
-        assert len(repr(one)) < 160
-        assert trihedron.report(one)
-    assert results[2].plot()._repr_png_().startswith(b"\x89PNG")
-
-
 def test_names_from_a_file_are_escaped_in_html(recording):
     assert "<script>" not in replace(recording, source="<script>alert(1)</script>.csv")._repr_html_()
-
-
-def test_results_are_pickled_and_copied_whole(results):
-    for one in results:
-        for twin in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
-            assert type(twin) is type(one)
-            assert twin.to_dict() == one.to_dict()
 
 
 def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():

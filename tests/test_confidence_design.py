@@ -53,7 +53,7 @@ WEAKNESSES = {
     ),
     # The drift hides in the nine numbers of the poses, and S_f was off by up to 4.5, S_w by 7 standard errors.
     "accelerometer whose bias drifts by milli g": Weakness(
-        (202, 203), (205, 206), {"drift": "accelerometer"}, {"S_f": 3.5, "S_w": 4.0}
+        (202,), (203, 205, 206), {"drift": "accelerometer"}, {"S_f": 3.5, "S_w": 4.0}
     ),
     # An axis that stands still reads its bias while another turns: b was off by a third of a step, by up to 96 errors.
     "bias inside a step": Weakness(
@@ -107,7 +107,7 @@ def test_errors_of_a_session_that_was_weak_are_within_their_uncertainty(weakness
     assert np.all(result.gyroscope.sigma_b < np.linalg.norm(result.gyroscope.S, axis=0))
 
 
-@pytest.mark.parametrize("sessions", [3, pytest.param(6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sessions", [2, pytest.param(6, marks=pytest.mark.slow)])
 def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_samples_points(sessions):
     every = {"points": [], "averages": []}
     for sampling, scores in every.items():
@@ -169,11 +169,11 @@ def test_a_delay_between_the_sensors_that_hides_in_the_noise_of_velocities_moves
     assert np.sqrt(np.mean(np.square(scores))) < 1.5
 
 
-@pytest.mark.parametrize(("rate_hz", "sessions"), [pytest.param(25.0, 6, marks=pytest.mark.slow), (100.0, 3)])
+@pytest.mark.parametrize(("rate_hz", "sessions"), [pytest.param(25.0, 6, marks=pytest.mark.slow), (100.0, 2)])
 def test_what_misalignment_turns_inside_a_step_is_an_error_that_all_moves_share(rate_hz, sessions):
     # Charged as if it scattered from move to move, S_w was off by up to 7, b_w by up to 10 standard errors.
     found = [calibrated(7000 + k, path="axis by axis", rate_hz=rate_hz, **QUICK)[1] for k in range(sessions)]
     scores = np.array([[*z["S_w"], *z["b_w"]] for z in found])
-    # 36 or 72 numbers, of which those of a session share its readings.
+    # 24 or 72 numbers, of which those of a session share its readings.
     assert np.abs(scores).max() < 4.0
     assert np.sqrt(np.mean(np.square(scores))) < 1.45

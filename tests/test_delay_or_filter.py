@@ -9,7 +9,7 @@ from trihedron.records import Recording
 
 
 def test_a_delay_comes_before_the_filter():
-    f, w, rate, _, _ = hand(91, move_s=1.5)
+    f, w, rate, _, _ = hand(91, n_poses=10, move_s=1.5)
     late = np.round(np.concatenate([np.repeat(w[:1], 4, axis=0), w[:-4]]))
     recording = Recording(np.arange(len(f)) / rate, f, late, rate, accelerometer_unit="counts", gyroscope_unit="counts")
     effect = diagnose(recording, gravity_m_s2=G).effects[0]

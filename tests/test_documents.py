@@ -28,9 +28,7 @@ PAGES = sorted(DOCS.rglob("*.md"))
 MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
     "tutorials/notebook.md"
 }
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
-)
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 # What a fence may say behind its backticks: a language, and nothing else.
 FENCE = re.compile(r"^ *```(.*)$", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -49,32 +47,24 @@ def test_every_page_is_in_the_navigation_once():
     assert set(listed) == {page.relative_to(DOCS).as_posix() for page in PAGES} | MADE
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_fence_says_its_language_only(page):
-    said = FENCE.findall(page.read_text(encoding="utf-8"))
+@pytest.mark.parametrize("page", [*PAGES, *ROOT.glob("*.md")], ids=lambda page: page.stem)
+def test_links_of_the_sources_hold_fences_say_their_language_and_commands_name_programs_that_are_there(page):
+    text = page.read_text(encoding="utf-8")
+    prose = re.sub(r"^```.*?^```|`[^`\n]+`", "", text, flags=re.MULTILINE | re.DOTALL)
+    paths = {link.partition("#")[0] for link in LINK.findall(prose) if not re.match(r"\w+:", link)} - {""}
+    places = {path: (page.parent / path).resolve() for path in paths}
+    made = {DOCS / name for name in MADE}
+    assert [path for path, place in places.items() if not place.exists() and place not in made] == []
+    # What a figure was made with can be run again.
+    programs = re.findall(r"python (benches/\w+(?:\.py)?)", text)
+    assert [name for name in programs if not (ROOT / name).exists()] == []
+    said = FENCE.findall(text) if page in PAGES else []
     assert not [words for words in said if not re.fullmatch(r"\w*", words)]
     assert len(said) % 2 == 0
 
 
-@pytest.mark.parametrize("page", [*PAGES, *ROOT.glob("*.md")], ids=lambda page: page.stem)
-def test_links_of_the_sources_hold_where_they_are_read_as_files(page):
-    prose = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-    paths = {link.partition("#")[0] for link in LINK.findall(prose) if not re.match(r"\w+:", link)} - {""}
-    made = {DOCS / name for name in MADE}
-    assert [
-        path for path in paths if not (found := (page.parent / path).resolve()).exists() and found not in made
-    ] == []
-
-
-def test_commands_name_programs_that_are_there():
-    """``python benches/...``: what a figure was made with can be run again."""
-    for page in [*PAGES, *ROOT.glob("*.md")]:
-        named = set(re.findall(r"python (benches/\w+(?:\.py)?)", page.read_text(encoding="utf-8")))
-        assert [name for name in named if not (ROOT / name).exists()] == [], page.name
-
-
 def test_the_readme_is_short_and_its_pictures_are_in_the_repository():
-    """There is no public repository yet: an absolute link would be an invented one."""
+
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 140
     pictures = re.findall(r"!\[[^]]*\]\((\S+)\)", text)

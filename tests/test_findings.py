@@ -1,6 +1,7 @@
 """The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
 
 import ast
+import itertools
 import re
 from functools import cache
 from pathlib import Path
@@ -15,24 +16,22 @@ PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 
 
 @cache
-def calls_of(path):
-    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
-
-
 def _calls(attribute):
     """Calls of ``Finding.of`` (or of ``Finding`` itself) with the file they stand in."""
+    found = []
     for path in sorted(PACKAGE.rglob("*.py")):
         name = str(path.relative_to(PACKAGE))
-        if name.startswith("report/"):
+        if name.startswith("report/") or "Finding" not in (text := path.read_text()):
             continue
-        for node in calls_of(path):
+        for node in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)):
             called = node.func
             if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name):
                 is_one = attribute and called.value.id == "Finding" and called.attr == "of"
             else:
                 is_one = not attribute and isinstance(called, ast.Name) and called.id == "Finding"
             if is_one:
-                yield name, node
+                found.append((name, node))
+    return found
 
 
 def _choices(node):
@@ -60,12 +59,26 @@ def _created():
         yield f"{name}:{node.lineno}", codes, cases, given, node
 
 
-def test_every_finding_of_a_stage_is_in_the_catalogue_with_exactly_its_places():
-    for where, codes, cases, given, _ in _created():
-        for code in codes:
-            for case in cases:
-                assert (code, case) in CATALOGUE, f"{where}: {code.value} '{case}' is not in the catalogue"
-                assert given == CATALOGUE[code, case].places, f"{where}: {code.value} '{case}'"
+def test_every_finding_of_a_stage_is_in_the_catalogue_with_exactly_its_places_and_severities():
+    for where, codes, cases, given, node in _created():
+        stated = [keyword.value for keyword in node.keywords if keyword.arg == "severity"]
+        for key in itertools.product(codes, cases):
+            assert key in CATALOGUE, f"{where}: {key} is not in the catalogue"
+            entry = CATALOGUE[key]
+            assert given == entry.places, f"{where}: {key}"
+            for value in stated:
+                names = {n.attr for n in ast.walk(value) if isinstance(n, ast.Attribute)} & set(Severity.__members__)
+                assert names == {entry.severity.name, entry.or_severity.name}, where
+
+
+def test_no_finding_is_written_outside_the_report():
+    assert not _calls(attribute=False)
+    for name, node in _calls(attribute=True):
+        for keyword in (k for k in node.keywords if k.arg != "numbers"):
+            for part in ast.walk(keyword.value):
+                text = part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else ""
+                assert " " not in text, f"{name}:{node.lineno}: a sentence belongs into the catalogue"
+                assert not isinstance(part, ast.JoinedStr), f"{name}:{node.lineno}"
 
 
 def test_every_entry_of_the_catalogue_is_created_somewhere_and_once_in_the_table():
@@ -73,30 +86,6 @@ def test_every_entry_of_the_catalogue_is_created_somewhere_and_once_in_the_table
     assert set(CATALOGUE) == created
     assert len(ENTRIES) == len(CATALOGUE)
     assert {code for code, _ in CATALOGUE} == set(FindingCode)
-
-
-def test_a_stated_severity_is_one_the_catalogue_allows():
-    for where, codes, cases, _, node in _created():
-        for keyword in node.keywords:
-            if keyword.arg == "severity":
-                stated = {n.attr for n in ast.walk(keyword.value) if isinstance(n, ast.Attribute)} & set(
-                    Severity.__members__
-                )
-                for code in codes:
-                    for case in cases:
-                        entry = CATALOGUE[code, case]
-                        assert stated == {entry.severity.name, entry.or_severity.name}, where
-
-
-def test_no_finding_is_written_outside_the_report():
-    written = {name for name, _ in _calls(attribute=False)}
-    assert written == set()
-    for name, node in _calls(attribute=True):
-        for keyword in (k for k in node.keywords if k.arg != "numbers"):
-            for part in ast.walk(keyword.value):
-                text = part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else ""
-                assert " " not in text, f"{name}:{node.lineno}: a sentence belongs into the catalogue"
-                assert not isinstance(part, ast.JoinedStr), f"{name}:{node.lineno}"
 
 
 def test_a_finding_carries_its_numbers_for_machines():

@@ -15,12 +15,6 @@ STEP_S = 0.01
 ROWS = np.arange(60_000)
 
 
-def drifting(step_s=STEP_S):
-    """A crystal that warms up by 20 ppm: it leaves the best straight line by 1 to 2 ms in ten minutes."""
-    t = ROWS * step_s
-    return t * (1.0 + 20e-6 * t / t[-1])
-
-
 @pytest.mark.parametrize(
     "timestamps",
     [ROWS * STEP_S, ROWS / 99.746, np.round(ROWS / 99.746, 3), np.round(ROWS / 99.746, 6), np.round(ROWS * 0.0037, 2)],
@@ -32,7 +26,9 @@ def test_stamps_that_are_a_line_in_the_row_may_have_been_remade(timestamps):
 
 @pytest.mark.parametrize("digits", [3, 4, 6])
 def test_stamps_that_leave_the_line_by_more_than_their_rounding_are_a_clocks(digits):
-    assert not could_be_remade(np.round(drifting(), digits), STEP_S)
+    t = ROWS * STEP_S
+    # A crystal that warms up by 20 ppm: it leaves the best straight line by 1 to 2 ms in ten minutes.
+    assert not could_be_remade(np.round(t * (1.0 + 20e-6 * t / t[-1]), digits), STEP_S)
 
 
 def test_a_gap_that_the_stamps_show_does_not_make_a_line_a_clock():
@@ -64,11 +60,7 @@ def test_losses_are_possible_wherever_moves_are_missed(seed):
 
 def test_a_clock_of_its_own_rules_losses_out():
     """The same session with a clock's timestamps: what was lost is a gap in them, and no share of the scale."""
-
-    def warming(t):
-        return t * (1.0 + 20e-6 * t / t[-1])
-
-    result, truth = lossy(20018, warming)
+    result, truth = lossy(20018, lambda t: t * (1.0 + 20e-6 * t / t[-1]))
     assert not {FindingCode.SAMPLES_LOST, FindingCode.LOSSES_POSSIBLE} & {finding.code for finding in result.findings}
     z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
     assert np.abs(z).max() < 4.0

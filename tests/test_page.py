@@ -15,9 +15,7 @@ from trihedron.cli import main
 from trihedron.files.log import write_recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
-)
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = [
     pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine"),
     pytest.mark.skipif(find_spec("playwright") is None, reason="playwright is not installed (extra test)"),

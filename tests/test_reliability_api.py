@@ -5,6 +5,7 @@ import copy
 import dataclasses
 import enum
 import inspect
+import json
 import pickle
 import re
 import traceback
@@ -12,7 +13,9 @@ import types
 from fractions import Fraction
 
 import numpy as np
+import polars as pl
 import pytest
+from matplotlib.figure import Figure
 
 import trihedron
 from small_session import made_once
@@ -80,6 +83,7 @@ NO_WORD = (3, b"x", ["lower"], {}, object(), np.array("lower"), "x", "", "a\0b")
 NO_ARRAY = (None, "x", object(), [["a"]], [[1, 2], [3]], np.ones((50, 3)) * 1j, np.zeros((2, 2, 2, 2)), {}, 3.0, [])
 NO_ARRAY += (np.array([object()]), np.array(["2020-01-01"], "M8[s]"), np.array(1.0), {1, 2}, [10**400])
 NO_CALL = (3, "x", object(), [1], int, np.zeros(3))
+NO_TABLE = (object(), 3, np.zeros(3), b"x", "a\0b", [1])
 
 BY_KIND = {
     "float": (*NO_NUMBER, *NO_QUANTITY),
@@ -91,25 +95,10 @@ BY_KIND = {
     "Sequence[str]": (*NO_LIST, [1], [None], [["a"]]),
     "Sequence[tuple[float, float]]": (*NO_LIST, [1], ["ab"], [(1, 2, 3)], [("a", "b")], [(float("nan"), 1)]),
     "npt.ArrayLike": NO_ARRAY,
-    "Progress": NO_CALL,
-    "Callable[[Block], bool | None]": NO_CALL,
-    "Tell": NO_CALL,
     "Segments": (object(), 3, "x", [1], np.zeros(3), int),
-    "AnyRecording": NO_RECORD,
-    "AnyCalibration": NO_RECORD,
-    "CalibrationResult": NO_RECORD,
     "object": (3, object(), "x", None, np.zeros(3), []),
-    "Any": NO_RECORD,
-    "PoseTable": (object(), 3, np.zeros(3), b"x", "a\0b", "", "none.csv", [1]),
-    "Noise": (object(), 3, np.zeros(3), b"x", "a\0b", "none.json", [1]),
-    "NoiseSource": (object(), 3, np.zeros(3), b"x", "a\0b", "none.json", [1]),
-    "AnyReference": (object(), 3, np.zeros(3), b"x", "a\0b", "", "none.csv", [1]),
-    "GivenModel": (object(), 3, np.zeros(3), b"x", "a\0b", "none.toml", [1]),
-    "Scenario": (object(), 3, np.zeros(3), b"x", "a\0b", "no-such", [1]),
-    "AccelerationUnit": (*NO_WORD, 1.5),
-    "RateUnit": (*NO_WORD, 1.5),
-    "Sequence[AnyRecording]": (*NO_LIST, [], [3], [object()], ["none.csv"]),
-    "Sequence[AnyReference]": (*NO_LIST, [], [3], [object()], ["none.csv"]),
+    "GivenModel": (*NO_TABLE, "none.toml"),
+    "Scenario": (*NO_TABLE, "no-such"),
     "Axes | Sequence[Axes]": (3, "x", object(), [3], {}),
     "Sequence[AnyCalibration]": (*NO_LIST, [], [3], [object(), object()], ["none.json"] * 2),
     "Sequence[AnyRecording | CalibrationResult]": (*NO_LIST, [], [3], [object(), object()], ["none.csv"] * 2),
@@ -117,6 +106,13 @@ BY_KIND = {
 }
 """What is wrong for a parameter of each type; a new type of parameter needs its line here."""
 BY_KIND |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Loss", "Method", "NormFrame", "RateShape"), NO_WORD)
+BY_KIND |= dict.fromkeys(("AccelerationUnit", "RateUnit"), (*NO_WORD, 1.5))
+BY_KIND |= dict.fromkeys(("AnyRecording", "AnyCalibration", "CalibrationResult", "Any"), NO_RECORD)
+BY_KIND |= dict.fromkeys(("Progress", "Callable[[Block], bool | None]", "Tell"), NO_CALL)
+BY_KIND |= dict.fromkeys(("PoseTable", "AnyReference"), (*NO_TABLE, "", "none.csv"))
+BY_KIND |= dict.fromkeys(("Noise", "NoiseSource"), (*NO_TABLE, "none.json"))
+LISTS_OF_LOGS = ("Sequence[AnyRecording]", "Sequence[AnyReference]")
+BY_KIND |= dict.fromkeys(LISTS_OF_LOGS, (*NO_LIST, [], [3], [object()], ["none.csv"]))
 BY_KIND |= {"str | os.PathLike[str]": NO_FILE, "int | str": (1.5, b"x", [1], object())}
 FIRST = ["Sequence[str | os.PathLike[str]]", "Scenario", "PoseTable", "Noise", "AccelerationUnit", "RateUnit"]
 FIRST += ["str | os.PathLike[str]", "int | str", "Sequence[int]"]
@@ -186,23 +182,21 @@ def test_an_unknown_or_a_missing_argument_is_a_sentence():
 
 
 @pytest.mark.parametrize("kind", ["Calibration", "Diagnosis", "Finding", "Recording", "Segments"])
-def test_a_record_made_by_hand_is_checked_where_it_is_made(kind, recording, result):
-    diagnosis = trihedron.Diagnosis
+def test_a_record_made_by_hand_is_checked_where_it_is_made(kind, results):
     made = {
-        "Calibration": result.calibration,
-        "Finding": result.findings[0],
-        "Recording": recording,
-        "Segments": result.segments,
-    }.get(kind) or next(one for one in diagnosed(recording) if isinstance(one, diagnosis))
-    for field in dataclasses.fields(getattr(trihedron, kind)):
+        "Calibration": results["calibrate"].calibration,
+        "Diagnosis": results["diagnose"],
+        "Finding": results["calibrate"].findings[0],
+        "Recording": results["read"],
+        "Segments": results["segment"],
+    }[kind]
+    values = {f.name: getattr(made, f.name) for f in dataclasses.fields(getattr(trihedron, kind))}
+    for name in values.keys() - {"rows_in_file", "rows_read"}:
         for value in (object(), 1j, [object()], {"x": [1, [2]]}, np.ones((2, 2, 2, 2)) * 1j):
-            if field.name in ("extensions", "noise", "references", "numbers", "auxiliary") and isinstance(value, dict):
+            if name in ("extensions", "noise", "references", "numbers", "auxiliary") and isinstance(value, dict):
                 continue
-            if field.name in ("rows_in_file", "rows_read"):
-                continue
-            values = {f.name: getattr(made, f.name) for f in dataclasses.fields(getattr(trihedron, kind))}
-            arguments = values | {field.name: value}
-            refused(f"{kind}({field.name}={value!r:.40})", lambda a=arguments: getattr(trihedron, kind)(**a))
+            arguments = values | {name: value}
+            refused(f"{kind}({name}={value!r:.40})", lambda a=arguments: getattr(trihedron, kind)(**a))
 
 
 def test_a_recording_of_arrays_and_a_sensor_are_checked():
@@ -223,12 +217,6 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
             refused(f"SensorCalibration({name}={value!r:.40})", lambda a=arguments: SensorCalibration(**a))
 
 
-def diagnosed(recording, _kept=[]):  # noqa: B006
-    if not _kept:
-        _kept.append(trihedron.diagnose(recording, gravity_m_s2=9.80665))
-    return _kept
-
-
 @pytest.fixture(scope="module")
 def results(folder, recording, result):
     rest = folder / "rest.csv"
@@ -241,7 +229,7 @@ def results(folder, recording, result):
         "sessions": trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665),
         "verify": trihedron.verify(result, recording),
         "check": trihedron.check(rest),
-        "diagnose": diagnosed(recording)[0],
+        "diagnose": trihedron.diagnose(recording, gravity_m_s2=9.80665),
         "extend": trihedron.extend(result),
         "kalman": trihedron.kalman(recording, gravity_m_s2=9.80665),
         "allan": trihedron.allan(rest),
@@ -287,14 +275,35 @@ def loose(value, path):
     return found, arrays
 
 
-def test_nobody_can_write_into_a_result_or_what_pickle_and_deepcopy_make_of_it(results):
+def test_nobody_can_write_into_a_result_or_what_pickle_and_deepcopy_make_of_it_whole(results):
     seen = collections.Counter()
     for name, one in results.items():
         for copied in (one, pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
             found, arrays = loose(copied, name)
             assert found == []
+            assert type(copied) is type(one)
+            assert not hasattr(one, "to_dict") or copied.to_dict() == one.to_dict()
             seen[name] += len(arrays)
     assert sum(seen.values()) > 300
+
+
+SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
+
+
+@pytest.mark.parametrize("name", [*SHOWN, "read_calibration"])
+def test_a_result_is_plain_types_a_frame_a_figure_and_a_piece_of_html(results, name):
+    one = results[name]
+    json.dumps(one.to_dict(), allow_nan=False)
+    assert isinstance(one.to_dataframe(), pl.DataFrame)
+    assert isinstance(one.plot(), Figure)
+    assert one.plot()._repr_png_().startswith(b"\x89PNG")
+    page = one._repr_html_()
+    # A notebook holds many: small, no picture inside, nothing that runs.
+    assert len(page) < 8000
+    assert "<script" not in page
+    assert "<img" not in page
+    assert len(repr(one)) < 160
+    assert trihedron.report(one)
 
 
 def test_the_arrays_that_a_caller_gave_stay_the_callers_to_write_to():

@@ -17,12 +17,13 @@ import pytest
 
 from small_session import made_elsewhere
 from trihedron import _core
+from trihedron.cli import main
 from trihedron.documents import DocumentError, read_text
 from trihedron.errors import RefusedError
 from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
 from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
-from trihedron.read import ReadError, read_recording
+from trihedron.read import ReadError, open_chunks, read_recording
 from trihedron.sanitise import printable, printable_json
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.scenario_file import read_scenario
@@ -44,6 +45,9 @@ def test_what_is_no_plain_file_of_sane_size_is_refused_at_once(tmp_path, reader,
     for path, words in ((pipe, "plain file"), ("/dev/zero", "plain file"), (large, "1000 MB"), (tmp_path, "directory")):
         with pytest.raises(error, match=words):
             reader(path)
+    for name in ("n" * 300, "a\0b", tmp_path / "none"):
+        with pytest.raises(DocumentError):
+            read_text(name, "calibration file")
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "9" * 400, "1e999", "NaN", "[" * 70 + "]" * 70, "{", '"'])
@@ -53,12 +57,6 @@ def test_depth_and_numbers_beyond_any_document_are_refused(tmp_path, reader, err
     path.write_text(text)
     with pytest.raises(error):
         reader(path)
-
-
-def test_a_name_that_cannot_be_opened_is_a_sentence(tmp_path):
-    for name in ("n" * 300, "a\0b", tmp_path / "none"):
-        with pytest.raises(DocumentError):
-            read_text(name, "calibration file")
 
 
 def test_a_header_that_lies_about_an_array_is_refused(tmp_path):
@@ -91,11 +89,6 @@ def test_archives_that_unpack_to_harm_are_refused(tmp_path):
         read_recording(archive)
 
 
-def test_escapes_of_a_terminal_are_spelled_out():
-    assert printable("a\x1b[2J\x9b\u202eb\n\t") == "a\\x1b[2J\\x9b\\u202eb\n\t"
-    assert printable_json('"\x9b"') == '"\\u009b"'
-
-
 def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_a_calibration_that_is_shown(tmp_path):
     known = json.loads((made_elsewhere() / "c.json").read_text())
     known["recording"] = {"source": "a\x1b[2J\x9b\u202eb.csv", "sha256": ""}
@@ -104,6 +97,8 @@ def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_a_calibration_tha
     write_calibration(calibration, tmp_path / "again.json")
     text = (tmp_path / "again.json").read_text()
     assert printable(text) == text
+    assert printable("a\x1b[2J\x9b\u202eb\n\t") == "a\\x1b[2J\\x9b\\u202eb\n\t"
+    assert printable_json('"\x9b"') == '"\\u009b"'
     assert read_calibration(tmp_path / "again.json").recording_source == calibration.recording_source
 
 
@@ -141,8 +136,6 @@ def test_a_damaged_line_of_a_quoted_table_is_named_by_its_number(tmp_path, line,
 
 
 def test_a_log_read_in_pieces_that_becomes_shorter_is_a_sentence(tmp_path):
-    from trihedron.read import open_chunks
-
     path = tmp_path / "log.npy"
     for array in (np.arange(60_000.0).reshape(-1, 6), np.asfortranarray(np.arange(60_000.0).reshape(-1, 6))):
         np.save(path, array)
@@ -157,9 +150,18 @@ def test_a_log_read_in_pieces_that_becomes_shorter_is_a_sentence(tmp_path):
             log.rows(0, 10)
 
 
-def test_a_session_of_a_thousand_million_poses_is_refused(tmp_path):
-    (tmp_path / "s.toml").write_text('[session]\nkind = "hand"\nn_poses = 999999999\n')
-    with pytest.raises(ValueError, match="a session has at most"):
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[session]\nkind = "hand"\nn_poses = 999999999', "a session has at most"),
+        ("unit = [1]", r"s\.toml: a value is of another kind"),
+        ("table_tilt_deg = [{}, 1]", r"s\.toml: a value is of another kind"),
+        ("unit = inf", r"s\.toml: a value is of another kind"),
+    ],
+)
+def test_a_scenario_of_a_thousand_million_poses_or_a_value_of_another_kind_is_refused(tmp_path, text, words):
+    (tmp_path / "s.toml").write_text(text + "\n")
+    with pytest.raises(ValueError, match=words):
         read_scenario(tmp_path / "s.toml")
 
 
@@ -176,76 +178,50 @@ def test_a_session_of_odd_values_is_made_or_refused(tmp_path, kind):
                 read_scenario(path)
 
 
-@pytest.mark.parametrize("text", ["unit = [1]", "table_tilt_deg = [{}, 1]", "unit = inf"])
-def test_a_scenario_whose_value_is_of_another_kind_is_refused(tmp_path, text):
-    (tmp_path / "s.toml").write_text(text + "\n")
-    with pytest.raises(ValueError, match=r"s\.toml: a value is of another kind"):
-        read_scenario(tmp_path / "s.toml")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["fleet", "", "--out", "x"], "the name of the logs is empty"),
+        (["calibrate", "LOG", "--faces", "inf"], ""),
+        (["plan", "--gyro-noise", "1e-300"], ""),
+    ],
+)
+def test_what_the_attack_found_stays_mended(words, said, capsys):
+    assert main([str(made_elsewhere() / "log.csv") if w == "LOG" else w for w in words]) == 1
+    err = capsys.readouterr().err
+    assert said in err
+    assert "internal error" not in err
 
 
-def test_the_empty_name_is_not_every_log_below_here(capsys):
-    from trihedron.cli import main
-
-    assert main(["fleet", "", "--out", "x"]) == 1
-    assert "the name of the logs is empty" in capsys.readouterr().err
-
-
-# Fork
-
-
-def _allan(_=None):
+def deviations(_=None):
     x = np.random.default_rng(1).standard_normal((100_000, 3))
     return _core.allan_variance(x, [1, 2, 64], _core.AllanKind.Overlapping)[0]
 
 
 def test_a_forked_child_computes_what_its_parent_computes():
-    expected = _allan()
+    expected = deviations()
     with multiprocessing.get_context("fork").Pool(2) as pool:
-        for got in pool.map_async(_allan, range(3)).get(30):
+        for got in pool.map_async(deviations, range(3)).get(30):
             np.testing.assert_array_equal(got, expected)
 
 
-# The attack, a short part of it
+SHORT = [("inputs.Inputs", 100), ("formats.Formats", 120), ("commands.Commands", 8)]
+LONG = [("inputs.Inputs", 4000), ("formats.Formats", 1000), ("commands.Commands", 300)]
 
 
-MANY = pytest.mark.slow
-
-
-@pytest.mark.parametrize("count", [100, pytest.param(4000, marks=MANY)])
-def test_mutated_inputs_are_taken_or_refused_in_a_sentence(count):
-    assert _failures("from attacks.inputs import Inputs as Attack", f"range({count})") == "[]"
-
-
-@pytest.mark.parametrize("count", [120, pytest.param(1000, marks=MANY)])
-def test_mutated_logs_of_other_formats_are_read_or_refused_in_a_sentence(count):
-    for library in ("h5py", "rosbags", "pyulog", "pymavlink"):
+@pytest.mark.parametrize(("attack", "count"), [*SHORT, *(pytest.param(*one, marks=pytest.mark.slow) for one in LONG)])
+def test_mutated_files_and_command_lines_end_in_an_answer_or_a_sentence(attack, count):
+    for library in ("h5py", "rosbags", "pyulog", "pymavlink") if attack == "formats.Formats" else ():
         pytest.importorskip(library)
-    assert _failures("from attacks.formats import Formats as Attack", f"range({count})") == "[]"
-
-
-@pytest.mark.parametrize("count", [8, pytest.param(300, marks=MANY)])
-def test_command_lines_end_with_a_status_and_a_sentence(count):
-    assert _failures("from attacks.commands import Commands as Attack", f"range({count})") == "[]"
-
-
-def _failures(imported, numbers):
-    """What fails in a process of its own: one that has read a table before, as tests do, cannot fork and read."""
+    module, name = attack.split(".")
+    # In a process of its own: one that has read a table before, as tests do, cannot fork and read.
     code = (
-        f"{imported}\na = Attack(11)\n"
-        f"print([(n, a.describe(n), out) for n, out in a.run_forked({numbers}) if out.startswith('FAILED')])"
+        f"from attacks.{module} import {name} as Attack\na = Attack(11)\n"
+        f"print([(n, a.describe(n), out) for n, out in a.run_forked(range({count})) if out.startswith('FAILED')])"
     )
     path = os.pathsep.join([str(Path(__file__).parent), *(p for p in sys.path if p)])
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout.strip().splitlines()[-1]
-
-
-@pytest.mark.parametrize("words", [["calibrate", "LOG", "--faces", "inf"], ["plan", "--gyro-noise", "1e-300"]])
-def test_what_the_attack_found_stays_mended(words, capsys):
-    from small_session import made_once
-    from trihedron.cli import main
-
-    assert main([str(made_once() / "log.csv") if w == "LOG" else w for w in words]) == 1
-    assert "internal error" not in capsys.readouterr().err
+    assert done.stdout.strip().splitlines()[-1] == "[]"

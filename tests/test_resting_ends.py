@@ -8,9 +8,8 @@ from trihedron.estimate.gyroscope.turn_rounding import resting_ends
 AXES = np.array([True, True, True])
 
 
-def codes_of(rate, zero):
-    """Codes (n, 3) of rates (n, 3) [steps]."""
-    return np.round(rate + zero)
+def still_of(codes, first, stop):
+    return resting_ends(codes, np.ones(3), np.zeros(3), AXES, np.array([[first, stop]]))
 
 
 LAWS = {
@@ -28,7 +27,7 @@ def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_lef
         for scale in np.linspace(20.0, 40.0, 41):
             rate = way * LAWS[law](n, scale)
             codes = np.round(rate + zero)
-            still = resting_ends(np.repeat(codes[:, None], 3, 1), np.ones(3), np.zeros(3), AXES, np.array([[0, 200]]))
+            still = still_of(np.repeat(codes[:, None], 3, 1), 0, 200)
             # An offset of -zero on readings that are not still must make up for what the codes miss.
             told += np.sum(codes - rate)
             lasted += np.count_nonzero(~still[:, 0])
@@ -40,18 +39,16 @@ def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_lef
 def test_an_axis_that_never_leaves_its_step_is_as_still_as_the_body():
     rate = np.zeros((300, 3))
     rate[100:200, 0] = 30.0 * np.sin(np.pi * np.arange(100) / 100.0)
-    still = resting_ends(codes_of(rate, 0.2), np.ones(3), np.zeros(3), AXES, np.array([[80, 220]]))
-    assert np.array_equal(still[:, 0], still[:, 1])
-    assert still[80:98].all()
-    assert still[203:220].all()
+    rate[90:210, 1] = 30.0 * np.sin(np.pi * np.arange(120) / 120.0)
+    still = still_of(np.round(rate + 0.2), 80, 220)
+    assert np.array_equal(still[:, 2], still[:, 0] & still[:, 1])
+    assert still[80:88].all()
+    assert still[213:220].all()
     assert not still[102:198].any()
     assert not still[:80].any()
     assert not still[220:].any()
-
-
-def test_a_move_in_which_nothing_is_seen_to_turn_is_not_said_to_be_still():
-    still = resting_ends(np.zeros((100, 3)), np.ones(3), np.zeros(3), AXES, np.array([[10, 90]]))
-    assert not still.any()
+    # Where nothing is seen to turn, nothing is said to be still.
+    assert not still_of(np.zeros((100, 3)), 10, 90).any()
 
 
 def test_an_axis_that_turns_slowly_beside_a_quick_one_is_as_still_as_itself_shows():
@@ -62,8 +59,8 @@ def test_an_axis_that_turns_slowly_beside_a_quick_one_is_as_still_as_itself_show
     for place in places:
         rate = 16.0 * u**2 * (1.0 - u) ** 2 * np.array([90.0, 12.0, 5.0]) * rng.choice((-1.0, 1.0), 3)
         rate *= rng.uniform(0.8, 1.25, 3)
-        still = resting_ends(codes_of(rate, place), np.ones(3), np.zeros(3), AXES, np.array([[0, 260]]))
-        told.append(np.sum(np.where(still, -rate, codes_of(rate, place) - rate - place), axis=0))
+        codes = np.round(rate + place)
+        told.append(np.sum(np.where(still_of(codes, 0, 260), -rate, codes - rate - place), axis=0))
     # Readings in which the place still acts, of 260, known to 1 and to 1.4 on the slowest axis. With the quickest axis'
     # stillness for all it acted for 10, 13 and 19 of them.
     assert np.abs(np.array(told).T @ places / (places @ places)).max() < 5.0

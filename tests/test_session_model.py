@@ -1,8 +1,6 @@
 """The joint model of a session: whitening, derivatives, biases that differ by pose, timestamps that repeat."""
 
 from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,13 +35,11 @@ def fitted_to(recording, gravity):
     return tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None), calibration
 
 
-def scattered(recording, segments, sigma_raw, rng):
-    """The recording with a bias of its own in every pose, carried from pose to pose in the middle of each move."""
-    offset = np.zeros_like(recording.gyroscope)
-    edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), recording.n_samples]
-    for start, stop in pairwise(edges):
-        offset[start:stop] = sigma_raw * rng.standard_normal(3)
-    return replace(recording, gyroscope=recording.gyroscope + offset)
+def scattered(readings, segments, sigma_raw, rng):
+    """Readings with a bias of its own in every pose, carried from pose to pose in the middle of each move."""
+    edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), len(readings)]
+    offset = np.repeat(sigma_raw * rng.standard_normal((len(edges) - 1, 3)), np.diff(edges), axis=0)
+    return readings + offset
 
 
 def test_a_zero_that_scatters_from_pose_to_pose_does_not_shrink_the_gyro():
@@ -52,10 +48,9 @@ def test_a_zero_that_scatters_from_pose_to_pose_does_not_shrink_the_gyro():
         recording, truth = session_of(seed)
         plain, calibration = fitted_to(recording, truth.gravity_m_s2)
         scale = np.linalg.norm(calibration.gyroscope.S, 2)
-        moved = scattered(
-            recording, segment_recording(recording), np.radians(0.1) / scale, np.random.default_rng(seed + 50)
-        )
-        fitted, _ = fitted_to(moved, truth.gravity_m_s2)
+        rng = np.random.default_rng(seed + 50)
+        rates = scattered(recording.gyroscope, segment_recording(recording), np.radians(0.1) / scale, rng)
+        fitted, _ = fitted_to(replace(recording, gyroscope=rates), truth.gravity_m_s2)
         change.append(np.diag(fitted.state.gyro_S) / np.diag(plain.state.gyro_S) - 1.0)
     # A zero wrong by 0.1 deg/s in half of a move of 2 s is 0.1 deg in 120 deg, 1e-3 a move and less over 17 moves;
     # shrinking, where it happened, was -5e-3 with one sign on every axis.
@@ -63,7 +58,7 @@ def test_a_zero_that_scatters_from_pose_to_pose_does_not_shrink_the_gyro():
     assert np.abs(change).max() < 2e-3
 
 
-def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data: Path) -> None:
+def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data):
     folder = real_data / "getovermassif"
     recording = read_recording(
         accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt"
@@ -134,12 +129,8 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     core = fitted.core
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
     session = core_model(fitted.obs, fitted.state.gravity, fitted.prior)
-    gain = [
-        session.fit(
-            state=core_state(fitted.state), strengths=(*core.strengths[:3], (w, w)), force_effect=None, rate_effect=None
-        ).log_marginal
-        for w in (1.0, 3.0)
-    ]
+    given = {"state": core_state(fitted.state), "force_effect": None, "rate_effect": None}
+    gain = [session.fit(strengths=(*core.strengths[:3], (w, w)), **given).log_marginal for w in (1.0, 3.0)]
     n, chi2 = int(moves.sum()), float((fitted.system.residual[moves] ** 2).sum())
     # Gaussian: chi-square gained less n log 3; the other unknowns' determinant moves it by far less.
     expected = 0.5 * chi2 * (1.0 - 1.0 / 9.0) - n * np.log(3.0)
@@ -149,8 +140,8 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
 
 @pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 8.6)])
 def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_poses_alone(
-    real_data: Path, name: str, expected_mm_s2: float
-) -> None:
+    real_data, name, expected_mm_s2
+):
     # Moves of this log miss by degrees (lost samples, timestamps of arrival). Over the accelerometer they left 19
     # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone leave 2.94 and 8.30.
     result = calibrate(read_recording(real_data / "openaxes" / f"{name}.csv"), gravity_m_s2=9.8127)
@@ -171,19 +162,15 @@ def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))
         force_scale = np.cbrt(abs(np.linalg.det(truth.accelerometer_S)))
-        moved = scattered(recording, segments, np.radians(0.05) / scale, rng)
-        offset = np.zeros_like(recording.accelerometer)
-        edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), recording.n_samples]
-        for start, stop in pairwise(edges):
-            offset[start:stop] = 3e-3 / force_scale * rng.standard_normal(3)
-        moved = replace(moved, accelerometer=recording.accelerometer + offset)
-        found = calibrate(moved, segments=segment_recording(moved), gravity_m_s2=truth.gravity_m_s2).calibration
-        error = np.concatenate(
-            [(found.accelerometer.S - truth.accelerometer_S).ravel(), (found.gyroscope.S - truth.gyroscope_S).ravel()]
+        moved = replace(
+            recording,
+            gyroscope=scattered(recording.gyroscope, segments, np.radians(0.05) / scale, rng),
+            accelerometer=scattered(recording.accelerometer, segments, 3e-3 / force_scale, rng),
         )
-        sigma = np.concatenate([found.accelerometer.sigma_S.ravel(), found.gyroscope.sigma_S.ravel()])
-        free = sigma > 0.0
-        scores.append(error[free] / sigma[free])
+        found = calibrate(moved, segments=segment_recording(moved), gravity_m_s2=truth.gravity_m_s2).calibration
+        pairs = ((found.accelerometer, truth.accelerometer_S), (found.gyroscope, truth.gyroscope_S))
+        error = np.concatenate([(s.S - S)[s.sigma_S > 0.0] for s, S in pairs])
+        scores.append(error / np.concatenate([s.sigma_S[s.sigma_S > 0.0] for s, _ in pairs]))
     squares = np.array(scores) ** 2
     # 90 correlated scores of unit variance: their mean square lies in 1 ± 0.25 (15 parameters a session, six sessions).
     assert 0.5 < squares.mean() < 1.6

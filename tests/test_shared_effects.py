@@ -1,8 +1,5 @@
 """Several recordings of one unit: their evidence for an effect of one size adds."""
 
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -15,7 +12,6 @@ from trihedron.diagnose.hypothesis import AddedTerms, Term
 from trihedron.diagnose.session.state import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
 
-MASSIF = Path(__file__).parents[2] / "shared" / "data" / "getovermassif"
 STRENGTHS = ((1.0, 1.0), (1.0,) * 4, (1.0, 1.0), (1.0, 1.0))
 
 
@@ -61,13 +57,12 @@ def test_values_that_agree_do_so_at_the_rate_of_chance():
     assert 0.07 <= np.mean(np.array(p) < 0.1) <= 0.13
 
 
-@cache
 def sessions(*strengths):
     """Recordings of one unit whose gyro has these g-sensitivities [(rad/s)/(m/s²)]."""
     made = []
     for k, g in enumerate(strengths):
-        size = {"matrix": [[0.0, g, 0.0], [0.0, 0.0, g], [-g, 0.0, 0.0]]}
-        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, **(size if g else {}))[0])
+        size = {"matrix": [[0.0, g, 0.0], [0.0, 0.0, g], [-g, 0.0, 0.0]]} if g else {}
+        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, **size)[0])
     return trihedron.diagnose_sessions(made, gravity_m_s2=9.81)
 
 
@@ -81,24 +76,20 @@ def test_an_effect_too_weak_for_one_recording_is_found_in_three():
     assert abs(value.value - 6e-5) < 4.0 * value.std
 
 
-def test_healthy_recordings_share_nothing():
+def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     found = sessions(0.0, 0.0)
     assert found.effects == ()
     assert "share no missing effect" in str(found)
+    with pytest.raises(ValueError, match="two or more"):
+        trihedron.diagnose_sessions([simulated("", 11, 14)[0]], gravity_m_s2=9.81)
 
 
 @pytest.mark.slow
-def test_values_that_differ_are_not_called_the_instruments():
-    found = sessions(4e-4, -4e-4)
-    assert all(not one.is_of_instrument for one in found.effects)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not MASSIF.is_dir(), reason="the recordings are not here")
-def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions():
+def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions_and_one_that_differs_in_none(real_data):
+    folder = real_data / "getovermassif"
     recordings = [
         trihedron.read(
-            accelerometer_path=MASSIF / f"session{k}_acc.txt", gyroscope_path=MASSIF / f"session{k}_gyro.txt"
+            accelerometer_path=folder / f"session{k}_acc.txt", gyroscope_path=folder / f"session{k}_gyro.txt"
         )
         for k in (2, 3, 4)
     ]
@@ -109,8 +100,4 @@ def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions():
     # Each of them by itself gains at the common expected size; together far more.
     assert min(effect.scores) > 0.0
     assert effect.score > 100.0
-
-
-def test_one_recording_shares_nothing_with_itself_alone():
-    with pytest.raises(ValueError, match="two or more"):
-        trihedron.diagnose_sessions([simulated("", 11, 18)[0]], gravity_m_s2=9.81)
+    assert not any(one.is_of_instrument for one in sessions(4e-4, -4e-4).effects)

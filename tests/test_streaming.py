@@ -6,6 +6,7 @@ import sys
 import tempfile
 
 import numpy as np
+import polars
 import pytest
 
 import trihedron
@@ -21,18 +22,21 @@ def whole():
     return recorded(Instrument(), 5, rate_hz=100.0)
 
 
-@pytest.fixture(scope="module", params=["npy", "parquet", "csv"])
-def path(whole, request, tmp_path_factory):
-    table = np.hstack([whole.accelerometer, whole.gyroscope])
-    out = tmp_path_factory.mktemp("large") / f"log.{request.param}"
-    if request.param == "npy":
+def saved(log, out):
+    """The readings alone, as an array or a table."""
+    table = np.hstack([log.accelerometer, log.gyroscope])
+    if out.suffix == ".npy":
         np.save(out, table)
+    elif out.suffix == ".csv":
+        polars.DataFrame(table, schema=COLUMNS.split(",")).write_csv(out)
     else:
-        import polars
-
-        frame = polars.DataFrame(table, schema=COLUMNS.split(","))
-        frame.write_csv(out) if request.param == "csv" else frame.write_parquet(out)
+        polars.DataFrame(table, schema=COLUMNS.split(",")).write_parquet(out)
     return out
+
+
+@pytest.fixture(scope="module")
+def path(whole, tmp_path_factory):
+    return saved(whole, tmp_path_factory.mktemp("large") / "log.npy")
 
 
 def opened(path):
@@ -41,10 +45,11 @@ def opened(path):
     )
 
 
-@pytest.mark.parametrize("piece", [250, 1 << 18])
-def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, path, piece, monkeypatch):
+@pytest.mark.parametrize(("ending", "piece"), [("npy", 1 << 18), ("npy", 250), ("parquet", 250), ("csv", 250)])
+def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, tmp_path, ending, piece, monkeypatch):
     monkeypatch.setattr(streaming, "PIECE_ROWS", piece)
-    found, wanted = streaming.segment_file(opened(path)), trihedron.segment(whole)
+    found = streaming.segment_file(opened(saved(whole, tmp_path / f"log.{ending}")))
+    wanted = trihedron.segment(whole)
     assert found.poses == wanted.poses
     assert found.moves == wanted.moves
     for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):

@@ -37,6 +37,21 @@ BY_OPTION = {
     "--gyro-lsb": ["0.03 deg/s", "x", "nan deg/s"],
     "--accuracy": ["10", "accel 0.05 %, gyro 0.1 %", "x"],
 }
+OUTPUTS = {"output", "json", "report", "csv", "plot", "truth", "updated", "improved"}
+ENDINGS = [".csv", ".json", ".html", ".txt", ".png", ".npz", ".parquet", ".toml", ""]
+LOGS = ["log.csv", "short.csv", "rest.csv", "a.npy", "b.npz", "a.zip", "a.gz", "quoted.csv"]
+# Files in the place of an input, and what else stands there in half of the cases.
+BY_FILE = {
+    "calibration": (["c.json", "untrusted.json", "noise.json"], ["bad.json", *SPECIAL]),
+    "noise": (["noise.json", "axis.json", "rest.csv", "bad.json"], []),
+    "with-effects": (["diagnosis.json", "c.json", "bad.json"], []),
+    "diagnosis": (["diagnosis.json", "c.json", "bad.json"], []),
+    "reference": (["poses.csv", "bad.csv"], []),
+}
+BY_NAME = {
+    "scenario": ["s.toml", "bad.toml", "hand-session", "x", "missing.toml"],
+    "port": ["short.csv", "bad.csv", "missing", "a.npy", "/dev/null", "tcp://", "tcp://127.0.0.1:1"],
+}
 
 
 class Commands(Attack):
@@ -66,7 +81,7 @@ class Commands(Attack):
                 continue
             if is_argument and rng.random() < 0.05:
                 continue
-            value = self._value(rng, flag, parameter, is_tame)
+            value = str(rng.choice(self._values(rng, flag, parameter, is_tame)))
             if is_argument:
                 words.append(value)
             elif "bool" in repr(parameter.type_descriptor.annotation):
@@ -80,39 +95,21 @@ class Commands(Attack):
             words.insert(at, str(rng.choice(["--nonsense", "-x", "--json", "--force", "--full", *WORDS])))
         return words
 
-    def _value(self, rng: np.random.Generator, flag: str, parameter: Any, is_tame: bool) -> str:
+    def _values(self, rng: np.random.Generator, flag: str, parameter: Any, is_tame: bool) -> list[str]:
+        """What may stand in the place of a parameter."""
+        name, kind = flag.lstrip("-"), repr(parameter.type_descriptor.annotation)
         if flag in BY_OPTION:
-            return str(rng.choice(BY_OPTION[flag]))
-        kind = repr(parameter.type_descriptor.annotation)
+            return BY_OPTION[flag]
+        if "Path" in kind and name in OUTPUTS:
+            made = f"out{int(rng.integers(3))}{rng.choice(ENDINGS)}"
+            return [made, made, made, *(["c.json", "log.csv"] if is_tame else SPECIAL)]
         if "Path" in kind:
-            name = flag.lstrip("-")
-            if name in ("calibration",):
-                return str(
-                    rng.choice(["c.json", "untrusted.json", "noise.json", *([] if is_tame else ["bad.json", *SPECIAL])])
-                )
-            if name in ("output", "json", "report", "csv", "plot", "truth", "updated", "improved"):
-                endings = [".csv", ".json", ".html", ".txt", ".png", ".npz", ".parquet", ".toml", ""]
-                made = f"out{int(rng.integers(3))}{rng.choice(endings)}"
-                return str(rng.choice([made, made, made, *(["c.json", "log.csv"] if is_tame else SPECIAL)]))
-            if name in ("noise",):
-                return str(rng.choice(["noise.json", "axis.json", "rest.csv", "bad.json"]))
-            if name in ("with-effects", "diagnosis"):
-                return str(rng.choice(["diagnosis.json", "c.json", "bad.json"]))
-            if name == "reference":
-                return str(rng.choice(["poses.csv", "bad.csv"]))
-            pool = ["log.csv", "short.csv", "rest.csv", "a.npy", "b.npz", "a.zip", "a.gz", "quoted.csv"]
-            return str(
-                rng.choice(pool if is_tame else [*pool, "bad.csv", "bad.npy", "bad.npz", "bad.gz", "c.json", *SPECIAL])
-            )
-        if flag.lstrip("-") == "scenario":
-            return str(rng.choice(["s.toml", "bad.toml", "hand-session", "x", "missing.toml"]))
-        if flag.lstrip("-") == "port":
-            return str(
-                rng.choice(["short.csv", "bad.csv", "missing", "a.npy", "/dev/null", "tcp://", "tcp://127.0.0.1:1"])
-            )
-        if "int" in kind or "float" in kind:
-            return str(rng.choice(["1", "2", "100", "0.01", "60", *([] if is_tame else WORDS)]))
-        return str(rng.choice(WORDS))
+            tame, wild = BY_FILE.get(name, (LOGS, ["bad.csv", "bad.npy", "bad.npz", "bad.gz", "c.json", *SPECIAL]))
+            return tame if is_tame else [*tame, *wild]
+        if name in BY_NAME:
+            return BY_NAME[name]
+        is_number = "int" in kind or "float" in kind
+        return ["1", "2", "100", "0.01", "60", *([] if is_tame else WORDS)] if is_number else WORDS
 
     def describe(self, number: int) -> str:
         return json.dumps(self.words(number))
@@ -131,8 +128,7 @@ class Commands(Attack):
         finally:
             os.chdir("/")
         took = time.process_time() - began
-        files = (before, _content(folder))
-        return self._judged(words, status, out.getvalue(), err.getvalue(), files, took)
+        return self._judged(words, status, out.getvalue(), err.getvalue(), [before, _content(folder)], took)
 
     def _sandbox(self, rng: np.random.Generator) -> Path:
         folder = self.folder / f"{os.getpid()}"
@@ -147,28 +143,14 @@ class Commands(Attack):
             path = folder / name
             if not path.exists() or path.stat().st_size != len(data):
                 path.write_bytes(data)
-        for name, ending in (
-            ("c.json", "json"),
-            ("short.csv", "csv"),
-            ("a.npy", "npy"),
-            ("b.npz", "npz"),
-            ("a.gz", "gz"),
-        ):
-            data = self.files[name]
+        for name in ("c.json", "short.csv", "a.npy", "b.npz", "a.gz"):
+            data, ending = self.files[name], name.partition(".")[2]
             is_json = ending == "json" and rng.random() < 0.7
             (folder / f"bad.{ending}").write_bytes(of_json(rng, data) if is_json else of_bytes(rng, data))
         (folder / "bad.toml").write_bytes(of_bytes(rng, self.files["s.toml"]))
         return folder
 
-    def _judged(
-        self,
-        words: list[str],
-        status: int,
-        out: str,
-        err: str,
-        files: tuple[dict[str, str], dict[str, str]],
-        took: float,
-    ) -> str:
+    def _judged(self, words: list[str], status: int, out: str, err: str, files: list[dict], took: float) -> str:
         before, after = files
         said = f"status {status}: {err[-300:]!r}"
         if status not in (0, 1, 2):
