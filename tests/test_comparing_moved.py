@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-import trihedron
 from trihedron.comparison.frames import AIMED_AT, missed_alike
 from trihedron.probability import bdtrc
-from trihedron.simulate import hand_session, profile_by_name
-from trihedron.simulate.scenario import Scenario
 
 ALPHA = 0.01
 
@@ -52,16 +49,3 @@ def test_a_ratio_beyond_chance_is_told_of_poses_and_not_of_moves(n, ratio):
     assert one.interval[1] < AIMED_AT[0] or one.interval[0] > AIMED_AT[1]
     assert one.p_value < ALPHA
     assert "simulations" in one.remark
-
-
-# The worked example ends in a scenario that is consistent, in every run.
-@pytest.mark.slow
-def test_the_scenario_that_made_a_log_shows_both_ratios_and_is_consistent():
-    a, g = profile_by_name("mpu").unit(12)
-    scenario = Scenario(hand_session(14), "unit", a, g)
-    log, _ = trihedron.simulate(scenario, 5)
-    found = trihedron.diagnose(log, against=scenario, gravity_m_s2=scenario.environment.gravity)
-    rows = {n.term: n for n in found.noise_compared if n.term in ("poses", "moves")}
-    assert found.verdict == "consistent"
-    assert set(rows) == {"poses", "moves"}
-    assert all(row.interval[0] < 1.1 and row.interval[1] > 0.9 for row in rows.values())

@@ -27,15 +27,14 @@ def gyro_z(result, truth):
     return error / result.gyroscope.sigma_S, np.abs(error).max() / np.abs(np.diag(truth.S_w)).mean()
 
 
-@pytest.mark.parametrize(("move_s", "part"), [(2.0, 5e-4), (30.0, 1e-3)])
-def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, part):
-    f, w, rate, truth, motion = hand(21, n_poses=12, move_s=move_s)
+def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned():
+    f, w, rate, truth, motion = hand(21, n_poses=12, move_s=30.0)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
     z, relative = gyro_z(result, lower(truth))
     assert result.segments.n_poses == len(motion.rests)
     # Nine numbers, each within four standard errors; the rate noise over a minute is 0.04° in 90°.
     assert np.abs(z).max() < 4.0
-    assert relative < part
+    assert relative < 1e-3
 
 
 def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds():
@@ -81,36 +80,17 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
         calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
 
 
-@pytest.mark.slow
-def test_the_zero_of_a_coarse_gyro_is_not_drawn_to_its_code():
-    place, miss = [], []
-    for seed in range(900, 916):
-        f, w, rate, truth, _ = hand(seed, n_poses=12, pose_s=2.5, gyro_bits=10)
-        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
-        zero = -np.linalg.solve(truth.S_w, truth.b_w)
-        place.append(zero - np.round(zero))
-        miss.append(-np.linalg.solve(result.gyroscope.S, result.gyroscope.b) - zero)
-    # An offset on whole moves took what stands still at their ends for what turns, and fell short by 0.05 to 0.06 of
-    # the place inside the step. 48 misses tell that slope to 0.009; its own standard error is the yardstick.
-    place, miss = np.concatenate(place), np.concatenate(miss)
-    slope = np.polyfit(place, miss, 1)[0]
-    error = np.std(miss - slope * place) / (np.std(place) * np.sqrt(len(place)))
-    assert error < 0.012, "a test that could not tell a slope of 0.05 says nothing"
-    assert abs(slope) < 3.0 * error
-
-
-@pytest.mark.parametrize("bits", [8, pytest.param(10, marks=pytest.mark.slow)])
-def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
+def test_a_coarse_gyro_has_the_error_bars_of_its_rounding():
     z, of_bias = [], []
     for seed in (31, 32, 33):
-        f, w, rate, truth, _ = hand(seed, gyro_bits=bits)
+        f, w, rate, truth, _ = hand(seed, gyro_bits=8)
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
         if not result.is_trustworthy:
             # Marked as not to be trusted, which is the other honest answer.
             continue
         scores, relative = gyro_z(result, lower(truth))
         # A step of 4 °/s at 8 bit: three parts in a thousand are what its moves of 2 s show.
-        assert relative < (6e-3 if bits == 8 else 2e-3)
+        assert relative < 6e-3
         z.append(scores)
         of_bias.append((result.gyroscope.b - lower(truth).b_w) / result.gyroscope.sigma_b)
     assert len(z) >= 2
@@ -144,10 +124,9 @@ def test_moves_through_hundreds_of_degrees_need_no_nominal_scale():
     assert relative < 0.01
 
 
-@pytest.mark.parametrize("sessions", [3, pytest.param(6, marks=pytest.mark.slow)])
-def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_back(sessions):
+def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_back():
     accelerometer, gyro = [], []
-    for seed in range(60, 60 + sessions):
+    for seed in range(60, 63):
         f, w, rate, truth, _ = table(seed, turns=(90.0, -90.0))
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces")
         a = result.accelerometer
@@ -158,10 +137,9 @@ def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_bac
     assert np.mean(np.square(gyro)) < 1.5
 
 
-@pytest.mark.parametrize("others", [2, pytest.param(5, marks=pytest.mark.slow)])
-def test_whole_turns_show_the_lean_of_a_table_that_headings_hide(others):
+def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
     accelerometer = []
-    for seed in (610080, *range(90, 90 + others)):
+    for seed in (610080, 90, 91):
         f, w, rate, truth, motion = table(seed, turns=(360.0, -360.0))
         turns = [angle for _, _, angle in motion.turns]
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=turns)

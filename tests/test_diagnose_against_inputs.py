@@ -36,6 +36,8 @@ def test_a_scenario_with_a_typing_error_is_refused_with_its_place(tmp_path, caps
 
 def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):
     assert "no such file" in refused(tmp_path / "absent.csv", capsys)
+    belongs = "this is a trihedron calibration, no log; name it with --calibration"
+    assert belongs in refused(made_once() / "c.json", capsys)
     empty = tmp_path / "words.csv"
     empty.write_text("nothing,here\n")
     assert "words.csv" in refused(empty, capsys)
@@ -49,24 +51,11 @@ def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, cap
     assert "pose" in said
 
 
-def without_gyro(path, log):
-    """The log's time and accelerometer alone."""
-    path.write_text("\n".join(",".join(line.split(",")[:4]) for line in log.read_text().splitlines()) + "\n")
-    return path
-
-
 def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, capsys):
-    log = made_once() / "log.csv"
-    bare = without_gyro(tmp_path / "bare.csv", log)
+    log, bare = made_once() / "log.csv", tmp_path / "bare.csv"
+    bare.write_text("\n".join(",".join(line.split(",")[:4]) for line in log.read_text().splitlines()) + "\n")
     for recording, model, lacks in ((log, bare, "the simulated log has none"), (bare, log, "the recording has none")):
         assert main(["diagnose", str(recording), "--gravity", G, "--against", str(model), "--full"]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert "the gyro was not compared." in said
         assert lacks in said
-
-
-def test_a_calibration_in_place_of_a_simulated_log_is_told_where_it_belongs(tmp_path, capsys):
-    made = tmp_path / "cal.json"
-    assert main(["calibrate", str(made_once() / "log.csv"), "--gravity", G, "-o", str(made)]) == 0
-    capsys.readouterr()
-    assert "this is a trihedron calibration, no log; name it with --calibration" in refused(made, capsys)

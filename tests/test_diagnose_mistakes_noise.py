@@ -76,15 +76,17 @@ def test_the_same_unit_again_has_made_no_mistake(real):
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"),
+    ("factor", "rate_hz", "words"),
     [
-        (10.0, "multiplied by the root of the rate once too often"),
-        (0.1, "was not multiplied by the root of the rate"),
+        (10.0, RATE_HZ, "multiplied by the root of the rate once too often"),
+        (0.1, RATE_HZ, "was not multiplied by the root of the rate"),
+        # The root is that of the model's rate.
+        (20.0, 4.0 * RATE_HZ, "√400"),
     ],
 )
-def test_a_density_scaled_by_the_root_of_the_rate_is_named(real, factor, words):
-    for sensor in SENSORS:
-        assert words in said(log(3, size=factor, step=STEP * min(factor, 1.0)), real)[sensor, "N"]
+def test_a_density_scaled_by_the_root_of_the_rate_is_named(real, factor, rate_hz, words):
+    found = said(replace(log(3, size=factor, step=STEP * min(factor, 1.0)), rate_hz=rate_hz), real)
+    assert all(words in found[sensor, "N"] for sensor in SENSORS)
 
 
 def test_uniform_noise_is_told_from_normal_noise_of_the_same_size(real):
@@ -108,11 +110,6 @@ def test_one_draw_for_all_three_axes_is_named():
     # Noise that the recording's axes share (a supply, a table) refutes nothing.
     assert ("gyroscope", "distribution") not in said(one, one)
     assert ("gyroscope", "distribution") not in said(own, one)
-
-
-def test_the_root_of_the_rate_is_that_of_the_model(real):
-    at_400_hz = replace(log(23, size=20.0), rate_hz=4.0 * RATE_HZ)
-    assert "√400" in said(at_400_hz, real)["gyroscope", "N"]
 
 
 def test_readings_without_steps_are_named_where_the_recordings_steps_matter():

@@ -8,33 +8,29 @@ import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_adc, missing_codes
 
+MISSING = (1.0, False, False, ())
+"""Samples lost without a trace in the timestamps, in motion too quick for a smooth join across the gap."""
 
-@pytest.mark.parametrize(
-    ("flaw", "seed"),
-    [
-        ("gyro-thermal-bias", 8111100504),
-    ],
-)
-def test_a_straight_line_among_zeros_that_scatter_is_no_curve(flaw, seed, tmp_path):
-    # Called quadratic, or with its rate of change, it paid for three numbers more and lost to a drift in time.
-    columns, _ = draw(flaw, seed)
+
+def diagnosed(tmp_path, *drawn):
+    columns, answer = draw(*drawn)
     pl.DataFrame(columns).write_csv(tmp_path / "log.csv")
-    first = trihedron.diagnose(str(tmp_path / "log.csv"), gravity_m_s2=G).effects[0]
-    assert (first.id, first.model["variant"]) == (flaw, "linear")
+    return trihedron.diagnose(str(tmp_path / "log.csv"), gravity_m_s2=G), answer
 
 
 @pytest.mark.parametrize(
-    ("flaw", "seed", "expected"),
+    ("flaw", "seed", "first"),
     [
+        # Called quadratic, or with its rate of change, it paid for three numbers more and lost to a drift in time.
+        ("gyro-thermal-bias", 8111100504, [("gyro-thermal-bias", "linear")]),
         ("none", 4500100519, []),  # soft supports that ring: named a line
-        # Power in brisk moves was the hand's.
-        pytest.param("vibration-rectification", 8500100015, ["vibration-rectification"], marks=pytest.mark.slow),
     ],
 )
-def test_soft_supports_and_brisk_moves_are_not_vibration(flaw, seed, expected, tmp_path):
-    columns, _ = draw(flaw, seed)
-    pl.DataFrame(columns).write_csv(tmp_path / "log.csv")
-    assert [e.id for e in trihedron.diagnose(str(tmp_path / "log.csv"), gravity_m_s2=G).effects][:1] == expected
+def test_a_straight_line_among_zeros_that_scatter_is_no_curve_and_a_soft_support_no_vibration(
+    flaw, seed, first, tmp_path
+):
+    found, _ = diagnosed(tmp_path, flaw, seed)
+    assert [(one.id, one.model["variant"]) for one in found.effects[:1]] == first
 
 
 def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
@@ -45,7 +41,26 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     assert missing_codes(poses, float(np.concatenate(poses).std()), step) == 0
     sigma, _, _ = before_adc(poses, step)
     assert sigma == pytest.approx(noise, rel=0.15)  # one level of its grid is 12 %
-
-
-def test_still_readings_on_one_code_show_no_grid():
+    # One code shows no grid.
     assert missing_codes([np.zeros(100)] * 5, 0.0, 0.02) is None
+
+
+@pytest.mark.parametrize(
+    ("seed", "what"),
+    [
+        (87100100214, "20 Hz, one sample a gap: a join of six samples spans half the move"),
+        (87100100614, "50 Hz, two samples a gap, moves that do not join at all"),
+    ],
+)
+def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, what):
+    found, answer = diagnosed(tmp_path, "dropped-samples", seed, *MISSING)
+    assert [effect.id for effect in found.effects][:1] == ["dropped-samples"], what
+    lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
+    # Up to one in ten of what is missing: a loss in a turn about the vertical is one that gravity cannot count.
+    assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1), what
+
+
+@pytest.mark.parametrize("flaw", ["gyro-saturation", "sensor-lag"])
+def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw):
+    found, _ = diagnosed(tmp_path, flaw, 11, *MISSING)
+    assert "dropped-samples" not in [effect.id for effect in found.effects]

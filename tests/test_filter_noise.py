@@ -134,18 +134,19 @@ def test_parts_of_an_error_are_the_textbook_ones():
     assert parts_of(fixed, 10.0, alike=half)["reference"][0] == pytest.approx(8 * SLOW**2, rel=1e-3)
 
 
-@pytest.fixture(scope="module")
-def moved():
-    """A hand for 70 s before a tracker, noise and truth error known."""
-    rng = np.random.default_rng(5)
-    t, C, _ = hand(rng, 70)
+def before_a_tracker(seed, seconds, per_kelvin=(0.0, 0.0, 0.0), is_logged=False):
+    """A hand, noise and truth error known, while the sensor warms up by six kelvin, its bias along with it."""
+    rng = np.random.default_rng(seed)
+    t, C, _ = hand(rng, seconds)
     step = FINE_HZ // 100
     n = len(t) // step
+    time = (np.arange(n) * step + (step - 1) / 2) / FINE_HZ
     w, f = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (rates_of(C), forces(C)))
-    w = w + 0.01 + N * 10 * rng.normal(size=w.shape)
+    degrees = 30.0 - 6.0 * np.exp(-time / 60.0)
+    w = w + 0.01 + (degrees - 30.0)[:, None] * per_kelvin + N * 10 * rng.normal(size=w.shape)
     log = Recording.from_arrays(
-        (np.arange(n) * step + (step - 1) / 2) / FINE_HZ, f + 0.01 * rng.normal(size=f.shape), w,
-        accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+        time, f + 0.01 * rng.normal(size=f.shape), w, accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+        temperature_degc=degrees + 0.05 * rng.normal(size=n) if is_logged else None,
     )  # fmt: skip
     k = np.arange(0, len(t), FINE_HZ // 50)
     return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
@@ -163,8 +164,9 @@ def static(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(moved, static):
-    return trihedron.filter_noise(moved[0], static=static, reference=moved[1], horizons_s=[1, 10], gravity_m_s2=G)
+def found(static):
+    log, truth = before_a_tracker(5, 70)
+    return trihedron.filter_noise(log, static=static, reference=truth, horizons_s=[1, 10], gravity_m_s2=G)
 
 
 def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
@@ -240,18 +242,13 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
     assert any(f.code.value == "filter-noise-at-rest" for f in found.findings)
 
 
-def test_without_a_reference_the_tilt_over_moves_is_shown_beside_what_noise_predicts():
-    log = turned_between_intervals(scale=1.02)
-    found = trihedron.filter_noise(log, static=trihedron.allan(resting(2)))
-    assert found.tilt is not None
-    # Two per cent of 90°; noise at rest predicts hundredths of a degree.
-    assert found.tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)
-    assert found.tilt.predicted < 0.1 * found.tilt.actual
-
-
-def test_without_a_reference_a_bias_that_changes_between_intervals_is_shown_beside_what_noise_predicts():
-    log = turned_between_intervals(scale=1.0)
+def test_without_a_reference_tilt_and_bias_over_moves_are_shown_beside_what_noise_predicts():
     rest = trihedron.allan(resting(2))
+    tilt = trihedron.filter_noise(turned_between_intervals(scale=1.02), static=rest).tilt
+    # Two per cent of 90°; noise at rest predicts hundredths of a degree.
+    assert tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)
+    assert tilt.predicted < 0.1 * tilt.actual
+    log = turned_between_intervals(scale=1.0)
     found = trihedron.filter_noise(log, static=rest).intervals
     assert found.n == 4
     # Four stretches of 30 s: N / sqrt(15), a limit of K on top of it; twelve axes' changes scatter by a quarter.
@@ -299,30 +296,12 @@ def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     assert math.isfinite(accelerometer.N.value)
 
 
-def warmed(seed, per_kelvin, is_logged=True):
-    """A hand before a tracker while the sensor warms up by six kelvin, its bias along with it."""
-    rng = np.random.default_rng(seed)
-    t, C, _ = hand(rng, 150)
-    step = FINE_HZ // 100
-    n = len(t) // step
-    time = (np.arange(n) * step + (step - 1) / 2) / FINE_HZ
-    w, f = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (rates_of(C), forces(C)))
-    degrees = 30.0 - 6.0 * np.exp(-time / 60.0)
-    w = w + 0.01 + (degrees - 30.0)[:, None] * per_kelvin + N * 10 * rng.normal(size=w.shape)
-    log = Recording.from_arrays(
-        time, f + 0.01 * rng.normal(size=f.shape), w, accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
-        temperature_degc=degrees + 0.05 * rng.normal(size=n) if is_logged else None,
-    )  # fmt: skip
-    k = np.arange(0, len(t), FINE_HZ // 50)
-    return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
-
-
 @pytest.mark.slow
 def test_a_bias_that_follows_a_logged_temperature_has_a_share_of_its_own_and_none_of_the_walk(static):
     per_kelvin = np.array([1e-3, -7e-4, 5e-4])
     share, walk = {}, {}
     for is_logged in (True, False):
-        log, truth = warmed(3, per_kelvin, is_logged)
+        log, truth = before_a_tracker(3, 150, per_kelvin, is_logged)
         found = trihedron.filter_noise(log, static=static, reference=truth, horizons_s=[10], gravity_m_s2=G)
         gyro = found.sensor("gyroscope")
         share[is_logged] = next((s.share for s in gyro.shares if s.cause == "temperature"), None)

@@ -116,13 +116,12 @@ def row(serial, name, numbers, sigma=1e-4):
     }
 
 
-@pytest.mark.parametrize(("fleets", "most", "least"), [(15, 2, 7), pytest.param(40, 3, 22, marks=pytest.mark.slow)])
-def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path, fleets, most, least):
+def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path):
     rng = np.random.default_rng(8)
     found, alarms = 0, 0
     # Kinds of numbers with sizes of their own, axes of one kind made alike.
     sizes = np.repeat([0.3, 0.01, 0.01, 0.02, 0.01, 0.01, 0.01], 3)
-    for _ in range(fleets):
+    for _ in range(15):
         numbers = rng.normal(size=(6, 21)) * sizes
         rows = [row(f"u{k}", str(k), one) for k, one in enumerate(numbers)]
         alarms += bool(summarise(rows, tmp_path).summary.outliers)
@@ -130,9 +129,10 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path,
         numbers[k, j] += 8.0 * sizes[j]
         strays = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers)], tmp_path).summary.outliers
         found += (f"u{k}", j) in [(one.serial, PARAMETERS.index(one.parameter)) for one in strays]
-    # One in a hundred sound fleets: 0.4 expected. Of the strays three in four: by each axis alone one in fifteen.
-    assert alarms <= most
-    assert found >= least
+    # One in a hundred sound fleets: three of 15 come once in 2000. Of the strays three in four: by each axis alone one
+    # in fifteen.
+    assert alarms <= 2
+    assert found >= 7
 
 
 def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):

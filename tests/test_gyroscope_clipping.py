@@ -60,8 +60,7 @@ def on_a_table(rng, n_turns, pose_s, ramp_s, quantum):
     return np.round((rate + 0.02 * rng.normal(size=rate.shape)) / quantum) * quantum
 
 
-@pytest.mark.parametrize("pose_s", [0.5, 3.0])
-@pytest.mark.parametrize("ramp_s", [0.05, 0.3])
+@pytest.mark.parametrize(("pose_s", "ramp_s"), [(0.5, 0.05), (3.0, 0.3)])
 def test_a_steady_turn_of_a_table_under_a_coarse_converter_is_not_at_a_limit(pose_s, ramp_s):
     # Of these, 9 to 20 in 20 were taken for a limit while only the axis itself was looked at.
     for seed in range(20):

@@ -13,7 +13,7 @@ from trihedron.api.improving import improve
 from trihedron.comparison.ranges import stated_ranges
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.simulate import Scenario, hand_session, read_scenario, simulate
+from trihedron.simulate import Scenario, diagnosed_sizes, hand_session, read_scenario, simulate
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.readout import Adc
 from trihedron.simulate.twin import unclipped
@@ -65,11 +65,7 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
     # The ADC's, not an effect beside it; and none of the accelerometer, whose range nothing came to.
     assert "gyro-saturation" not in {e["id"] for e in table.get("effect", [])}
     assert "low" not in table["accelerometer"].get("adc", {})
-
-
-@pytest.mark.slow
-def test_what_a_scenario_said_of_its_old_values_is_not_kept_and_a_stated_bias_of_none_is_not_asked_about(improved):
-    found, better = improved
+    # What the scenario said of its old values is not kept; a stated bias of none is not asked about.
     text = better.read_text()
     assert text.startswith("# ideal.toml, with the values of a recording")
     assert "perfect" not in text
@@ -116,10 +112,7 @@ def test_a_cut_peak_is_drawn_beyond_the_limit_and_nothing_else_is_touched():
     assert np.all(out[at, 0] >= 80.0)
     assert 82.0 < out[:, 0].max() < 100.0
     assert unclipped(x, replace(facts, limits=())) is x
-
-
-def test_the_sign_and_the_place_of_a_limit_do_not_matter():
-    _, cut, facts = triangle(100.0, 80.0)
+    # Neither the sign nor the place of a limit matters.
     limit = facts.limits[0]
     below = replace(facts, limits=(replace(limit, value=-80.0, is_high=False),))
     np.testing.assert_allclose(unclipped(-cut, below), -unclipped(cut, facts), atol=1e-12)
@@ -142,3 +135,15 @@ def test_a_range_is_stated_where_it_ends_within_what_axes_differ_by(clipped, imp
     # An effect without a limit states nothing.
     bare = replace(found[0], parameters=(EffectParameter("samples", 3.0, 0.0, "1"),))
     assert not stated_ranges(scenario, [bare], recording)
+
+
+def test_a_straight_drift_of_a_session_whose_length_nobody_says_is_left_out():
+    change = (0.05, -0.08, 0.06)
+    values = [{"name": f"drift_{axis}", "value": v} for axis, v in zip("xyz", change, strict=True)]
+    effect = {"id": "accel-bias-drift", "parameters": values, "model": {"variant": "line"}}
+    sizes, left_out = diagnosed_sizes([effect])
+    assert not sizes
+    assert "needs the length of its session" in left_out["accel-bias-drift"]
+    sizes, left_out = diagnosed_sizes([effect], 200.0)
+    assert sizes == [("accel-bias-drift", {"change": change, "length_s": 200.0})]
+    assert not left_out

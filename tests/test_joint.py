@@ -67,17 +67,12 @@ def test_the_covariance_of_all_24_parameters_is_honest(sessions):
     assert abs(np.mean(np.abs(np.array(scores)) < 1.0) - 0.683) < margin
 
 
-def test_the_gyro_alone_agrees_with_the_joint_answer_inside_its_error_bars():
+def test_the_gyro_alone_agrees_with_the_joint_answer_and_sharpens_the_accelerometer():
     recording, truth = session(3)
     segments, alone, joint = solve(recording, truth)
     moves, _ = calibrate_moves(recording, segments, alone, truth.gravity_m_s2, MoveOptions(n_folds=0))
     assert np.abs((moves.S - joint.gyroscope.S) / joint.gyroscope.sigma_S).max() < 1.0
     np.testing.assert_allclose(moves.sigma_S, joint.gyroscope.sigma_S, rtol=0.25)
-
-
-def test_the_gyro_sharpens_the_accelerometer():
-    recording, truth = session(3)
-    _, alone, joint = solve(recording, truth)
     free = np.diag(alone.covariance) > 0.0
     ratio = np.diag(joint.accelerometer.covariance)[free] / np.diag(alone.covariance)[free]
     # Estimated scatter of the two noise figures: a few per cent.

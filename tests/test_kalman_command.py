@@ -48,12 +48,7 @@ def test_the_report_shows_every_method_and_the_calibration_file_holds_the_truth(
 
 
 def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
-    accelerometer = Accelerometer(noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
-    scenario = Scenario(motion=long_rest(1200.0), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    rest = simulate(scenario, seed=2)[0]
-    path = tmp_path / "rest.csv"
-    rows = np.column_stack([rest.time_s, rest.accelerometer])
-    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
+    path = rest_log(tmp_path / "rest.csv", 1200.0, N=(0.01,) * 3, K=(0.001,) * 3)
     assert run(session, "--reference", session / "angles.csv", "--noise", path, "--json") == 0
     said = json.loads(capsys.readouterr().out)
     for axis in said["axes"]:
@@ -62,11 +57,10 @@ def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
         assert axis["noise"]["walk"] == pytest.approx(0.001, rel=0.6)
 
 
-def rest_log(path, **accelerometer):
-    scenario = Scenario(
-        motion=long_rest(600.0), accelerometer=Accelerometer(**accelerometer), clock=Clock(rate_hz=25.0)
-    )
-    rest = simulate(scenario, seed=3)[0]
+def rest_log(path, seconds, **noise):
+    accelerometer = Accelerometer(noise=NoiseTerms(**noise))
+    scenario = Scenario(motion=long_rest(seconds), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
+    rest = simulate(scenario, seed=2)[0]
     rows = np.column_stack([rest.time_s, rest.accelerometer])
     np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
     return path
@@ -74,7 +68,7 @@ def rest_log(path, **accelerometer):
 
 def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, capsys):
     # Half the counts at twice the range: half the noise, too little to tell from a quieter place, and half of gravity.
-    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(0.01,) * 3))
+    rest = rest_log(tmp_path / "rest.csv", 600.0, N=(0.01,) * 3)
     half = np.loadtxt(rest, delimiter=",", skiprows=1) * [1.0, 0.5, 0.5, 0.5]
     np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
     assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1

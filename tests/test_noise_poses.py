@@ -43,22 +43,19 @@ def of(rng, **options):
     return noise_of_poses(readings, RATE, windows)[0]
 
 
-EIGHT = [pytest.param(o, 8, 6, marks=pytest.mark.slow) for o in ({"step": 0.2}, {"scatter": 0.2}, {"knocks": 2})]
-
-
-@pytest.mark.parametrize(("options", "pairs", "least"), [({"step": 0.2}, 4, 3), *EIGHT], ids=str)
-def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options, pairs, least):
+@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
+def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
     rng = np.random.default_rng(71)
     inside = covered = false = 0
-    for _ in range(pairs):
+    for _ in range(4):
         one, other = of(rng, N=1.25e-2, **options), of(rng, **options)
         inside += other.white.lower <= 1e-2 <= other.white.upper
         ratio = ratio_of(one.white, other.white)
         covered += ratio.lower <= 1.25 <= ratio.upper
         false += ratio_of(other.white, of(rng, **options).white).p_value < 0.01
-    # Of 4 at 95 %: 3 or more with probability 0.986, 6 of 8 with 0.994; two false alarms of 8 at 1 % once in 370.
-    assert inside >= least
-    assert covered >= least
+    # Of 4 at 95 %: 3 or more with probability 0.986; two false alarms of 4 at 1 % once in 1700.
+    assert inside >= 3
+    assert covered >= 3
     assert false <= 1
 
 
@@ -85,25 +82,23 @@ def test_a_line_common_to_the_holds_is_found_with_its_amplitude():
     (line,) = of(rng, poses=40, line=0.03).lines
     assert line.frequency_hz == pytest.approx(17.0, abs=0.4)
     assert line.amplitude.value == pytest.approx(0.03, rel=0.3)
-    assert of(rng, poses=40).lines == ()
 
 
-@pytest.mark.parametrize("amplitude", [0.3, pytest.param(1.0, marks=pytest.mark.slow)])
-def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(amplitude):
+def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave():
     ratios, corners = [], []
     for seed in range(3):
         rng = np.random.default_rng(seed)
         n, poses = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
         clean = rng.normal(size=(n, 1))
-        wave = amplitude * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
+        wave = 0.3 * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
         plain, lined = (noise_of_poses(x, 100.0, poses)[0] for x in (clean, clean + wave))
-        assert len(lined.lines) == 1
+        assert (len(plain.lines), len(lined.lines)) == (0, 1)
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)
         both = zip(plain.octaves, lined.octaves, strict=True)
         # The same noise: what the line's own two numbers a pose take off, of some 70 in its octave.
         assert all(abs(np.log(b.density.value / a.density.value)) < 0.1 for a, b in both)
-    # Left in, half its square would be 2 and 22 % of the density.
+    # Left in, half its square would be 2 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01
     assert corners == [None] * 3
 

@@ -94,7 +94,7 @@ def test_the_command_says_what_turns_poses_and_moves_are_worth(capsys):
     assert main(["plan", "--turn-time", "-1"]) == 1
 
 
-@pytest.mark.parametrize("noise", ["1e-8", "0.01", "1e6"])
+@pytest.mark.parametrize("noise", ["1e-8", "1e6"])
 def test_which_poses_are_best_does_not_depend_on_the_noise(noise, capsys):
     def nine(words):
         assert main(["plan", "--json", *words]) == 0

@@ -40,7 +40,6 @@ def check_ranked(known, log, gravity):
         name = names[one.name]
         assert one.is_rejected, name
         assert name.removeprefix("gyro-") in [found.kind for found in one.suspicions], (name, said_of(one))
-    return ranking
 
 
 @pytest.fixture(scope="module")
@@ -52,20 +51,12 @@ def session():
 
 def test_five_wrong_files_of_a_simulated_unit_are_rejected_with_their_mistake(session):
     log, known = session
-    ranking = check_ranked(known, log, 9.81)
-    assert "undone" in str(ranking.candidates[-1].suspicions) or ranking.candidates[-1].suspicions
+    check_ranked(known, log, 9.81)
 
 
 def test_five_wrong_files_of_a_phones_imu_are_rejected_on_another_session(real_data):
     logs = [trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt") for run in (2, 3)]
     check_ranked(trihedron.calibrate(logs[0], gravity_m_s2=9.79871).calibration, logs[1], 9.79871)
-
-
-def of_massif(real_data, k):
-    folder = real_data / "getovermassif"
-    return trihedron.read(
-        accelerometer_path=folder / f"session{k}_acc.txt", gyroscope_path=folder / f"session{k}_gyro.txt"
-    )
 
 
 def test_files_of_other_makers_are_ranked_and_what_they_do_not_hold_is_taken_from_the_log(session, tmp_path, capsys):
@@ -92,12 +83,9 @@ def test_files_of_other_makers_are_ranked_and_what_they_do_not_hold_is_taken_fro
 
 def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
     log, known = session
-    nameless = replace(
-        known,
-        accelerometer=replace(known.accelerometer, b=np.zeros(3)),
-        gyroscope=replace(known.gyroscope, b=np.zeros(3)),
-        extensions={"maker": "kalibr", "without_bias": ("accelerometer", "gyroscope")},
-    )
+    a, w = (replace(sensor, b=np.zeros(3)) for sensor in (known.accelerometer, known.gyroscope))
+    nothing = {"maker": "kalibr", "without_bias": ("accelerometer", "gyroscope")}
+    nameless = replace(known, accelerometer=a, gyroscope=w, extensions=nothing)
     ranking = trihedron.rank([known, nameless], log, gravity_m_s2=9.81)
     assert not any(one.is_rejected for one in ranking.candidates)
     one = next(one for one in ranking.candidates if one.maker == "kalibr")
@@ -119,34 +107,24 @@ def test_parameters_of_a_board_are_judged_behind_what_it_had_done_to_the_log():
     np.testing.assert_allclose(logged @ made.accelerometer.S.T + made.accelerometer.b, wanted, atol=1e-12)
 
 
-def codes(result):
-    return {(found.code, found.severity.value) for found in result.findings}
+def wide(sensor):
+    return replace(sensor, S=1.05 * sensor.S, b=1.05 * sensor.b, covariance=1e4 * sensor.covariance)
 
 
-def test_verify_rejects_a_gyro_bias_that_is_wrong_by_five_degrees_per_second(session):
+def test_verify_rejects_a_gyro_bias_that_is_wrong_and_what_is_worse_than_nothing_however_uncertain(session):
     log, known = session
-    off = replace(known, gyroscope=replace(known.gyroscope, b=known.gyroscope.b + np.radians(5.0)))
+    a, w = known.accelerometer, known.gyroscope
     assert trihedron.verify(known, log, gravity_m_s2=9.81).is_passed
-    result = trihedron.verify(off, log, gravity_m_s2=9.81)
-    assert not result.is_passed
-    assert (FindingCode.CALIBRATION_SHIFT, "serious") in codes(result)
-
-
-def test_verify_rejects_what_is_worse_than_nothing_however_wide_its_uncertainty(session):
-    log, known = session
-
-    def wide(sensor):
-        return replace(sensor, S=1.05 * sensor.S, b=1.05 * sensor.b, covariance=1e4 * sensor.covariance)
-
-    off = replace(
-        known,
-        accelerometer=wide(known.accelerometer),
-        gyroscope=wide(known.gyroscope),
-        covariance=1e4 * known.covariance,
-    )
-    result = trihedron.verify(off, log, gravity_m_s2=9.81)
-    assert not result.is_passed
-    assert (FindingCode.WORSE_THAN_UNCALIBRATED, "serious") in codes(result)
+    for off, code in (
+        (replace(known, gyroscope=replace(w, b=w.b + np.radians(5.0))), FindingCode.CALIBRATION_SHIFT),
+        (
+            replace(known, accelerometer=wide(a), gyroscope=wide(w), covariance=1e4 * known.covariance),
+            FindingCode.WORSE_THAN_UNCALIBRATED,
+        ),
+    ):
+        result = trihedron.verify(off, log, gravity_m_s2=9.81)
+        assert not result.is_passed
+        assert (code, "serious") in {(found.code, found.severity.value) for found in result.findings}
 
 
 def test_verify_says_which_parameters_the_log_cannot_judge(session):
@@ -157,24 +135,19 @@ def test_verify_says_which_parameters_the_log_cannot_judge(session):
     assert all(abs(one.times_sigma) < 4 for one in result.verification.parameters if one.id != "gyro-bias")
     # A log of one pose knows the gyro's bias and nothing else.
     rest = replace(
-        log,
-        time_s=log.time_s[:300],
-        accelerometer=log.accelerometer[:300],
-        gyroscope=log.gyroscope[:300],
-        temperature_degc=None,
-        supply_v=None,
-        auxiliary={},
-    )
+        log, time_s=log.time_s[:300], accelerometer=log.accelerometer[:300], gyroscope=log.gyroscope[:300],
+        temperature_degc=None, supply_v=None, auxiliary={},
+    )  # fmt: skip
     few = trihedron.verify(known, rest, gravity_m_s2=9.81).verification.parameters
     assert not any(one.is_judged for one in few if one.id != "gyro-bias")
-    assert "not judged by this log" in str(trihedron.verify(known, rest, gravity_m_s2=9.81)) or few
 
 
 def test_published_results_of_imu_tk_are_found_to_be_made_with_another_gravity(real_data):
     """Its author's own files beside his recordings hold imu_tk's default of 9.81744 m/s² for 9.803: 0.15 % of scale."""
     folder = real_data / "getovermassif"
     files = [folder / f"session{k}_acc.calib" for k in (2, 3)]
-    ranking = trihedron.rank(files, of_massif(real_data, 4), gravity_m_s2=9.803)
+    log = trihedron.read(accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt")
+    ranking = trihedron.rank(files, log, gravity_m_s2=9.803)
     for one in ranking.candidates:
         assert (one.maker, [found.kind for found in one.suspicions]) == ("imu_tk", ["gravity"])
         # Scales repeat to 0.03 % from session to session.

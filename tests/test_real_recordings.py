@@ -56,9 +56,8 @@ def test_xsens_raw_counts_agree_with_the_published_calibration(xsens, real_data,
     assert np.sqrt(np.nanmean(angles**2)) < 0.5
 
 
-@pytest.mark.parametrize("unit", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
-def test_mpu9150_is_at_its_noise_floor_and_predicts_moves_it_has_not_seen(real_data, capsys, unit):
-    document = calibrated(capsys, real_data / "mpu9150" / f"imu{unit}.log", "--rate", 100, "--gravity", 9.81)
+def test_mpu9150_is_at_its_noise_floor_and_predicts_moves_it_has_not_seen(real_data, capsys):
+    document = calibrated(capsys, real_data / "mpu9150" / "imu0.log", "--rate", 100, "--gravity", 9.81)
     assert "residual-above-noise" not in codes(document)
     angles = np.array(document["gyroscope"]["residuals"]["held_out_angle_deg"], dtype=float)
     # The only other tool measured on these logs leaves 0.07 to 0.21 deg in sample.
@@ -119,25 +118,6 @@ def test_ferraris_annotated_faces_reproduce_the_published_matrices(real_data):
     S_a, b_a = other_form(told.accelerometer.S, told.accelerometer.b)
     np.testing.assert_allclose(S_a, np.array(published["K_a"]) @ np.array(published["R_a"]), atol=3e-3)
     np.testing.assert_allclose(b_a, published["b_a"], atol=3e-3)
-
-
-def test_phone_rests_on_six_faces_at_the_published_means(real_data):
-    folder = real_data / "phone"
-    table = json.loads((folder / "published_results.json").read_text())["six_face_means_acc"]
-    # The files are named after another pair of axes than the published table: x of the names is y of the readings.
-    faces = {
-        "X_down": "y_down", "X_up": "y_up", "Y_down": "x_up", "Y_up": "x_down", "z_down": "z_down", "z_up": "z_up",
-    }  # fmt: skip
-    for name, face in faces.items():
-        recording = trihedron.read(
-            accelerometer_path=next(folder.glob(f"imu_rec_{name}*Acceleration.csv")),
-            gyroscope_path=next(folder.glob(f"imu_rec_{name}*AngularVelocity.csv")),
-        )
-        assert "clocks-merged" in {finding.code.value for finding in recording.findings}
-        segments = trihedron.segment(recording)
-        longest = int(segments.duration_s.argmax())
-        expected = [table[f"{face}_acc_{axis}_mean"] for axis in "xyz"]
-        np.testing.assert_allclose(segments.accelerometer_mean[longest], expected, atol=5e-3)
 
 
 def test_ferraris_session_is_calibrated_by_method_one_and_refused_by_method_two(real_data, capsys):
@@ -217,14 +197,6 @@ def test_the_manuals_example_is_recovered_within_its_error_bars_and_both_triads_
     left = [finding.seen for finding in result.findings if finding.code.value == "left-handed"]
     assert any("ccelerometer" in seen for seen in left)
     assert any("gyro" in seen.lower() for seen in left)
-
-
-def test_a_calibration_of_xsens_refuses_the_readings_of_another_sensor(xsens, real_data, tmp_path, capsys):
-    known = tmp_path / "c.json"
-    assert main(["calibrate", *map(str, xsens), "-o", str(known)]) == 0
-    capsys.readouterr()
-    assert main(["apply", str(known), str(real_data / "kim" / "kim_imu_good1.txt")]) == 1
-    assert "maps counts" in capsys.readouterr().err
 
 
 def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data):

@@ -13,10 +13,9 @@ def codes(segments):
     return {finding.code for finding in segments.findings}
 
 
-@pytest.mark.parametrize("session", [3, pytest.param(5, marks=pytest.mark.slow)])
-def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data, session):
+def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data):
     for device in (1, 8):
-        recording = read_recording(real_data / "mimu4444" / f"exp_{session}.npz", device=device)
+        recording = read_recording(real_data / "mimu4444" / "exp_3.npz", device=device)
         segments = segment_recording(recording)
         steady = segments.duration_s > 15.0
         assert 19 <= steady.sum() <= 20
@@ -33,18 +32,12 @@ def test_tomi_rest_is_one_hold_that_lasts(real_data):
     assert segments.duration_s[0] > 0.99 * recording.duration_s
 
 
-def phone(folder, run):
-    return {
-        "accelerometer_path": next(folder.glob(f"rec_{run}_*Acceleration.csv")),
-        "gyroscope_path": next(folder.glob(f"rec_{run}_*AngularVelocity.csv")),
-    }
-
-
 @pytest.mark.parametrize("run", [2, 3])
 def test_phone_holds_agree_with_the_published_sections(real_data, run):
     folder = real_data / "phone"
     published = json.loads((folder / "published_results.json").read_text())[f"static_sections_rec{run}_samples"]
-    segments = segment_recording(read_recording(**phone(folder, run)))
+    acceleration, rate = (next(folder.glob(f"rec_{run}_*{what}.csv")) for what in ("Acceleration", "AngularVelocity"))
+    segments = segment_recording(read_recording(accelerometer_path=acceleration, gyroscope_path=rate))
     agreement = [
         max((min(h.stop, b) - max(h.start, a)) / (max(h.stop, b) - min(h.start, a)) for h in segments.poses)
         for a, b in published

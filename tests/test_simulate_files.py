@@ -98,6 +98,11 @@ def test_a_scenario_file_says_the_same_as_python(tmp_path):
         ("session = { kind = 'hand', n = 3 }", "there is no 'n'; there are kind, n_poses"),
         ("[[effect]]\nid = 'gremlin'", "no effect is called 'gremlin'"),
         ("[accelerometer.noise]\nN = -1", "noise term N"),
+        ("latitude_deg = 48.0", "belongs in [environment]"),
+        ("rate_hz = 48.0", "belongs in [clock]"),
+        ('[[effect]]\nkind = "accel-cubic"', "needs its id"),
+        ('[[effect]]\nid = "accel-cubic"', "accel-cubic needs k3"),
+        ('[[effect]]\nid = "accel-cubic"\nk = [1, 1, 1]', "it takes k3"),
     ],
 )
 def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, text, sentence):
@@ -165,22 +170,6 @@ def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, 
         assert "Traceback" not in told
     assert main(["simulate", str(written(tmp_path, EXAMPLE)), "-o", str(tmp_path / "c.parquet")]) == 0
     assert not (tmp_path / "b.csv").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("latitude_deg = 48.0", r"belongs in \[environment\]"),
-        ("rate_hz = 48.0", r"belongs in \[clock\]"),
-        ('[[effect]]\nkind = "accel-cubic"', "needs its id"),
-        ('[[effect]]\nid = "accel-cubic"', "accel-cubic needs k3"),
-        ('[[effect]]\nid = "accel-cubic"\nk = [1, 1, 1]', "has no 'k'.*it takes k3"),
-    ],
-)
-def test_what_a_scenario_lacks_or_has_in_the_wrong_place_is_named(tmp_path, text, said):
-    (tmp_path / "s.toml").write_text(text + "\n")
-    with pytest.raises(ValueError, match=said):
-        read_scenario(tmp_path / "s.toml")
 
 
 @pytest.mark.usefixtures("few_simulations")

@@ -40,7 +40,7 @@ def compare(recording, gravity):
 # Spectra within these factors, octave by octave: a twin has three numbers per axis for its noise.
 @pytest.mark.parametrize(
     ("which", "gravity", "accel_factor", "gyro_factor"),
-    [("xsens_mti", 9.81744, 1.6, 1.4), ("mpu9150", 9.81, 2.0, 3.0)],
+    [("xsens_mti", 9.81744, 1.6, 1.4), pytest.param("mpu9150", 9.81, 2.0, 3.0, marks=pytest.mark.slow)],
 )
 def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, accel_factor, gyro_factor):
     if which == "xsens_mti":

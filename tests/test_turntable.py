@@ -68,10 +68,9 @@ def table():
     return segmented(0)
 
 
-@pytest.mark.parametrize("units", [3, pytest.param(5, marks=pytest.mark.slow)])
-def test_known_speeds_in_unknown_orientations_make_a_gyro_three_times_as_certain(table, units):
+def test_known_speeds_in_unknown_orientations_make_a_gyro_three_times_as_certain(table):
     scores = []
-    for recording, segments, truth in (table, *map(segmented, range(1, units))):
+    for recording, segments, truth in (table, *map(segmented, (1, 2))):
         plain = calibrate(recording, segments=segments, gravity_m_s2=G).gyroscope
         result = calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0] * 4)
         gyro = result.gyroscope

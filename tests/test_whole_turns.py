@@ -56,6 +56,6 @@ def test_an_uneven_table_widens_what_is_said():
     assert bars(0.1) > 5.0 * bars(0.0)
 
 
-@pytest.mark.parametrize("angle", [0.0, 180.0, 90.0])
+@pytest.mark.parametrize("angle", [0.0, 180.0])
 def test_turns_that_are_not_whole_show_nothing(angle):
     assert found(on_a_table(np.random.default_rng(5)), angle)[1] is None

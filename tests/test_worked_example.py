@@ -46,21 +46,21 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
 SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
-@pytest.fixture(scope="module", params=[SHORTER, pytest.param("", marks=pytest.mark.slow)], ids=["shorter", "printed"])
-def names(request, tmp_path_factory):
-    """What the script leaves, its sessions as they are printed or shorter."""
+@pytest.fixture(scope="module")
+def names(tmp_path_factory):
+    """What the script leaves, its sessions shorter than they are printed."""
     script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
     session = 'kind = "hand"\\n'
     assert script.count(session) == 2
-    script = script.replace(session, session + request.param)
+    script = script.replace(session, session + SHORTER)
     left = {}
     with (
         contextlib.chdir(tmp_path_factory.mktemp("tutorial")),
         contextlib.redirect_stdout(io.StringIO()),
         pytest.MonkeyPatch.context() as patch,
     ):
-        if request.param:  # improved scenarios are aimed by two simulations and not by eight
-            patch.setattr("trihedron.api.driving.N_SEEDS", 2)
+        # Improved scenarios are aimed by two simulations and not by eight.
+        patch.setattr("trihedron.api.driving.N_SEEDS", 2)
         exec(compile(script, "simulation_against_recording.py", "exec"), left)
     return left
 
