@@ -8,7 +8,7 @@ from nuisance_trial.draw import G, draw
 
 
 def diagnosed(flaw, seed, tmp_path):
-    columns, answer = draw(flaw, seed, 1.0, False, False, ())
+    columns, answer = draw(flaw, seed, 1.0, False)
     log = tmp_path / "log.csv"
     pl.DataFrame(columns).write_csv(log)
     return trihedron.diagnose(str(log), gravity_m_s2=G), answer

@@ -146,7 +146,7 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
 
 @pytest.mark.parametrize("seed", [9700200004, pytest.param(9700200104, marks=pytest.mark.slow)])
 def test_a_drift_that_temperature_explains_as_well_names_both(seed, tmp_path):
-    columns, _ = draw("gyro-thermal-bias", seed, 0.5, True, False, ())
+    columns, _ = draw("gyro-thermal-bias", seed, 0.5)
     polars.DataFrame(columns).write_csv(tmp_path / "log.csv")
     effects = {one.id: one for one in trihedron.diagnose(tmp_path / "log.csv", gravity_m_s2=G).effects}
     # At half its size a bias that follows 9 °C is known to three sigma: a walk of the bias does as well.
