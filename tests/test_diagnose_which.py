@@ -8,7 +8,7 @@ import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_adc, missing_codes
 
-MISSING = (1.0, False, False, ())
+MISSING = (1.0, False)
 """Samples lost without a trace in the timestamps, in motion too quick for a smooth join across the gap."""
 
 

@@ -138,7 +138,7 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
 
 
 def test_a_drift_that_temperature_explains_as_well_names_both(tmp_path):
-    columns, _ = draw("gyro-thermal-bias", 9700200004, 0.5, True, False, ())
+    columns, _ = draw("gyro-thermal-bias", 9700200004, 0.5)
     polars.DataFrame(columns).write_csv(tmp_path / "log.csv")
     effects = {one.id: one for one in trihedron.diagnose(tmp_path / "log.csv", gravity_m_s2=G).effects}
     # At half its size a bias that follows 9 °C is known to three sigma: a walk of the bias does as well.
