@@ -179,7 +179,7 @@ def _answer(
         vertical=up,
         earth_rate=_earth(found, effects, k),
         effects=MappingProxyType(_estimates(found, k, effects)),
-        replay=() if motion.attitude is None else held_out(found, k, one.seen, given),
+        replay=() if motion.attitude is None else held_out(one.side, one.seen, one.gyro, given, _windows),
         frame_covariance=frame,
         error=error_of(found, k),
         bias=bias_over_time(found, k),

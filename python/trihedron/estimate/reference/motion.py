@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
 from trihedron.estimate.reference.likelihood import (
     TYPICAL,
@@ -58,18 +58,6 @@ class MotionFit:
         at = np.concatenate([self.places[k][name] for name in names])
         sigma = np.concatenate([self.wider.get(name, 1.0) * self.sides[k].sigma(name) for name in names])
         return np.asarray(self.fitted.covariance[np.ix_(at, at)] * np.outer(sigma, sigma))
-
-    def refitted(self, k: int, seen: BoolArray) -> Point:
-        """Recording k fitted alone to its samples ``seen`` (n,), under the whole fit's strengths; its last bias."""
-        side = replace(self.sides[k], seen=self.sides[k].seen & seen)
-        own = places([side], tuple(self.places[k]))
-        problem = side.problem(self.points[k], own[0], self.wider)
-        strengths = self.fitted.strengths[k]
-        mean = together([problem], strengths[None]).mean
-        change = {name: _si(side, name, self.wider) * mean[at] for name, at in own[0].items()}
-        walked = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())[0] @ np.append(-mean, 1.0)
-        change["b"] = change["b"] + walked[-3:]
-        return side.moved(self.points[k], change)
 
 
 def fit_motion(

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from trihedron._core import rotation_from_vector
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.reference.motion import MotionFit
+from trihedron.errors import REFUSALS
+from trihedron.estimate.reference.beside import Beside
+from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.estimate.reference.windows import Windows
 from trihedron.records.reference import ReplayStage
 
 HORIZON_S = 10.0
@@ -18,13 +23,10 @@ LEAST_HELD_OUT_S = 12.0
 
 
 def held_out(
-    found: MotionFit, k: int, seen: BoolArray, given: tuple[FloatArray, FloatArray] | None
-) -> tuple[ReplayStage, ...]:
-    """Replay on the last part of a log: nominal, as ``given``, and calibrated on the first part by the reference.
-
-    The fit to the first part has the parameters of the whole fit, accepted effects included, and its strengths.
-    """
-    side = found.sides[k]
+    side: Beside, seen: BoolArray, gyro: GyroFit, given: tuple[FloatArray, FloatArray] | None,
+    windows: Callable[[Grid, Reference, BoolArray], Windows],
+) -> tuple[ReplayStage, ...]:  # fmt: skip
+    """Replay on the last part of a log: nominal, as ``given``, and calibrated on the first part by the reference."""
     grid, reference = side.grid, side.reference
     inside = np.flatnonzero(seen)
     cut = inside[int(TRAINED * len(inside))]
@@ -32,26 +34,28 @@ def held_out(
     first[cut:], last[:cut] = False, False
     if last.sum() * grid.step_s < LEAST_HELD_OUT_S:
         return ()
-    point = found.refitted(k, first)
-    time = grid.time_s * (1.0 + point.rate) + point.offset_s
-    calibrated = side.corrected(point)
+    try:
+        taught = fit_gyroscope(grid, reference, windows(grid, reference, first), gyro.offset_s, gyro.rate, clock=1)
+    except REFUSALS:
+        return ()
+    time = grid.time_s * (1.0 + taught.rate) + taught.offset_s
     stages: list[tuple[str, FloatArray]] = [
-        ("one scale, bias from static poses", _nominal(grid, point.S, reference.rate(time), first))
+        ("one scale, bias from static poses", _nominal(grid, taught, reference.rate(time), first))
     ]
     if given is not None:
         # The given parameters have their own frame: the rotation between both is the mounting, not an error.
         S, b = given
-        u, _, vt = np.linalg.svd(point.S @ S.T)
+        u, _, vt = np.linalg.svd(taught.A @ S.T)
         turn = (u * np.array([1.0, 1.0, np.linalg.det(u @ vt)])) @ vt
         stages.append(("as given", (grid.gyroscope @ S.T + b) @ turn.T))
-    stages.append(("by the reference", calibrated))
+    stages.append(("by the reference", grid.gyroscope @ taught.A.T + taught.a))
     done = [replay(name, rate, grid, reference, time, last) for name, rate in stages]
     return tuple(stage for stage in done if stage is not None)
 
 
-def _nominal(grid: Grid, S: FloatArray, rate: FloatArray, seen: BoolArray) -> FloatArray:
+def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: BoolArray) -> FloatArray:
     """Nominal rates (n, 3): one scale for all axes, orthogonal axes, bias from the second with the least rotation."""
-    u, s, vt = np.linalg.svd(S)
+    u, s, vt = np.linalg.svd(gyro.A)
     A = (u @ vt) * float(np.mean(s))
     n = max(round(1.0 / grid.step_s), 8)
     m = len(grid.gyroscope) // n
