@@ -148,7 +148,7 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.nd
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
     found = diagnosis.effects
-    named = {
+    named: dict[str, Any] = {
         "effects": [effect.id for effect in found],
         "statements": [words("because", sentence=effect.statement) for effect in found],
     }
