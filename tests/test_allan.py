@@ -3,6 +3,7 @@
 import allantools
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from trihedron import _core
 from trihedron.estimate.noise.allan import KINDS, TYPES, allan_deviation
@@ -49,6 +50,10 @@ def test_every_kind_agrees_with_allantools(kind, oracle):
     assert len(taus) == len(clusters)
     if kind == "overlapping":
         assert curve.n_terms.tolist() == n_terms.tolist()
+    # 95 % of a χ² with the curve's own degrees of freedom; a total variance has a bias besides.
+    assert kind == "total" or curve.lower**2 == pytest.approx(
+        curve.variance * curve.edf / chi2.ppf(0.975, curve.edf), rel=1e-9
+    )
     # The oracle keeps the mean in its running sum: 1e-10 leaves room for its rounding, ours is far below.
     assert curve.deviation == pytest.approx(deviation, rel=1e-10)
 

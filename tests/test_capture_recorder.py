@@ -86,6 +86,7 @@ def test_an_unplugged_board_goes_on_in_the_same_file_with_gaps_said_and_cut_fram
     assert recorder.count.disconnections == 3  # the last is for good
     times = np.concatenate([block.time_s for block in blocks])
     assert len(times) + recorder.count.lost == 360
+    assert sum(map(int, re.findall(r"lost (\d+) before frame", text))) == recorder.count.lost > 0
     # The index of every frame is the one that the device gave it, whatever was cut.
     assert blocks[-1].index[-1] == 359
     steps = np.sort(np.diff(times))

@@ -39,7 +39,7 @@ def clipped():
     accel, gyro = profile.unit(5)
     code = round(math.radians(LIMIT_DEG_S) / gyro.S[0][0])
     gyro = replace(gyro, adc=replace(gyro.adc, low=-float(code), high=float(code)))
-    scenario = Scenario(hand_session(16, pose_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
+    scenario = Scenario(hand_session(12, pose_s=2.5, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
     return code, simulate(scenario, 11)[0]
 
 
@@ -84,7 +84,7 @@ def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, impro
 
 
 def test_a_scenario_without_noise_takes_the_recordings(improved):
-    # Three axes of the part's data sheet; 16 poses of three seconds know a density to some per cent.
+    # Three axes of the part's data sheet; 12 poses of 2.5 s know a density to some per cent.
     part = profile_by_name("mpu").unit(5)
     scenario = read_scenario(improved[1])
     for name, own in zip(("accelerometer", "gyroscope"), part, strict=True):

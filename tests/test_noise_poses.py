@@ -43,7 +43,7 @@ def of(rng, **options):
     return noise_of_poses(readings, RATE, windows)[0]
 
 
-@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
+@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "knocks": 2}], ids=str)
 def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
     rng = np.random.default_rng(71)
     inside = covered = false = 0

@@ -11,7 +11,7 @@ from trihedron.cli import main
 from trihedron.files.formats import export_calibration
 from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
-from trihedron.records import FindingCode, Onboard
+from trihedron.records import FindingCode, Onboard, Severity
 from trihedron.report.ranking import ranking_report, said_of
 
 SWAPPED = np.eye(3)[[1, 0, 2]]
@@ -124,7 +124,10 @@ def test_verify_rejects_a_gyro_bias_that_is_wrong_and_what_is_worse_than_nothing
     ):
         result = trihedron.verify(off, log, gravity_m_s2=9.81)
         assert not result.is_passed
-        assert (code, "serious") in {(found.code, found.severity.value) for found in result.findings}
+        found = [one for one in result.findings if one.code is code and one.severity is Severity.SERIOUS]
+        assert found
+        # Five degrees per second beside hundredths.
+        assert all(one.numbers.get("times_expected", 20.0) > 10.0 for one in found)
 
 
 def test_verify_says_which_parameters_the_log_cannot_judge(session):
