@@ -69,7 +69,7 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
             return _listed(where, value, kind.removeprefix("Sequence[").removesuffix("]"))
     if kinds == _PATH:
         return _path(where, value)
-    if kinds == {"Sequence[int]", "npt.NDArray[np.int64]"}:
+    if kinds == {"Sequence[int]", "IntArray"}:
         return _listed(where, value, "int")
     if kinds == {"npt.ArrayLike"}:
         return numbers_of(where, value)

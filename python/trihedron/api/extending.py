@@ -147,16 +147,20 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.nd
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    found = diagnosis.effects
-    named: dict[str, Any] = {
-        "effects": [effect.id for effect in found],
-        "statements": [words("because", sentence=effect.statement) for effect in found],
-    }
+    if not diagnosis.effects:
+        return Finding.of(
+            FindingCode.EFFECTS_MODELLED,
+            "none-but-disagree" if left else "none",
+            left=left,
+            n_effects=0,
+            n_domains_left=len(left),
+        )
     return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        ("fitted" if found else "none") + ("-but-disagree" if left else ""),
-        **(named if found else {}),
+        "fitted-but-disagree" if left else "fitted",
+        effects=[effect.id for effect in diagnosis.effects],
+        statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
         left=left,
-        n_effects=len(found),
+        n_effects=len(diagnosis.effects),
         n_domains_left=len(left),
     )

@@ -232,15 +232,14 @@ def _between_intervals(
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     out = []
     for one in sensors:
-        reference = one.reference
-        noticed = {
-            FindingCode.FILTER_NOISE_UNSETTLED: not one.is_settled,
-            FindingCode.FILTER_NOISE_NO_STATIC: one.static is None,
-            FindingCode.FILTER_NOISE_FOLLOWED: reference is not None and reference.follows,
-            FindingCode.FILTER_NOISE_NOT_SEPARATED: reference is not None
-            and (one.K.is_limit or reference.slow.is_limit),
-        }
-        out += [Finding.of(code, sensor=one.sensor) for code, is_seen in noticed.items() if is_seen]
+        if not one.is_settled:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
+        if one.static is None:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
+        if one.reference is not None and one.reference.follows:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=one.sensor))
+        if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
+            out.append(Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=one.sensor))
         uncalibrated = _uncalibrated(one)
         if uncalibrated is not None:
             share, horizon_s = uncalibrated
