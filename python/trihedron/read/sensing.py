@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import numpy as np
 
@@ -35,19 +34,27 @@ class Judged:
     confirms_clock: bool = False
 
 
-_Unit = TypeVar("_Unit", AccelerationUnit, RateUnit)
-
-
-def parse_unit(kind: type[_Unit], text: str | _Unit) -> _Unit:
-    """The unit that a user's text or a column's name spells."""
-    is_rate = kind is RateUnit
-    key = text.value if isinstance(text, kind) else known_unit("gyroscope" if is_rate else "accelerometer", str(text))
+def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
+    """The acceleration unit that a user's text names."""
+    key = text.value if isinstance(text, AccelerationUnit) else known_unit("accelerometer", text)
     try:
-        return kind(key.replace("raw", "counts"))
+        return AccelerationUnit(key.replace("raw", "counts"))
     except ValueError:
         raise ReadError(
-            f"'{text}' is not an {'angular rate' if is_rate else 'acceleration'} unit known here; state one with "
-            f"--{'gyro' if is_rate else 'accel'}-unit: {', '.join(unit.value for unit in kind)} (counts: of any size)."
+            f"'{text}' is not an acceleration unit known here; state one with --accel-unit: "
+            f"{', '.join(unit.value for unit in AccelerationUnit)} (counts: of any size)."
+        ) from None
+
+
+def parse_rate_unit(text: str | RateUnit) -> RateUnit:
+    """The rate unit that a user's text names."""
+    key = text.value if isinstance(text, RateUnit) else known_unit("gyroscope", text)
+    try:
+        return RateUnit(key.replace("raw", "counts"))
+    except ValueError:
+        raise ReadError(
+            f"'{text}' is not an angular rate unit known here; state one with --gyro-unit: "
+            f"{', '.join(unit.value for unit in RateUnit)} (counts: of any size)."
         ) from None
 
 
@@ -69,31 +76,34 @@ def judge_accelerometer(
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
-        unit = parse_unit(AccelerationUnit, given if given is not None else named)
+        unit = parse_acceleration_unit(given if given is not None else named)
         against = _contradiction_accelerometer(unit, norm, is_given=given is not None)
         return Judged(unit, _stated("accelerometer", unit, against, is_given=given is not None))
-    unit, code, case = _unit_at_rest(norm, is_whole=whole)
-    values: dict[str, Any] = {"unit": unit.value} if case in ("mg-or-gal", "accelerometer-at-rest") else {}
-    return Judged(unit, (Finding.of(code, case, rest_norm=norm, **values),))
-
-
-def _unit_at_rest(norm: float, *, is_whole: bool) -> tuple[AccelerationUnit, FindingCode, str]:
-    """The unit in which ``norm`` is gravity, and the code and case of the finding that states it."""
-    if is_whole and not _is_near(norm, 1.0):
+    if whole and not _is_near(norm, 1.0):
+        found = AccelerationUnit.COUNTS
         if _is_near(norm, 1000.0):
-            return AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "counts-or-mg"
-        return AccelerationUnit.COUNTS, FindingCode.UNIT_DETECTED, "accelerometer-counts"
+            return Judged(
+                found,
+                (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", rest_norm=norm),),
+            )
+        return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", rest_norm=norm),))
     lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
     nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
     if _is_near(norm, lengths[nearest]):
         # A usual scale error makes mg and cm/s^2 indistinguishable.
         is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
-            return nearest, FindingCode.UNIT_ASSUMED, "mg-or-gal"
-        return nearest, FindingCode.UNIT_DETECTED, "accelerometer-at-rest"
-    if norm < 1.0 and not is_whole:
-        return AccelerationUnit.M_S2, FindingCode.GRAVITY_MISSING, ""
-    return AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity"
+            return Judged(
+                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", rest_norm=norm, unit=nearest.value),)
+            )
+        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=nearest.value)
+        return Judged(nearest, (told,))
+    if norm < 1.0 and not whole:
+        return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, rest_norm=norm),))
+    return Judged(
+        AccelerationUnit.COUNTS,
+        (Finding.of(FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", rest_norm=norm),),
+    )
 
 
 def _is_near(value: float, target: float) -> bool:
@@ -137,11 +147,17 @@ def judge_gyroscope(
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
-        unit = parse_unit(RateUnit, given if given is not None else named)
+        unit = parse_rate_unit(given if given is not None else named)
         against = None
         if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
-            against = _by_turning(
-                FindingCode.UNIT_CONTRADICTED, "gyro-by-turning", unit, turning, is_given=given is not None
+            against = Finding.of(
+                FindingCode.UNIT_CONTRADICTED,
+                "gyro-by-turning",
+                is_given=given is not None,
+                unit=unit.value,
+                factor=turning.factor(unit),
+                percent=turning.percent,
+                correlation=turning.correlation,
             )
         return Judged(unit, _stated("gyro", unit, against, is_given=given is not None))
     if whole:
@@ -149,21 +165,26 @@ def judge_gyroscope(
     if turning is None:
         return _gyroscope_by_magnitude(extremes, windows)
     unit = min(turning.candidates, key=lambda unit: abs(math.log(turning.factor(unit))))
+    factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
     if turning.fits(unit):
-        return Judged(unit, (_by_turning(FindingCode.UNIT_DETECTED, "gyro-by-turning", unit, turning),))
-    return Judged(unit, (_by_turning(FindingCode.UNIT_CONTRADICTED, "gyro-no-unit", unit, turning),))
-
-
-def _by_turning(code: FindingCode, case: str, unit: RateUnit, turning: Turning, **values: Any) -> Finding:
-    return Finding.of(
-        code,
-        case,
-        unit=unit.value,
-        factor=turning.factor(unit),
-        percent=turning.percent,
-        correlation=turning.correlation,
-        **values,
-    )
+        told = Finding.of(
+            FindingCode.UNIT_DETECTED,
+            "gyro-by-turning",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    else:
+        told = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "gyro-no-unit",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    return Judged(unit, (told,))
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:
@@ -176,7 +197,10 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
         unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
     else:
         unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
-    return Judged(unit, (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", rest=rest, largest=largest, unit=unit.value),))
+    return Judged(
+        unit,
+        (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", rest=rest, largest=largest, unit=unit.value),),
+    )
 
 
 def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tuple[bool | None, str]:
@@ -185,7 +209,7 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
     From pose to pose the means of an accelerometer change and those of a gyro do not; in a single pose the ratio of
     gravity to the accelerometer's noise is far higher than that of the gyro's bias to its noise.
     """
-    windows = look({"first": first, "second": second}, rate_hz)
+    windows = look_at_pair(first, second, rate_hz)
     if windows is None:
         return None, "short"
     change, level = [], []
@@ -200,3 +224,8 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
     if max(level) > 5.0 * min(level):
         return level[0] > level[1], "level"
     return None, "alike"
+
+
+def look_at_pair(first: FloatArray, second: FloatArray, rate_hz: float) -> Windows | None:
+    """Windows of two triads whose sensors are not known yet."""
+    return look({"first": first, "second": second}, rate_hz)

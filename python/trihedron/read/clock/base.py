@@ -69,7 +69,12 @@ def build_clock(
         count = np.count_nonzero(~finite)
         findings.append(
             Finding.of(
-                FindingCode.NON_FINITE, "time", count=count, where=table.place(bad), row=bad, rows_left_out=count
+                FindingCode.NON_FINITE,
+                "time",
+                count=count,
+                where=table.place(bad),
+                row=bad,
+                numbers={"rows_left_out": float(count)},
             )
         )
         rows = np.flatnonzero(finite)

@@ -203,10 +203,13 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
     if sampling.timestamp_error_s <= _worth(sampling.kind) * sampling.period_s:
         return ()
     follows, ignores = _decided(sampling.followed, sampling.sigma_followed)
-    kept = FindingCode.TIMESTAMPS_KEPT if follows and not ignores else FindingCode.CLOCK_UNDECIDED
     return (
         Finding.of(
-            FindingCode.EVEN_CLOCK if sampling.is_even else kept,
+            FindingCode.EVEN_CLOCK
+            if sampling.is_even
+            else FindingCode.TIMESTAMPS_KEPT
+            if follows and not ignores
+            else FindingCode.CLOCK_UNDECIDED,
             period_s=sampling.period_s,
             sigma_period_s=sampling.sigma_period_s,
             rate_hz=1.0 / sampling.period_s,
