@@ -339,16 +339,3 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert "names that differ" in capsys.readouterr().err
     assert main(["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb", "0.01 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err
-
-
-def test_the_list_of_targets_says_what_each_needs_and_files_out_of_order_are_refused(tmp_path, capsys):
-    assert main(["export", "--to", "list"]) == 0
-    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()[1:])
-    assert listed["kalibr*"] == "--noise --rate"
-    assert listed["px4*"] == "--current-parameters"
-    assert listed["c"] == "–"
-    assert main(["export", "--to", "c"]) == 1
-    assert "name a calibration file" in capsys.readouterr().err
-    (tmp_path / "log.csv").write_text("t,ax,ay,az\n0,0,0,9.8\n")
-    assert main(["apply", str(tmp_path / "log.csv"), "cal.json"]) == 1
-    assert "it comes before the log" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import yaml
 
 import trihedron
 from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
+from trihedron.cli import main
 from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
 from trihedron.files.formats.parsing import yaml_of
 
@@ -216,3 +217,16 @@ def test_a_foreign_calibration_is_exported_to_another_program(tmp_path):
     np.testing.assert_allclose(
         READINGS @ scope["S_ACCELEROMETER"].T + scope["B_ACCELEROMETER"], corrected(known.accelerometer), **ROUNDING
     )
+
+
+def test_the_list_of_targets_says_what_each_needs_and_files_out_of_order_are_refused(tmp_path, capsys):
+    assert main(["export", "--to", "list"]) == 0
+    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()[1:])
+    assert listed["kalibr*"] == "--noise --rate"
+    assert listed["px4*"] == "--current-parameters"
+    assert listed["c"] == "–"
+    assert main(["export", "--to", "c"]) == 1
+    assert "name a calibration file" in capsys.readouterr().err
+    (tmp_path / "log.csv").write_text("t,ax,ay,az\n0,0,0,9.8\n")
+    assert main(["apply", str(tmp_path / "log.csv"), "cal.json"]) == 1
+    assert "it comes before the log" in capsys.readouterr().err

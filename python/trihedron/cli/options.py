@@ -218,11 +218,11 @@ def with_options(table: Table | None = None, /, **groups: type) -> Callable[[Cal
 
 def _described(name: str, kind: Any, default: Any, table: Table) -> inspect.Parameter:
     """A parameter with the option or argument that its table describes; ``--its-name`` where it is an option."""
-    told = table[name] if name in table else SHARED[name]
-    if isinstance(told, str | tuple):
-        metavar, text, *short = (None, told) if isinstance(told, str) else told
-        told = typer.Option(f"--{name.replace('_', '-')}", *short, metavar=metavar, help=text)
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, told])
+    option = table[name] if name in table else SHARED[name]
+    if isinstance(option, str | tuple):
+        metavar, text, *short = (None, option) if isinstance(option, str) else option
+        option = typer.Option(f"--{name.replace('_', '-')}", *short, metavar=metavar, help=text)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option])
 
 
 def whole_numbers(option: str, text: str) -> list[int]:

@@ -26,7 +26,7 @@ def view_as_json(view: GuideView, lost: int = 0) -> str:
         return None if values is None else [round(float(v), 4) for v in values]
 
     angle = view.degrees_to_target
-    told = {
+    state = {
         "phase": view.phase.value,
         "instruction": view.instruction,
         "detail": view.detail,
@@ -56,7 +56,7 @@ def view_as_json(view: GuideView, lost: int = 0) -> str:
             for one in known.uncertain
         ],
     }
-    return json.dumps(told, allow_nan=False)
+    return json.dumps(state, allow_nan=False)
 
 
 class _QuietServer(ThreadingHTTPServer):

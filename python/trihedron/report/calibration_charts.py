@@ -39,15 +39,15 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
     if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
         held = mm_s2(quality.held_out)
         held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
-        told = [
+        tips = [
             said(f"cross-validated, {name}", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
         name = "cross-validated (predicted by a fit without it)"
-        marks.append(Points(pose + 0.17, held, told, held_sigma, name, "accent", True))
+        marks.append(Points(pose + 0.17, held, tips, held_sigma, name, "accent", True))
         top = _highest(held, held_sigma, residual, limit)
-    told = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
-    marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
+    tips = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
+    marks.append(Points(pose - 0.17, residual, tips, None, "in sample", "c1"))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("|f| − |g|  [mm/s²]", "mm/s²", limits=None if top is None else (-top, top))
     return Chart((Panel(x, y, tuple(marks)),))
@@ -80,7 +80,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
         f"move {k + 1}" + ("" if moves is None else f" (pose {moves[k].pose_before + 1} → {moves[k].pose_after + 1})")
         for k in range(n)
     ]
-    told = [
+    tips = [
         f"{said(w, v, '°')}{', excluded' if out else ''}"
         for w, v, out in zip(names, quality.angle_deg, is_out, strict=True)
     ]
@@ -89,9 +89,9 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     held = quality.held_out_angle_deg
     width, shift = (0.7, 0.0) if held is None else (0.38, 0.2)
     inside = np.where(is_out, np.nan, quality.angle_deg)
-    marks.append(Bars(move - shift, inside, width, told, "in sample", "c1"))
+    marks.append(Bars(move - shift, inside, width, tips, "in sample", "c1"))
     if np.any(is_out):
-        marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "excluded", "soft"))
+        marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, tips, "excluded", "soft"))
     if held is not None:
         told_held = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
         marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "cross-validated", "accent"))

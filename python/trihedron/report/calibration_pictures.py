@@ -57,9 +57,9 @@ def _lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
     held = _is_held(quality)
     kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
     for values, name, colour in kinds:
-        told = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
+        tips = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
-        marks.append(Points(pose, size, told, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
+        marks.append(Points(pose, size, tips, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
@@ -133,12 +133,12 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     force = means @ sensor.S.T + sensor.b
     values = mm_s2(_unseen(sensor.quality))
     limit = float(np.nanmax(np.abs(values), initial=0.0))
-    told = [
+    tips = [
         f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"
         for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
-    return Chart((Sphere(title, force / np.linalg.norm(force, axis=1)[:, None], values, limit, told),), legend=False)
+    return Chart((Sphere(title, force / np.linalg.norm(force, axis=1)[:, None], values, limit, tips),), legend=False)
 
 
 def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:
@@ -173,12 +173,12 @@ def _over_time(
     marks: list[Mark] = [Level(y=0.0), Line(x, y, "3 σ of noise alone", "shade")]
     for k, name in enumerate(names):
         values = mm_s2(residual[:, k])
-        told = [
+        tips = [
             said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", v, "mm/s²")
             for n, (t, v) in enumerate(zip(time_s, values, strict=True), 1)
         ]
         colour = AXIS_COLOURS[k] if name else "accent"
-        marks.append(Points(time_s, values, told, None, name or "norm in a pose", colour))
+        marks.append(Points(time_s, values, tips, None, name or "norm in a pose", colour))
     return tuple(marks)
 
 

@@ -161,7 +161,7 @@ def disagreement_report(
     numbers = differing_numbers(found)
     more = len(numbers) - _MOST_NUMBERS
     words = [*numbers[:_MOST_NUMBERS], *([f"and {more} more"] if more > 0 else ())]
-    told = [("", word) for word in words or ["none differs"]]
+    said = [("", word) for word in words or ["none differs"]]
     is_right = [e.id for e in found.effects][:1] == [sealed["effect"]]
     beside = any(sealed["effect"] in e.confounded_with for e in found.effects[:1])
     answer = "Found: it is the first effect named." if is_right else "Not found: another effect is named first."
@@ -173,7 +173,7 @@ def disagreement_report(
         verdict=verdict_in_words(found),
         is_trustworthy=True,
         sections=(
-            Section("Parameters: this unit differs from the data sheet", (Facts(tuple(told)),)),
+            Section("Parameters: this unit differs from the data sheet", (Facts(tuple(said)),)),
             Section("Physics: effects missing from the simulation", effects_blocks(found)),
             Section("Stage by stage", stages_blocks(found, MEANING)),
             Section("The improved simulation, compared with the same log", (Paragraph(verdict_in_words(improved)),)),

@@ -74,8 +74,8 @@ def _domain_marks(
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
         axis = channel_in_print(channel)
-        told = [said(f"{name}, {axis}", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
-        marks.append(Points(time_s, value[:, k], told, None, axis, colour))
+        tips = [said(f"{name}, {axis}", float(v), unit) for name, v in zip(names, value[:, k], strict=True)]
+        marks.append(Points(time_s, value[:, k], tips, None, axis, colour))
     return tuple(marks)
 
 
@@ -122,8 +122,8 @@ def stages_chart(diagnosis: Diagnosis) -> Chart:
         factor, unit = SHOWN[found[0][1].unit]
         x = np.array([k for k, _ in found], dtype=np.float64)
         y = 100.0 * np.array([d.rms for _, d in found]) / found[0][1].rms
-        told = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
-        marks += [Line(x, y, "", colour), Points(x, y, told, None, words, colour)]
+        tips = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
+        marks += [Line(x, y, "", colour), Points(x, y, tips, None, words, colour)]
         least = min(least, float(y.min()))
     along = Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names)
     up = Scale("rms left [% of the first stage]", "%", is_log=True, limits=(0.6 * least, 160.0))

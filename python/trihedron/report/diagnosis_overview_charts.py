@@ -65,11 +65,11 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     limit = np.array([d.limit or math.nan for d in tests])
     seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
     low, high = float(seen.min()) / ROOM, float(seen.max()) * ROOM
-    told = [f"{what}: agrees up to χ²/dof {plain_number(v)}" for what, v in zip(names, limit, strict=True)]
+    tips = [f"{what}: agrees up to χ²/dof {plain_number(v)}" for what, v in zip(names, limit, strict=True)]
     base = np.full(len(tests), low)
     marks: list[Mark] = [Level(x=1.0, name="noise alone", is_dashed=True)]
     if np.any(np.isfinite(limit)):
-        marks.insert(0, Bars(limit, rows, 4.0 * BESIDE, told, "agrees up to here", "shade", base, is_across=True))
+        marks.insert(0, Bars(limit, rows, 4.0 * BESIDE, tips, "agrees up to here", "shade", base, is_across=True))
     sides: list[tuple[str, Colour, FloatArray, FloatArray]] = [
         ("disagrees", "accent", np.where(differs, before, math.nan), rows + apart),
         ("agrees", "soft", np.where(differs, math.nan, before), rows + apart),
@@ -77,8 +77,8 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     ]
     for name, colour, values, at in sides:
         if np.any(np.isfinite(values)):
-            told = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-            marks.append(Points(values, at, told, None, name, colour))
+            tips = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
+            marks.append(Points(values, at, tips, None, name, colour))
     x = Scale("χ² per degree of freedom (logarithmic)", is_log=True, limits=(low, high))
     return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=ROW_PX * (len(tests) + 1)),))
 
@@ -115,13 +115,13 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     value = scale * np.array([p.difference for p in members])
     sigma = scale * np.array([p.std for p in members])
     place = -np.arange(1.0, len(members) + 1.0)
-    told = [
+    tips = [
         f"{named(p)}: recording − model {with_sigma(v, s)} {unit}".strip()
         for p, v, s in zip(members, value, sigma, strict=True)
     ]
     colour: Colour = "accent" if members[0].significant else "c1"
     name = "differs" if members[0].significant else "agrees"
-    dots = Points(value, place, told, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
+    dots = Points(value, place, tips, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
     x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=(0.0,))
     names = tuple(axis_in_print(p.name) for p in members)
     marks = (Level(x=0.0, name="model"), dots)
@@ -139,8 +139,8 @@ def _ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
     for is_other, name, colour in ((False, "agrees", "c1"), (True, "differs", "accent")):
         picked = np.array([bool(n.significant) == is_other for n in rows])
         if np.any(picked):
-            told = [_ratio_words(n, name) for n, is_picked in zip(rows, picked, strict=True) if is_picked]
-            marks.append(Points(ratio[picked], place[picked], told, None, name, colour))  # type: ignore[arg-type]
+            tips = [_ratio_words(n, name) for n, is_picked in zip(rows, picked, strict=True) if is_picked]
+            marks.append(Points(ratio[picked], place[picked], tips, None, name, colour))  # type: ignore[arg-type]
     seen = np.concatenate([ratio, ends[np.isfinite(ends) & (ends > 0.0)], [0.5, 2.0]])
     limits = (float(seen.min()) / 1.15, float(seen.max()) * 1.15)
     along = Scale("model / recording", is_log=True, limits=limits)

@@ -31,11 +31,11 @@ def drawn_disc(disc: Disc, caption: str) -> str:
     marks = []
     # Wanted poses are drawn on top.
     for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
-        px, py, told = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
+        px, py, tip = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
         if kind == "taken":
-            shape, drop = f'<circle class="pose" {told} cx="{px}" cy="{py}" r="7.5"/>', 3.0
+            shape, drop = f'<circle class="pose" {tip} cx="{px}" cy="{py}" r="7.5"/>', 3.0
         else:
-            shape, drop = f'<path class="pose" {told} d="M{px} {py}m0-10l9 16h-18z"/>', 4.0
+            shape, drop = f'<path class="pose" {tip} d="M{px} {py}m0-10l9 16h-18z"/>', 4.0
         name = f'<text class="{kind}" x="{px}" y="{drop - _RADIUS * y:.1f}">{escape(label)}</text>' if label else ""
         marks.append(shape + name)
     about = f"{disc.title}: {caption}"
@@ -56,8 +56,8 @@ def drawn_sphere(sphere: Sphere, caption: str) -> str:
     """A canvas that the page's script draws and rotates, by dragging or by the arrow keys."""
     share = np.clip(sphere.values / (sphere.limit or 1.0), -1.0, 1.0)
     points = [
-        [*(round(float(c), 3) for c in direction), round(float(s), 3), told]
-        for direction, s, told in zip(sphere.directions, share, sphere.said, strict=True)
+        [*(round(float(c), 3) for c in direction), round(float(s), 3), tip]
+        for direction, s, tip in zip(sphere.directions, share, sphere.said, strict=True)
         if np.isfinite(s)
     ]
     about = f"{sphere.title}: {caption} Arrow keys turn it."

@@ -230,16 +230,16 @@ def _points(mark: Points, at: Places) -> str:
     if not seen:
         return "".join(out)
     places = "".join(f"M{xs[k]:.0f} {ys[k]:.0f}h0" for k in seen)
-    told = _told(mark.said, seen, first, last)
+    tips = _tips(mark.said, seen, first, last)
     hole = f'<path class="hole" d="{places}"/>' if mark.is_hollow else ""
     out.append(
         f'<g class="{mark.colour}"><path class="dot" data-a="{escape(first)}" data-z="{escape(last)}" '
-        f'data-t="{told}" d="{places}"/>{hole}</g>'
+        f'data-t="{tips}" d="{places}"/>{hole}</g>'
     )
     return "".join(out)
 
 
-def _told(said: Sequence[str], seen: Iterable[int], first: str, last: str) -> str:
+def _tips(said: Sequence[str], seen: Iterable[int], first: str, last: str) -> str:
     """Tooltips of the marks ``seen`` of one path, without their common beginning and end."""
     parts = (said[k][len(first) : len(said[k]) - len(last)] for k in seen)
     return escape(BETWEEN.join(part.replace(BETWEEN, "¦") for part in parts))
@@ -276,7 +276,7 @@ def _bars(mark: Bars, at: Places) -> str:
     first, last = shared_ends(mark.said)
     return (
         f'<path class="area {mark.colour}{way}" data-a="{escape(first)}" data-z="{escape(last)}" '
-        f'data-t="{_told(mark.said, seen, first, last)}" d="{places}"/>'
+        f'data-t="{_tips(mark.said, seen, first, last)}" d="{places}"/>'
     )
 
 

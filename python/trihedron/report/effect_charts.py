@@ -72,7 +72,7 @@ def _curve_marks(one: EffectCurve, factor: float, unit_x: str) -> list[Mark]:
     x, shape, half = factor * one.x, scale * one.value, TWO_SIGMA * scale * one.sigma
     said_x = [f"{plain_number(float(factor * a))} {unit_x}" for a in one.data_x]
     axis = XYZ[one.axis]
-    told = [
+    tips = [
         f"{said(f'pose {k + 1}, {axis}', float(v), unit)} at {at}"
         for k, v, at in zip(one.poses, scale * one.data, said_x, strict=True)
     ]
@@ -81,7 +81,7 @@ def _curve_marks(one: EffectCurve, factor: float, unit_x: str) -> list[Mark]:
         Line(x, shape, f"{axis}: model", colour),
     ]
     if len(one.data):
-        marks.append(Points(factor * one.data_x, scale * one.data, told, None, f"{axis}: poses", colour))
+        marks.append(Points(factor * one.data_x, scale * one.data, tips, None, f"{axis}: poses", colour))
     return marks
 
 
@@ -171,23 +171,23 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
         colour: Colour = AXIS_COLOURS[k] if len(seen.channels) > 1 else "c1"
         data = factor * seen.before[:, k]
         where = [f"{label.split(' [')[0]} {plain_number(a)} {unit_x}" for a in x]
-        told = [
+        tips = [
             f"{said(f'{seen.kind} {n}, {channel}', v, unit)}, {at}"
             for n, (at, v) in enumerate(zip(where, data, strict=True), 1)
         ]
-        marks.append(Points(x, data, told, None, f"{channel}: without the effects", colour))
+        marks.append(Points(x, data, tips, None, f"{channel}: without the effects", colour))
         # Tilt errors are angles between vectors: their difference is not the explained part.
         after = factor * seen.after[:, k]
         if is_same and seen.domain == "moves":
-            told = [said(f"{seen.kind} {n}, with the effects", float(v), unit) for n, v in enumerate(after, 1)]
-            marks.append(Points(x, after, told, None, f"{channel}: with the effects", "accent", True))
+            tips = [said(f"{seen.kind} {n}, with the effects", float(v), unit) for n, v in enumerate(after, 1)]
+            marks.append(Points(x, after, tips, None, f"{channel}: with the effects", "accent", True))
         elif is_same:
             if seen.domain == "static-gyro" and unit_x in ("s", "°C"):
                 order = np.argsort(x)
                 marks.append(Line(x[order], (data - after)[order], f"{channel}: model", colour))
                 continue
-            told = [said(f"{seen.kind} {n}, model", float(v), unit) for n, v in enumerate(data - after, 1)]
-            marks.append(Points(x, data - after, told, None, f"{channel}: explained by the effects", colour, True))
+            tips = [said(f"{seen.kind} {n}, model", float(v), unit) for n, v in enumerate(data - after, 1)]
+            marks.append(Points(x, data - after, tips, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
 
 
@@ -217,10 +217,10 @@ def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
         mean = np.array([of_heat[pose == p].mean() for p in range(pose.max() + 1)])[pose]
         dots = factor * _averaged(values[k] + mean - of_heat.mean())
         curve = factor * (_polynomial(along - about, slopes) - of_heat.mean())
-        told = [f"{said(axis, float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)]
+        tips = [f"{said(axis, float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)]
         marks: tuple[Mark, ...] = (
             Level(y=0.0),
-            Points(at, dots, told, None, f"{axis}: log", AXIS_COLOURS[k]),
+            Points(at, dots, tips, None, f"{axis}: log", AXIS_COLOURS[k]),
             Line(along, curve, "curve, at constant temperature", "ink"),
         )
         y = Scale(f"bias, about its mean [{unit}]", unit)

@@ -261,12 +261,12 @@ def _panel(one: SensorFilterNoise) -> Panel:
             [f"{plain_number(a)} {unit} over {plain_number(s)} s" for a, s in zip(seen, h, strict=True)],
         )
 
-    predicted, actual, told = both("predicted", "actual")
+    predicted, actual, tips = both("predicted", "actual")
     marks: list[Mark] = [Line(h, predicted, "predicted, effective N and K", "c1")]
-    marks.append(Points(h, actual, told, None, "actual error", "c1"))
+    marks.append(Points(h, actual, tips, None, "actual error", "c1"))
     if one.consistency[0].static_predicted is not None:
-        predicted, actual, told = both("static_predicted", "static_actual")
+        predicted, actual, tips = both("static_predicted", "static_actual")
         marks.append(Line(h, predicted, "predicted, static N and K", "accent", is_dashed=True))
-        marks.append(Points(h, actual, told, None, "actual error of that filter", "accent", is_hollow=True))
+        marks.append(Points(h, actual, tips, None, "actual error of that filter", "accent", is_hollow=True))
     x, y = Scale("horizon [s]", "s", is_log=True), Scale(f"{what} [{unit}]", unit, is_log=True)
     return Panel(x, y, tuple(marks), title=one.sensor)

@@ -285,8 +285,8 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         marks: list[Level | Points] = [Level(y=0.0)]
         for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
             if part.any():
-                told = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
-                marks.append(Points(across[part], values[part], told, error[part], name, colour))
+                tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)

@@ -96,11 +96,11 @@ def verification_columns(verification: Verification) -> Columns:
     v = verification
     rows = []
     poses = range(len(v.norm_error))
-    for kind, unit, told in (
+    for kind, unit, each in (
         ("pose", "m/s^2", zip(poses, v.norm_error, v.norm_noise, v.norm_sigma, strict=True)),
         ("move", "deg", zip(v.moves.tolist(), v.angle_deg, v.angle_noise_deg, v.angle_sigma_deg, strict=True)),
     ):
-        rows += [(kind, k, *map(float, sizes), unit) for k, *sizes in told]
+        rows += [(kind, k, *map(float, sizes), unit) for k, *sizes in each]
     return of_rows(("kind", "index", "error", "noise", "sigma", "unit"), rows)
 
 

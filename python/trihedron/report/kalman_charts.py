@@ -85,11 +85,11 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         n = max(n, len(result.is_settled))
         mean = np.convolve(nis, np.ones(window) / window, mode="valid")
         name = XYZ[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
-        told = [
+        tips = [
             said(f"pose {p:.0f}, {name}", float(v), "times its predicted variance")
             for p, v in zip(pose, nis, strict=True)
         ]
-        marks.append(Points(pose, np.minimum(nis, 12.0), told, None, f"{name}: one pose", AXIS_COLOURS[k], True))
+        marks.append(Points(pose, np.minimum(nis, 12.0), tips, None, f"{name}: one pose", AXIS_COLOURS[k], True))
         marks.append(Line(pose[window - 1 :], mean, f"{name}: running mean", AXIS_COLOURS[k]))
     low, high = (np.full(2, float(stats.chi2.ppf(p, window)) / window) for p in (0.005, 0.995))
     name = f"99 % of running means (of {window}) when the noise model is right"
@@ -122,7 +122,7 @@ def residual_chart(residual: FloatArray) -> Chart:
     for k in range(residual.shape[1]):
         name = f"f{AXES[k]}" if residual.shape[1] == 3 else "|f| − |g|"
         values = mm_s2(residual[:, k])
-        told = [said(f"pose {p}, {name}", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
-        marks.append(Points(pose, values, told, None, name, AXIS_COLOURS[k]))
+        tips = [said(f"pose {p}, {name}", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
+        marks.append(Points(pose, values, tips, None, name, AXIS_COLOURS[k]))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     return Chart((Panel(x, Scale("residual [mm/s²]", "mm/s²"), tuple(marks)),))

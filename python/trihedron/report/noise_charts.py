@@ -31,10 +31,10 @@ BEST = "best averaging time"
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Allan deviation (k,) of one part of the sum; ``name`` is its label at ``x``, ``y``, ``told`` its tooltip."""
+    """Allan deviation (k,) of one part of the sum; ``name`` is its label at ``x``, ``y``, ``tip`` its tooltip."""
 
     name: str
-    told: str
+    tip: str
     deviation: FloatArray
     x: float
     y: float
@@ -149,11 +149,11 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
             marks.append(Line(tau, curve.deviation[good, c], axis.name.split()[-1].upper(), colour))
             best = axis.optimal_averaging()
             if best is not None:
-                told = f"{axis_in_print(axis.name)}: best averaging time {plain_number(best[0])} s, "
-                told += f"{plain_number(best[1])} {printed}"
+                tip = f"{axis_in_print(axis.name)}: best averaging time {plain_number(best[0])} s, "
+                tip += f"{plain_number(best[1])} {printed}"
                 # Placed on the measured curve: the minimum of the fitted sum may be off it.
                 found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
-                marks.append(Points(np.array([best[0]]), np.array([found]), [told], None, BEST, "accent"))
+                marks.append(Points(np.array([best[0]]), np.array([found]), [tip], None, BEST, "accent"))
         y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
         # Curves before points, so that the axes are together in the legend.
         marks.sort(key=lambda mark: isinstance(mark, Points))
@@ -184,14 +184,14 @@ def _terms(axis: NoiseAxis, tau: FloatArray) -> list[Mark]:
     middle = np.sqrt(tau[0] * tau[-1])
     for part in parts_of(axis, tau):
         marks.append(Line(tau, part.deviation, "parts of the sum", "soft", is_thin=True))
-        marks.append(Points(np.array([part.x]), np.array([part.y]), [part.told], None, "", "ink"))
+        marks.append(Points(np.array([part.x]), np.array([part.y]), [part.tip], None, "", "ink"))
         # The label extends towards the middle of the panel.
         marks.append(Note(part.x, part.y, part.name, side="right" if part.x < middle else "left"))
     total = np.sqrt(axis.allan_variance(tau))
     marks.append(Line(tau, total, "their sum", "ink", is_dashed=True, is_thin=True))
     best = axis.optimal_averaging()
     if best is not None:
-        told = f"best averaging time {plain_number(best[0])} s: {plain_number(best[1])} {unit_in_print(axis.unit)}"
-        marks.append(Points(np.array([best[0]]), np.array([best[1]]), [told], None, "smallest deviation", "accent"))
+        tip = f"best averaging time {plain_number(best[0])} s: {plain_number(best[1])} {unit_in_print(axis.unit)}"
+        marks.append(Points(np.array([best[0]]), np.array([best[1]]), [tip], None, "smallest deviation", "accent"))
         marks.append(Note(*best, f"{plain_number(best[0], 2)} s", "accent", "above"))
     return marks

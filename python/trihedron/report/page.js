@@ -95,7 +95,7 @@
       const dots = [], lines = [];
       for (const p of this.svg.querySelectorAll("[data-t]")) {
         const n = p.getAttribute("d").match(/-?[\d.]+/g).map(Number), { a, z, t } = p.dataset, is = (name) => p.classList.contains(name);
-        /* Dots of a path are three numbers each, bars five; what all are told by begins with a and ends with z. */
+        /* Dots of a path are three numbers each, bars five; the tooltip of all begins with a and ends with z. */
         t.split("|").forEach((one, k) => {
           const text = a + one + z, [x, y, v, w] = n.slice((is("area") ? 5 : 3) * k);
           /* A bar is pointed at anywhere along its length. */

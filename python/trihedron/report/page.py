@@ -53,9 +53,9 @@ def to_html(document: Document) -> str:
     lead = None if document.lead is None else _shown(document.lead)
     script = _file("body.js") + _file("page.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    told, others, place = _noticed(document)
+    foremost, others, place = _noticed(document)
     page = template("page.html.j2").render(
-        told=told,
+        foremost=foremost,
         others=others,
         findings=place,
         document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
@@ -82,8 +82,8 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
     rest = first.seen[len(clause) :].lstrip(" .;")
     seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
     is_said = not first.action or first.action[1:] == document.what_next[1:]
-    told = seen if is_said else f"{seen} → {first.action}"
-    return unbroken(told), others, f"s{list(listing).index(True) + 1}"
+    foremost = seen if is_said else f"{seen} → {first.action}"
+    return unbroken(foremost), others, f"s{list(listing).index(True) + 1}"
 
 
 def unbroken(text: str) -> Markup:

@@ -95,8 +95,8 @@ def _poses_chart(known: list[PosePlan]) -> Chart:
         ("bias", "mm/s²", [mm_s2_from_m_s2(pose.bias) for pose in known]),
     ):
         y = np.array(values)
-        told = [f"{pose.name}: {plain_number(v, 2)} {unit}" for pose, v in zip(known, values, strict=True)]
-        marks = (Line(n, y, "", "c1"), Points(n, y, told, None, "a set of poses", "c1"))
+        tips = [f"{pose.name}: {plain_number(v, 2)} {unit}" for pose, v in zip(known, values, strict=True)]
+        marks = (Line(n, y, "", "c1"), Points(n, y, tips, None, "a set of poses", "c1"))
         x = Scale("poses", whole=True, includes=(0.0,))
         panels.append(Panel(x, Scale(f"σ of {name} [{unit}]", unit, includes=(0.0,)), marks, height_px=200))
     return Chart(tuple(panels), columns=3)

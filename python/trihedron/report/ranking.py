@@ -167,7 +167,7 @@ def _panel(ranking: Ranking, what: str, unit: str, errors: FloatArray) -> Panel:
     kinds: tuple[tuple[BoolArray, Colour, str], ...] = ((~rejected, "c1", "fits"), (rejected, "accent", "rejected"))
     for part, colour, judged in kinds:
         if part.any():
-            told = [f"{names[i]}: {plain_number(errors[i, 0])} {unit}, {judged}" for i in np.flatnonzero(part)]
-            marks.append(Points(errors[part, 0], place[part], told, None, judged, colour))
+            tips = [f"{names[i]}: {plain_number(errors[i, 0])} {unit}, {judged}" for i in np.flatnonzero(part)]
+            marks.append(Points(errors[part, 0], place[part], tips, None, judged, colour))
     x = Scale(f"{what} [{unit}], rms", unit, includes=(0.0,))
     return Panel(x, Scale("", names=names), tuple(marks), title=what, height_px=ROW_PX * (len(names) + 1))

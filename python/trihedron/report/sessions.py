@@ -306,9 +306,9 @@ def _deviations(model: SessionsModel, k: int, axis: int, places: FloatArray) -> 
     values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
     error = np.sqrt(_compared_variance(model.sessions, k)) * factor
     name = axis_in_print(parameter.name)
-    told = [
+    tips = [
         said(f"{session.name}, {name}", v, f"± {e:.2g} {unit}")
         for session, v, e in zip(model.sessions, values, error, strict=True)
     ]
     step = 0.12 * max(float(np.ptp(places)) / max(len(places) - 1, 1), 1e-9)
-    return [*marks, Points(places + (axis - 1) * step, values, told, error, name, colour)]
+    return [*marks, Points(places + (axis - 1) * step, values, tips, error, name, colour)]

@@ -137,11 +137,11 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
         found = [one[i] for one in (effect.parameters, *effect.each)]
         scale, unit = parameter_unit(common.unit, max(abs(one.value) for one in found))
         value, sigma = scale * np.array([(one.value, one.std) for one in found]).T
-        told = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
+        tips = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
         marks = (
             Level(x=0.0, name="no effect"),
-            Points(value[1:], place[1:], told[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
-            Points(value[:1], place[:1], told[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
+            Points(value[1:], place[1:], tips[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
+            Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
         x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
         panels.append(Panel(x, Scale("", names=beside), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
@@ -152,8 +152,8 @@ def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
     """A bar per effect: its score in all recordings together."""
     place = -np.arange(1.0, len(candidates) + 1.0)
     score = np.array([one.score for one in candidates])
-    told = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
-    bars = Bars(score, place, BAR, told, "tried in all recordings together", "soft", is_across=True)
+    tips = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
+    bars = Bars(score, place, BAR, tips, "tried in all recordings together", "soft", is_across=True)
     # The axis extends beyond 0, so that positive scores have space even if there are none.
     x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
     names = tuple(one.id for one in candidates)

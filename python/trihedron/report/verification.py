@@ -162,7 +162,7 @@ def verification_chart(verification: Verification) -> Chart:
     error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
     edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
     limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
-    told = [
+    tips = [
         said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
         for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
     ]
@@ -173,7 +173,7 @@ def verification_chart(verification: Verification) -> Chart:
             Band(edge, -limit, limit, ALLOWED),
             Level(y=0.0),
             *(
-                Points(pose[part], error[part], [told[i] for i in np.flatnonzero(part)], None, name, colour)
+                Points(pose[part], error[part], [tips[i] for i in np.flatnonzero(part)], None, name, colour)
                 for part, name, colour in _parted(np.abs(error) > LIMIT_SIGMAS * sigma)
             ),
         ),
@@ -181,7 +181,7 @@ def verification_chart(verification: Verification) -> Chart:
     if not len(v.angle_deg):
         return Chart((norm,))
     move = (v.moves + 1).astype(np.float64)
-    told = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    tips = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
     edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
     limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
     moves = Panel(
@@ -190,7 +190,7 @@ def verification_chart(verification: Verification) -> Chart:
         (
             Band(edge, 0.0 * limit, limit, ALLOWED),
             *(
-                Bars(move[part], v.angle_deg[part], 0.7, [told[i] for i in np.flatnonzero(part)], name, colour)
+                Bars(move[part], v.angle_deg[part], 0.7, [tips[i] for i in np.flatnonzero(part)], name, colour)
                 for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
             ),
         ),
