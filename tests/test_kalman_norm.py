@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 
 from trihedron import _core
 from trihedron.estimate.kalman.model import shaping_model
-from trihedron.estimate.kalman.norm_invariant import NormFilter, NormStart, calibrate_without_references
+from trihedron.estimate.kalman.norm_invariant import NormFilter, calibrate_without_references, start_from_range
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
 from twins_kalman import normalised_error_squared
 
@@ -78,7 +78,7 @@ def test_a_session_that_begins_in_one_plane_does_not_collapse_to_zero():
     noise = np.random.default_rng(8).standard_normal(f.shape)
     readings = (f - B_TRUE) @ np.linalg.inv(S_TRUE).T + 0.5 * noise
     filtered = NormFilter(
-        AxisNoise(white=1.0), gravity_m_s2=GRAVITY, start=NormStart.from_range(readings, GRAVITY), pose_s=4.0
+        AxisNoise(white=1.0), gravity_m_s2=GRAVITY, start=start_from_range(readings, GRAVITY), pose_s=4.0
     )
     for i in range(90):
         filtered.add(readings[i], 8.0 * i, 4.0, np.zeros(3))

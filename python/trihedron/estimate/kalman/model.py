@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import stats
 
 from trihedron import _core
 from trihedron.arrays import AXES, BoolArray, FloatArray
+from trihedron.probability import chdtrc, chdtri
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, Consistency
 
@@ -67,14 +67,14 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
     if n == 0:
         return Consistency(float("nan"), 0.0, float("inf"), 0, 1.0, 0)
     tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = float(stats.chi2.ppf(tail, n)) / n, float(stats.chi2.ppf(1.0 - tail, n)) / n
+    low, high = chdtri(n, 1.0 - tail) / n, chdtri(n, tail) / n
     n_lags = min(20, n // 5)
     power = float(z @ z)
     r = np.array([float(z[lag:] @ z[: n - lag]) / power for lag in range(1, n_lags + 1)]) if power > 0 else np.zeros(0)
     p = 1.0
     if len(r):
         q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, n_lags + 1))))
-        p = float(stats.chi2.sf(q, n_lags))
+        p = chdtrc(n_lags, q)
     return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
 
 

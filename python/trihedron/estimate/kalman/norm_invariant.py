@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,45 +17,21 @@ from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
 
+START_RELATIVE, START_BIAS_M_S2 = 0.3, 3.0
+"""Standard uncertainty of the initial S, relative to its size, and of the bias, by the range of the readings."""
 
-@dataclass(frozen=True, eq=False)
-class NormStart:
-    """Initial state of the filter: ``f = S (raw − bias)`` with S (3, 3) and bias (3,), raw.
 
-    The standard uncertainty of S is ``sigma_relative`` of its size, that of the bias ``sigma_bias_m_s2``. The signs of
-    S are those of the result: the norm does not determine them.
+def start_from_range(readings: npt.ArrayLike, gravity_m_s2: float) -> tuple[FloatArray, FloatArray]:
+    """Initial scales (3,), biases (3,) in raw units, by the range of mean readings (n, 3): each axis was near the
+    vertical, both ways up. The norm does not determine signs: those of the result are positive, as these.
+
+    Raises ``RefusedError`` when an axis did not move.
     """
-
-    S: FloatArray
-    bias: FloatArray
-    sigma_relative: float = 0.1
-    sigma_bias_m_s2: float = 1.0
-
-    def __post_init__(self) -> None:
-        S, bias = np.array(self.S, dtype=np.float64), np.array(self.bias, dtype=np.float64)
-        if S.shape != (3, 3) or bias.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(bias))):
-            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {bias.shape}")
-        if np.linalg.matrix_rank(S) < 3:
-            raise RefusedError(
-                "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
-            )
-        if not (self.sigma_relative > 0 and self.sigma_bias_m_s2 > 0):
-            raise RefusedError("the uncertainty of a start must be positive")
-        object.__setattr__(self, "S", S)
-        object.__setattr__(self, "bias", bias)
-
-    @classmethod
-    def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
-        """Initial values from the range of mean readings (n, 3): each axis was near the vertical, both ways up.
-
-        Raises ``RefusedError`` when an axis did not move.
-        """
-        a = np.asarray(readings, dtype=np.float64)
-        half = (a.max(axis=0) - a.min(axis=0)) / 2.0
-        if np.any(half <= 0):
-            raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
-        bias = (a.max(axis=0) + a.min(axis=0)) / 2.0
-        return cls(np.diag(gravity_m_s2 / half), bias, sigma_relative=0.3, sigma_bias_m_s2=3.0)
+    a = np.asarray(readings, dtype=np.float64)
+    half = np.ptp(a, axis=0) / 2.0
+    if np.any(half <= 0):
+        raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up")
+    return gravity_m_s2 / half, (a.max(axis=0) + a.min(axis=0)) / 2.0
 
 
 NormFrame = Literal["lower", "symmetric"]
@@ -71,9 +46,9 @@ N_PARAMETERS = 9
 class NormFilter:
     """Kalman filter of a triad in unknown attitudes, over poses in order of time.
 
-    ``noise`` of one axis or of three, in raw units; ``start`` the initial calibration, signs included; ``frame`` the
-    form of S, which fixes the rotation that the norm does not determine; ``session_s``, ``pose_s`` the approximate
-    length of the session, which sets the slowest noise state, and of a pose.
+    ``noise`` of one axis or of three, in raw units; ``start`` the initial scales and biases (3,); ``frame`` the form
+    of S, which fixes the rotation that the norm does not determine; ``session_s``, ``pose_s`` the approximate length of
+    the session, which sets the slowest noise state, and of a pose.
     """
 
     def __init__(
@@ -81,18 +56,17 @@ class NormFilter:
         noise: AxisNoise | Sequence[AxisNoise],
         *,
         gravity_m_s2: float,
-        start: NormStart,
+        start: tuple[FloatArray, FloatArray],
         frame: NormFrame = "lower",
         session_s: float = 1800.0,
         pose_s: float = 3.0,
     ) -> None:
         self.frame: NormFrame = frame
         self._gravity = gravity_m_s2
-        self._bias = start.bias
+        scale, self._bias = start
         models = [shaping_model(n, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
-        size = np.abs(np.diag(start.S)).mean()
-        sigma = np.array([start.sigma_relative * size] * 6 + [start.sigma_bias_m_s2] * 3)
-        mean = np.array([start.S[i, j] for i, j in ENTRIES] + [0.0] * 3)
+        sigma = np.array([START_RELATIVE * scale.mean()] * 6 + [START_BIAS_M_S2] * 3)
+        mean = np.array([scale[i] if i == j else 0.0 for i, j in ENTRIES] + [0.0] * 3)
         self._filter = _core.NormKalman(
             models[0], models[1], models[2], frame == "symmetric", gravity_m_s2, mean, sigma
         )
@@ -152,16 +126,14 @@ def calibrate_without_references(
     start_s: npt.ArrayLike,
     pose_s: npt.ArrayLike,
     gravity_m_s2: float,
-    start: NormStart | None = None,
     frame: NormFrame = "lower",
     extra_variance: npt.ArrayLike = 0.0,
     raw_unit: str = "counts",
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
 
-    Arguments are those of ``calibrate_with_references``; the default ``start`` is from the range of the readings, with
-    positive axes. Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order, or there
-    are fewer than nine.
+    Arguments are those of ``calibrate_with_references``. Raises ``RefusedError`` when shapes disagree, values are not
+    finite, poses are out of order, or there are fewer than nine.
     """
     a = _mean_readings(readings)
     begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)
@@ -170,7 +142,7 @@ def calibrate_without_references(
         return NormFilter(
             noise,
             gravity_m_s2=gravity_m_s2,
-            start=start or NormStart.from_range(a, gravity_m_s2),
+            start=start_from_range(a, gravity_m_s2),
             frame=frame,
             session_s=float(begin[-1] + pose[-1] - begin[0]),
             pose_s=float(np.median(pose)),

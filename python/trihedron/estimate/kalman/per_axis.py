@@ -3,48 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import RefusedError
 from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.words import words
+from trihedron.sensor_model import other_form, other_form_jacobian
 
 DIFFUSE = 1e8
 """σ of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """Prior of the constants: ``mean``, ``sigma`` (3, 4) of ``(kx, ky, kz, U0)`` per axis.
-
-    ``walk`` (3, 4) is the random walk intensity of each constant, per √s; 0 for constants that do not change.
-    """
-
-    mean: FloatArray
-    sigma: FloatArray
-    walk: FloatArray
-
-    @classmethod
-    def diffuse(cls, reading_sigma: npt.ArrayLike) -> Prior:
-        """Diffuse prior: mean 0, σ of ``DIFFUSE`` times the standard deviation ``reading_sigma`` (3,) of a reading."""
-        sigma = np.broadcast_to(np.asarray(reading_sigma, dtype=np.float64), (3,))
-        return cls(np.zeros((3, 4)), DIFFUSE * np.repeat(sigma[:, None], 4, axis=1), np.zeros((3, 4)))
-
-    def __post_init__(self) -> None:
-        for name in ("mean", "sigma", "walk"):
-            array = np.array(getattr(self, name), dtype=np.float64)
-            if array.shape != (3, 4) or not np.all(np.isfinite(array)):
-                raise RefusedError(f"prior {name} must be finite with shape (3, 4), got {array.shape}")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
 
 
 def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
@@ -64,18 +38,13 @@ def calibrate_with_references(
     start_s: npt.ArrayLike,
     pose_s: npt.ArrayLike,
     extra_variance: npt.ArrayLike = 0.0,
-    prior: Prior | None = None,
     raw_unit: str = "counts",
-    with_baselines: bool = True,
 ) -> KalmanCalibration:
     """Calibrate a triad from mean readings in known attitudes, by all methods after every pose (docs/kalman.md, eq. 2).
 
     ``readings`` (n, 3) are the mean raw readings of the poses, ``references`` a table or the specific force (n, 3) in
     the body [m/s²], ``noise`` that of one axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start
-    and length of the poses [s], ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model. With a
-    ``prior`` (default: diffuse) the poses need not determine every constant (a head with one axis); the batch solutions
-    are then omitted. ``with_baselines`` adds recursive and batch least squares, ordinary and generalised; the latter
-    cost O(n³).
+    and length of the poses [s], ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model.
 
     Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
     constants.
@@ -94,18 +63,10 @@ def calibrate_with_references(
     if table.sigma_m_s2 > 0:
         # An angle error changes the reference by σ across it; the axis' sensitivity converts it to raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
-    is_diffuse = prior is None
-    if prior is None:
-        prior = Prior.diffuse([model.fast_variance(float(np.min(pose))) ** 0.5 for model in models])
-
     axes: list[AxisKalmanResult] = []
     findings: list[Finding] = []
     for axis in range(3):
-        result = _one_axis(
-            axis, noises[axis], models[axis], prior, z[:, axis].copy(), f, start, pose, extra[:, axis].copy(),
-            with_baselines=with_baselines,
-            must_determine=is_diffuse,
-        )  # fmt: skip
+        result = _one_axis(axis, noises[axis], models[axis], z[:, axis].copy(), f, start, pose, extra[:, axis].copy())
         axes.append(result)
         findings += consistency_findings(axis, result.consistency)
     observability, seen = _observability(f)
@@ -118,16 +79,9 @@ def calibrate_with_references(
 def pose_arrays(
     n: int, start_s: npt.ArrayLike, pose_s: npt.ArrayLike, extra_variance: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses.
-
-    Raises ``RefusedError`` when there is not one start per pose, or a length is not positive.
-    """
+    """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses."""
     start = np.array(start_s, dtype=np.float64)
     pose = np.array(np.broadcast_to(np.asarray(pose_s, dtype=np.float64), (n,)))
-    if start.shape != (n,):
-        raise RefusedError(f"start_s must have one entry per pose ({n}), got shape {start.shape}")
-    if not (np.all(np.isfinite(pose)) and np.all(pose > 0)):
-        raise RefusedError("pose_s must be finite and positive: every pose needs a positive length")
     extra = np.asarray(extra_variance, dtype=np.float64)
     return start, pose, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
 
@@ -142,47 +96,36 @@ def _one_axis(
     axis: int,
     noise: AxisNoise,
     model: _core.AxisKalmanModel,
-    prior: Prior,
     z: FloatArray,
     f: FloatArray,
     start: FloatArray,
     pose: FloatArray,
     extra: FloatArray,
-    *,
-    with_baselines: bool,
-    must_determine: bool,
 ) -> AxisKalmanResult:
-    mean, sigma = prior.mean[axis].copy(), prior.sigma[axis].copy()
-    begin = _core.KalmanStart(mean, sigma, prior.walk[axis])
+    mean, sigma = np.zeros(4), np.full(4, DIFFUSE * model.fast_variance(float(np.min(pose))) ** 0.5)
+    begin = _core.KalmanStart(mean, sigma, np.zeros(4))
     poses = _core.KalmanPoses(z, f, start, pose, extra)
     constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(model, begin, poses)
     _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, begin, poses)
-    tracks = [ConstantsTrack("kalman", constants, stated)]
-    batch: dict[str, tuple[FloatArray, FloatArray]] = {}
-    if with_baselines:
-        # Ordinary least squares uses only the variance of one reading.
-        white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
-        recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
-        tracks.append(ConstantsTrack("recursive least squares", *recursive))
-        try:
-            ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(model, begin, poses)
-        except REFUSALS:
-            if must_determine:
-                raise
-        else:
-            tracks.append(ConstantsTrack("recursive generalised least squares", track[0], track[1]))
-            batch = {
-                "least squares": (ols, np.sqrt(np.diag(ols_cov))),
-                "generalised least squares": (gls, np.sqrt(np.diag(gls_cov))),
-            }
+    # Ordinary least squares uses only the variance of one reading.
+    white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
+    recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
+    ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(model, begin, poses)
     innovation_sigma = np.sqrt(variance)
     return AxisKalmanResult(
         axis=axis,
         noise=noise,
         constants=constants[-1].copy(),
         covariance=covariance,
-        tracks=tuple(tracks),
-        batch=batch,
+        tracks=(
+            ConstantsTrack("kalman", constants, stated),
+            ConstantsTrack("recursive least squares", *recursive),
+            ConstantsTrack("recursive generalised least squares", track[0], track[1]),
+        ),
+        batch={
+            "least squares": (ols, np.sqrt(np.diag(ols_cov))),
+            "generalised least squares": (gls, np.sqrt(np.diag(gls_cov))),
+        },
         innovation=innovation,
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma),
@@ -206,21 +149,17 @@ def direct_form(
     scale = np.linalg.norm(inverse_S, axis=1)
     if np.any(scale == 0) or np.linalg.cond(inverse_S / scale[:, None]) > 1e6:
         raise RefusedError("the three axes read the same component of gravity: the triad cannot be inverted")
-    S = np.linalg.inv(inverse_S)
-    b = -S @ inverse_b
-    # dS = −S dS_a S and db = −S (dS_a b + db_a): errors of row i of S_a and b_a[i] are correlated, rows independent.
+    S, b = other_form(inverse_S, inverse_b)
     covariance = np.zeros((12, 12))
     for i, axis in enumerate(axes):
-        jacobian = np.zeros((12, 4))
-        for j in range(3):
-            jacobian[:9, j] = -np.outer(S[:, i], S[j, :]).ravel()
-            jacobian[9:, j] = -S[:, i] * b[j]
-        jacobian[9:, 3] = -S[:, i]
-        covariance += jacobian @ axis.covariance @ jacobian.T
+        # Row i of S_a and b_a[i] are correlated; axes are independent.
+        of_axis = [3 * i, 3 * i + 1, 3 * i + 2, 9 + i]
+        covariance[np.ix_(of_axis, of_axis)] = axis.covariance
+    jacobian = other_form_jacobian(inverse_S, inverse_b)
     return SensorCalibration(
         S=S,
         b=b,
-        covariance=covariance,
+        covariance=jacobian @ covariance @ jacobian.T,
         raw_unit=raw_unit,
         si_unit="m/s^2",
         method="kalman, known attitudes",
