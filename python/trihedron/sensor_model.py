@@ -55,6 +55,14 @@ def other_form_jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
     return jacobian
 
 
+def norms(readings: FloatArray, S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``|S a' + b|`` (n,) of readings (n, 3), and its derivative (n, 12) by S row by row, then b: ``(u ⊗ a', u)``."""
+    truth = correct(readings, S, b)
+    norm = np.linalg.norm(truth, axis=1)
+    up = truth / norm[:, None]
+    return norm, np.concatenate([(up[:, :, None] * readings[:, None, :]).reshape(-1, 9), up], axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class Reframing:
     """Change of a triad's frame: ``S → R S``, ``b → R b`` with a proper rotation that depends on S itself.

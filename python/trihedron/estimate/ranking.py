@@ -15,6 +15,7 @@ from trihedron.estimate.verification import norm_error
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration, Verification
 from trihedron.records.ranking import Interval, Suspicion
+from trihedron.sensor_model import norms
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 RESAMPLES = 2000
@@ -65,12 +66,10 @@ def with_bias_of_log(calibration: Calibration, segments: Segments, gravity_m_s2:
 
 def _accelerometer_bias(sensor: SensorCalibration, means: FloatArray, gravity_m_s2: float) -> FloatArray:
     """b (3,) [m/s²] by least squares of ``|S a + b| - |g|`` over the poses' means (n, 3), with S fixed."""
-    force, b = means @ sensor.S.T, np.zeros(3)
+    b = np.zeros(3)
     for _ in range(STEPS):
-        total = force + b
-        norm = np.linalg.norm(total, axis=1)
-        step = np.linalg.lstsq(total / norm[:, None], gravity_m_s2 - norm, rcond=None)[0]
-        b = b + step
+        norm, jacobian = norms(means, sensor.S, b)
+        b = b + np.linalg.lstsq(jacobian[:, 9:], gravity_m_s2 - norm, rcond=None)[0]
     return b
 
 

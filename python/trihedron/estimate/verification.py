@@ -24,6 +24,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
+from trihedron.sensor_model import norms
 
 FALSE_ALARM = 1e-3
 """Probability that errors of a valid calibration are found to exceed noise and uncertainty."""
@@ -97,12 +98,8 @@ def norm_error(
 
     With ``u = f/|f|``: ``var = uᵀ S Σ Sᵀ u + J C Jᵀ``, ``J = (u ⊗ a', u)``.
     """
-    force = means @ sensor.S.T + sensor.b
-    norm = np.linalg.norm(force, axis=1)
-    up = force / norm[:, None]
-    along = up @ sensor.S
-    noise = np.sum(along**2 * variance, axis=1)
-    jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
+    norm, jacobian = norms(means, sensor.S, sensor.b)
+    noise = np.sum((jacobian[:, 9:] @ sensor.S) ** 2 * variance, axis=1)
     model = np.einsum("ni,ij,nj->n", jacobian, sensor.covariance, jacobian)
     return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
 from trihedron.probability import fdtrc
@@ -22,6 +23,7 @@ from trihedron.records.checked import number_of
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.sensor_model import norms
 from trihedron.session.rounding import undithered_axes
 
 
@@ -44,15 +46,10 @@ def _of_poses(sensor: SensorCalibration, quality: FitQuality, segments: Segments
     assert segments.accelerometer_mean is not None
     if len(quality.residual) != segments.n_poses:
         return quality
-    residual = np.linalg.norm(segments.accelerometer_mean @ sensor.S.T + sensor.b, axis=1) - gravity_m_s2
-    total = float(np.sum(residual**2))
-    return replace(
-        _seen_alone(quality),
-        residual=residual,
-        chi2=float(np.sum((residual / np.maximum(quality.sigma, 1e-300)) ** 2)),
-        rms=float(np.sqrt(total / len(residual))),
-        rms_dof=float(np.sqrt(total / quality.dof)) if quality.dof else float("nan"),
-    )
+    residual = norms(segments.accelerometer_mean, sensor.S, sensor.b)[0] - gravity_m_s2
+    seen = gravity_quality(residual, quality.sigma, None)
+    rms_dof = seen.rms_dof * np.sqrt(seen.dof / quality.dof) if quality.dof else float("nan")
+    return replace(_seen_alone(quality), residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof))
 
 
 def _of_moves(
@@ -165,39 +162,35 @@ def on_turntable(
     found = plateaus(recording, segments)
     speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0
-    mean, covariance, W = found.mean[used], found.covariance[used], speeds[used]
-    start = np.concatenate([gyro.S.ravel(), gyro.b])
-    n = len(calibration.covariance)
-    own = _variance(mean, covariance, start)
-    of_table = np.outer(W, W) * relative_sigma**2
+    rows = _Rows(found.mean[used], found.covariance[used], speeds[used], relative_sigma)
+    before = np.concatenate([calibration.accelerometer.S.ravel(), calibration.accelerometer.b, gyro.S.ravel(), gyro.b])
     scatter = 0.0
     while True:
-        noise = np.diag(own + (scatter * W) ** 2) + of_table
-        theta, gain, H, misfit = _updated(calibration.covariance, start, mean, W, noise)
-        innovation = H @ calibration.covariance[n - 12 :, n - 12 :] @ H.T + noise
+        values, gain, slope, misfit, noise = rows.update(before, calibration.covariance, scatter)
+        innovation = slope @ calibration.covariance @ slope.T + noise
         chi2 = float(misfit @ np.linalg.solve(innovation, misfit))
-        if scatter > 0.0 or fdtrc(float(len(W)), 100.0, chi2 / len(W)) >= FALSE_ALARM:
+        if scatter > 0.0 or fdtrc(float(len(misfit)), 100.0, chi2 / len(misfit)) >= FALSE_ALARM:
             break
         # The table's speed scatters, or S and b do not describe the sensor: the rms misfit is added to the variance.
-        scatter = float(np.sqrt(np.mean((misfit / W) ** 2)))
-    posterior = calibration.covariance - gain @ H @ calibration.covariance[n - 12 :]
+        scatter = float(np.sqrt(np.mean((misfit / rows.speeds) ** 2)))
+    posterior = calibration.covariance - gain @ slope @ calibration.covariance
     posterior = 0.5 * (posterior + posterior.T)
-    shift = gain @ misfit
-    accelerometer = calibration.accelerometer
-    values = np.concatenate([accelerometer.S.ravel(), accelerometer.b]) + shift[:12]
+    shift = values - before
     # The shift from the optimum of poses and moves increases their χ² by this, to first order.
     cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
-    said = _said(scatter, misfit / W, float(np.sqrt(np.mean((_model(mean, theta)[0] / W - 1.0) ** 2))), relative_sigma)
+    left = float(np.sqrt(np.mean((rows.predicted(values)[0] / rows.speeds - 1.0) ** 2)))
     after = replace(
         calibration,
-        accelerometer=replace(
-            accelerometer, S=values[:9].reshape(3, 3), b=values[9:], covariance=posterior[:12, :12]
-        ),
-        gyroscope=replace(gyro, S=theta[:9].reshape(3, 3), b=theta[9:], covariance=posterior[12:, 12:]),
+        accelerometer=_with(calibration.accelerometer, values[:12], posterior[:12, :12]),
+        gyroscope=_with(gyro, values[12:], posterior[12:, 12:]),
         covariance=posterior,
-        findings=(*calibration.findings, said),
-    )  # fmt: skip
+        findings=(*calibration.findings, _said(scatter, misfit / rows.speeds, left, relative_sigma)),
+    )
     return with_own_residuals(after, recording, segments, cost)
+
+
+def _with(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray) -> SensorCalibration:
+    return replace(sensor, S=values[:9].reshape(3, 3), b=values[9:], covariance=covariance)
 
 
 def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
@@ -217,50 +210,50 @@ def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> F
     return np.broadcast_to(given, (n,)).copy()
 
 
-def _model(mean: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Speeds (k,) [rad/s] and their derivatives (k, 12) by S (row by row) and b."""
-    rate = mean @ theta[:9].reshape(3, 3).T + theta[9:]
-    speed = np.linalg.norm(rate, axis=1)
-    along = rate / speed[:, None]
-    return speed, np.concatenate([(along[:, :, None] * mean[:, None, :]).reshape(-1, 9), along], axis=1)
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Mean readings (k, 3) with their covariances (k, 3, 3) at ``speeds`` (k,) [rad/s] with a common relative error."""
 
+    mean: FloatArray
+    covariance: FloatArray
+    speeds: FloatArray
+    relative_sigma: float
 
-def _variance(mean: FloatArray, covariance: FloatArray, theta: FloatArray) -> FloatArray:
-    """(k,) variance of the speeds [(rad/s)²] due to the noise of the readings."""
-    S = theta[:9].reshape(3, 3)
-    rate = mean @ S.T + theta[9:]
-    gradient = (rate / np.linalg.norm(rate, axis=1)[:, None]) @ S
-    return np.asarray(np.einsum("ki,kij,kj->k", gradient, covariance, gradient))
+    def predicted(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Speeds (k,) [rad/s], and their derivatives (k, 24) by the parameters of both sensors."""
+        speed, slope = norms(self.mean, values[12:21].reshape(3, 3), values[21:])
+        return speed, np.pad(slope, ((0, 0), (12, 0)))
+
+    def update(
+        self, start: FloatArray, prior: FloatArray, scatter: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Posterior parameters (24,), gain (24, k), derivatives (k, 24), misfit (k,) of the prior, noise (k, k)."""
+        by_reading = self.predicted(start)[1][:, 21:] @ start[12:21].reshape(3, 3)
+        own = np.einsum("ki,kij,kj->k", by_reading, self.covariance, by_reading)
+        noise = np.diag(own + (scatter * self.speeds) ** 2)
+        noise += np.outer(self.speeds, self.speeds) * self.relative_sigma**2
+        values = start
+        for _ in range(ITERATIONS):
+            speed, slope = self.predicted(values)
+            gain = prior @ slope.T @ np.linalg.inv(slope @ prior @ slope.T + noise)
+            misfit = self.speeds - speed + slope @ (values - start)
+            last, values = values, start + gain @ misfit
+            if np.max(np.abs(values - last)[12:]) <= 1e-12 * np.max(np.abs(start[12:])):
+                break
+        return values, gain, slope, misfit, noise
 
 
 def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Finding:
     """Finding on the speeds: relative misfits ``missed`` (k,) before the update and their ``rms`` after it."""
     common = float(np.mean(missed))
     figures = {"rms": rms, "scatter": scatter, "sigma": sigma, "common": common}
-    if scatter > 0.0:
-        return Finding.of(
-            FindingCode.TURNTABLE,
-            "contradicting",
-            turns=len(missed),
-            scatter_percent=100.0 * scatter,
-            common_percent=100.0 * common,
-            numbers=figures,
-        )
-    return Finding.of(FindingCode.TURNTABLE, turns=len(missed), rms_percent=100.0 * rms, numbers=figures)
-
-
-def _updated(
-    prior: FloatArray, start: FloatArray, mean: FloatArray, W: FloatArray, noise: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Posterior gyro parameters (12,), gain (n, k), derivatives (k, 12), and linearised misfit (k,) of the prior."""
-    n, theta = len(prior), start
-    for _ in range(ITERATIONS):
-        speed, H = _model(mean, theta)
-        gain = prior[:, n - 12 :] @ H.T @ np.linalg.inv(H @ prior[n - 12 :, n - 12 :] @ H.T + noise)
-        misfit = W - speed + H @ (theta - start)
-        new = start + (gain @ misfit)[n - 12 :]
-        is_there = bool(np.max(np.abs(new - theta)) <= 1e-12 * np.max(np.abs(start)))
-        theta = new
-        if is_there:
-            break
-    return theta, gain, H, misfit
+    if scatter == 0.0:
+        return Finding.of(FindingCode.TURNTABLE, turns=len(missed), rms_percent=100.0 * rms, numbers=figures)
+    return Finding.of(
+        FindingCode.TURNTABLE,
+        "contradicting",
+        turns=len(missed),
+        scatter_percent=100.0 * scatter,
+        common_percent=100.0 * common,
+        numbers=figures,
+    )

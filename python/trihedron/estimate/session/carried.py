@@ -18,6 +18,7 @@ from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, Sessio
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import Calibration, FitQuality
 from trihedron.records.segments import Segments
+from trihedron.sensor_model import norms
 from trihedron.session.averaging import sharpened
 from trihedron.session.noise import along_gradient
 
@@ -93,10 +94,8 @@ def held_out(
 
 def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
     """(n,) variance of the norm by the uncertainty of S, b: ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
-    force = observed.pose_force @ S.T + b_centred
-    up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    means = observed.pose_force + observed.force_origin
-    jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
+    origin = observed.force_origin
+    _, jacobian = norms(observed.pose_force + origin, S, b_centred - S @ origin)
     return np.asarray(np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0))
 
 
