@@ -28,7 +28,7 @@ def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
             shape = np.concatenate([ramp, np.ones(n), 1.0 - ramp])
             shape *= sense * 180.0 * RATE_HZ / shape.sum()
             rates += [shape[:, None] * np.eye(3)[axis], np.zeros((round(POSE_S * RATE_HZ), 3))]
-            turns.append(Turn(at - 5, at + len(shape) + 5, axis, sense * np.pi))
+            turns.append(Turn(at - 5, at + len(shape) + 5, tuple(np.eye(3)[axis]), sense * np.pi))
             at += len(shape) + len(rates[-1])
     rates = np.concatenate(rates)
     seen = rates @ mix.T + zero + noise_deg_s * rng.normal(size=rates.shape)
@@ -64,14 +64,14 @@ def test_a_steady_reading_inside_one_step_is_one_error_and_a_ramp_is_none():
     readings[400:600, 0] = 7.0
     readings[600:, 0] = 0.0
     readings[300:400, 1] = np.repeat(np.arange(10.0), 10)
-    hidden = hidden_angles(readings, 0.01, np.ones(3), [(400, 600), (300, 410)], [(0, 300)], np.eye(3)[:2])
-    # Two seconds at 7: the turn is off by 2 s of a step's uniform error; of the ramp's steps one error each.
-    assert hidden.variance_of_turns()[0, 0] == pytest.approx(2.0**2 / 12.0)
-    assert hidden.passing[1, 1] == pytest.approx(8 * 0.01**2 / 12.0)
-    assert hidden.variance_of_biases()[0] == pytest.approx(np.full(3, 3.0**2 / 12.0))
+    edges, still = np.array([[400, 600], [300, 410], [380, 700]]), np.array([[0, 300]])
+    hidden = np.sum(hidden_angles(readings, 0.01, np.ones(3), edges, still, np.eye(3)[[0, 1, 0]]) ** 2, axis=2)
+    # Two seconds at 7: the turn is off by 2 s of a step's uniform error; of the ramp the step where it turns back.
+    assert hidden[0, 0] == pytest.approx(2.0**2 / 12.0)
+    assert hidden[1, 1] == pytest.approx((0.1**2 + 0.2**2) / 12.0)
+    assert hidden[-1] == pytest.approx(np.full(3, 1.0 / 12.0))
     # The same turn with rest at its ends, 0.2 and 1 s in the step of the bias, which is one error more.
-    (ends,) = hidden_angles(readings, 0.01, np.ones(3), [(380, 700)], [(0, 300)], np.eye(3)[:1]).variance_of_turns()
-    assert ends[0] == pytest.approx((2.0**2 + 1.2**2) / 12.0)
+    assert hidden[2, 0] == pytest.approx((2.0**2 + 1.2**2) / 12.0)
 
 
 def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars():

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns, Turn
-from trihedron.estimate.gyroscope.turn_system import TurnSystem, solve
+from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
+from trihedron.estimate.known_vectors import KnownVectors, fit_known
 from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import segments_from_truth
@@ -23,7 +23,9 @@ def turns_and_zeros(recording, truth):
     segments = segments_from_truth(recording, truth)
     mean = segments.accelerometer_mean
     moves = [m for m in segments.moves if np.linalg.norm(mean[m.pose_after] - mean[m.pose_before]) < 0.5]
-    return [Turn(m.start, m.stop) for m in moves], [(pose.start, pose.stop) for pose in segments.poses]
+    ups = [np.sign(np.round(mean[m.pose_before] / 9.8)) for m in moves]
+    turns = [Turn(m.start, m.stop, tuple(up)) for m, up in zip(moves, ups, strict=True)]
+    return turns, [(pose.start, pose.stop) for pose in segments.poses]
 
 
 def session(seed=0, S=SCALE, b=BIAS, **motion):
@@ -81,8 +83,8 @@ def test_the_manuals_eight_half_turns_in_counts_are_recognised_with_a_nominal_sc
     assert np.abs(z_scores(found, truth)).max() < 4.0
     # The angles stated instead: the same answer, whatever nominal scale is claimed beside them.
     stated = [
-        replace(turn, axis=axis, angle_rad=angle * DEG)
-        for turn, axis, angle in zip(turns, np.repeat((2, 0, 1), 6), (90, -90, 360, -360, 1440, -1440) * 3, strict=True)
+        replace(turn, angle_rad=angle * DEG)
+        for turn, angle in zip(turns, (90, -90, 360, -360, 1440, -1440) * 3, strict=True)
     ]
     said, _ = calibrate_turns(recording, stated, zeros, nominal_scale=2.2e-3)
     np.testing.assert_allclose(said.S, found.S, rtol=1e-9)
@@ -130,9 +132,7 @@ def test_turns_without_a_wall_widen_the_error_bars_and_say_so():
 
 def test_a_given_angle_is_believed_and_a_contradiction_is_a_finding():
     recording, truth, turns, zeros = session(turns_deg=(90.0, -90.0, 200.0, -200.0))
-    given = [
-        Turn(t.start, t.stop, angle_rad=a * DEG) for t, a in zip(turns, (90.0, -90.0, 200.0, -200.0) * 3, strict=True)
-    ]
+    given = [replace(t, angle_rad=a * DEG) for t, a in zip(turns, (90.0, -90.0, 200.0, -200.0) * 3, strict=True)]
     found, findings = calibrate_turns(recording, given, zeros)
     assert not findings
     assert np.abs(z_scores(found, truth)).max() < 4.0
@@ -144,36 +144,34 @@ def test_a_given_angle_is_believed_and_a_contradiction_is_a_finding():
 def test_malformed_turns_are_refused():
     recording, _, turns, zeros = session()
     with pytest.raises(ValueError, match="two samples"):
-        Turn(5, 6)
-    with pytest.raises(ValueError, match="axis"):
-        Turn(5, 60, axis=3)
+        Turn(5, 6, (1.0, 0.0, 0.0))
+    with pytest.raises(ValueError, match="unit vector"):
+        Turn(5, 60, (3.0, 0.0, 0.0))
     for given, still, words in (
         ([], zeros, "needs turns"),
         (turns, [], "without rotation"),
-        ([Turn(0, 10**7)], zeros, "inside the record"),
-        (turns[:12], zeros, "turn about Y"),
+        ([Turn(0, 10**7, (1.0, 0.0, 0.0))], zeros, "inside the record"),
+        (turns[:12], zeros, "three directions"),
     ):
         with pytest.raises(ValueError, match=words):
             calibrate_turns(recording, given, still)
 
 
-def test_errors_that_all_turns_share_pull_the_scale_as_a_whole_and_are_not_averaged_by_more_turns():
-    # All axes turned by one small rotation e change every turn by e x phi: the scale by S_w [e]x, however many.
+def test_errors_that_all_turns_share_are_of_the_scale_as_a_whole_and_are_not_averaged_by_more_turns():
+    # All axes turned by one small rotation e change every turn by e x phi: the scale by S [e]x, however many.
     S_w = np.diag([1.0, 0.9, 1.1]) + 0.02
     e = np.array([2e-4, -1e-4, 3e-4])
     for repeats in (1, 10):
         angles = 2.0 * np.pi * np.tile(np.concatenate([np.eye(3), -np.eye(3)]), (repeats, 1))
-        k = len(angles)
-        measured = MeasuredTurns(
-            angles @ S_w.T, np.full(k, 3.0), np.zeros((4, 3)), np.full(4, 3.0), np.full(3, 1e-6), np.zeros(3),
-            np.zeros(3), np.zeros(3),
-        )  # fmt: skip
-        system = TurnSystem(measured, angles, S_w, sigma_directions=np.full(k, 1e-4))
-        used = np.ones(k, dtype=bool)
-        pull = system.pull(solve(system, used), used, np.cross(e, angles)[:, :, None])[:, 0]
+        n = len(angles) + 1
+        vectors = np.append(angles, np.zeros((1, 3)), axis=0)
+        times, noise = np.append(np.full(n - 1, 3.0), 1.0), np.tile(1e-10 * np.eye(3), (n, 1, 1))
+        rows = KnownVectors(vectors @ S_w.T, vectors, times, noise, np.zeros((n, 3, 0)))
+        with_error = replace(rows, shared=(np.cross(e, vectors) @ S_w.T)[:, :, None])
+        added = fit_known(with_error).covariance - fit_known(rows).covariance
         skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-        np.testing.assert_allclose(pull[:9].reshape(3, 3), S_w @ skew, rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(pull[9:], 0.0, atol=1e-12)
+        pull = np.append((S_w @ skew).ravel(), np.zeros(3))
+        np.testing.assert_allclose(added, np.outer(pull, pull), rtol=1e-6, atol=1e-15)
 
 
 def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.0, -180.0), rate_hz=100.0):
@@ -190,7 +188,7 @@ def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.
             n = 300
             shape = 1.0 - np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
             rates += [shape[:, None] * up * angle * DEG * rate_hz / n, np.zeros((400, 3))]
-            turns.append(Turn(start - 1, start + n + 1, axis, angle * DEG * sign, face=face))
+            turns.append(Turn(start - 1, start + n + 1, tuple(sign * np.eye(3)[axis]), angle * DEG, face=face))
             zeros.append((start + n, start + n + 400))
     omega = np.concatenate(rates)
     raw = omega @ S_w.T - S_w @ np.array(BIAS) + 2e-3 * rng.normal(size=omega.shape)

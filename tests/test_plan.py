@@ -10,9 +10,8 @@ from trihedron.cli import main
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import (
     PlannedMove,
-    design_bias_first,
-    design_least_squares,
     design_moves,
+    design_turns,
 )
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
@@ -21,14 +20,14 @@ N = math.radians(0.005)
 
 
 def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
-    design = design_bias_first([0, 1, 2], [math.pi / 2] * 3, [2.0] * 3, 5.0, N)
+    design = design_turns([90.0], 2.0, 5.0, N)
     by_hand = N * math.sqrt(2.0 * (1.0 + 2.0 / 5.0)) / (math.pi / 2)
-    np.testing.assert_allclose(design.scale, by_hand, rtol=1e-12)
+    assert design.scale_bias_first == pytest.approx(by_hand, rel=1e-12)
     # There and back the bias cancels, and both routes are one.
-    pair = ([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 5.0, N)
-    np.testing.assert_allclose(design_bias_first(*pair).scale, N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rtol=1e-12)
-    np.testing.assert_allclose(design_least_squares(*pair).scale, design_bias_first(*pair).scale, rtol=1e-12)
-    assert design_least_squares(*pair).bias < design_bias_first(*pair).bias
+    pair = design_turns([90.0, -90.0], 2.0, 5.0, N)
+    assert pair.scale_bias_first == pytest.approx(N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rel=1e-12)
+    assert pair.scale == pytest.approx(pair.scale_bias_first, rel=1e-12)
+    assert pair.bias < pair.bias_bias_first
 
 
 def test_the_plan_is_what_the_calibration_says_of_itself():
@@ -38,7 +37,7 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
         for angle in (math.pi / 2, -math.pi / 2):
             n, still = int(2.0 * rate), int(20.0 * rate)
             zeros.append((clock, clock + still))
-            turns.append(Turn(clock + still, clock + still + n, axis, angle))
+            turns.append(Turn(clock + still, clock + still + n, tuple(np.eye(3)[axis]), angle))
             block = np.zeros((still + n, 3))
             t = (np.arange(n) + 0.5) / n
             block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2
@@ -47,7 +46,7 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
     gyro = np.vstack(pieces) + rng.normal(size=(clock, 3)) * N * math.sqrt(rate)
     recording = Recording(np.arange(clock) / rate, None, gyro, rate)
     found, _ = calibrate_turns(recording, turns, zeros)
-    design = design_least_squares([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 120.0, N)
+    design = design_turns([90.0, -90.0], 2.0, 120.0, N)
     # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
     np.testing.assert_allclose(np.diag(found.sigma_S), design.scale, rtol=0.12)
     np.testing.assert_allclose(found.sigma_b, design.bias, rtol=0.12)
@@ -73,10 +72,10 @@ def test_three_turns_about_level_axes_show_six_numbers_and_nine_with_a_stop_in_e
 
 
 def test_turns_that_determine_nothing_are_refused_in_words():
-    with pytest.raises(ValueError, match="no turn about Z"):
-        design_least_squares([0, 1], [1.0, 1.0], [1.0, 1.0], 1.0, N)
-    with pytest.raises(ValueError, match="nothing determines the bias"):
-        design_least_squares([0, 1, 2], [1.0] * 3, [1.0] * 3, 0.0, N)
+    with pytest.raises(ValueError, match="no turn about any axis"):
+        design_turns([0.0], 1.0, 1.0, N)
+    with pytest.raises(ValueError, match="must be positive"):
+        design_turns([90.0], 1.0, 0.0, N)
 
 
 def test_the_command_says_what_turns_poses_and_moves_are_worth(capsys):

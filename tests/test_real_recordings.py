@@ -208,7 +208,8 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         first, last = windows[name]
         rough = block[first:last, axis].sum() / 100.0
         zeros.append((start, start + 2000))
-        turns.append(Turn(start + first, start + last, axis, math.copysign(math.radians(angles[name]), rough)))
+        angle = math.copysign(math.radians(angles[name]), rough)
+        turns.append(Turn(start + first, start + last, tuple(np.eye(3)[axis]), angle))
         blocks.append(block)
         start += len(block)
     gyroscope = np.concatenate(blocks)

@@ -11,19 +11,19 @@ import numpy as np
 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.api.turns_on_faces import opposite_on_faces, resting_spans, turns_on_faces
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
+from trihedron.estimate.accelerometer.whole_turns import opposite_headings
+from trihedron.estimate.gyroscope import turn_axes
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
-from trihedron.estimate.gyroscope.turn_axes import shared_errors, stated_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
-from trihedron.estimate.joint import calibrate_joint, pull_allowed, pull_on_accelerometer
+from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.session.solved import calibrate_moves, scale_by_gravity
 from trihedron.estimate.session.start import MoveOptions
 from trihedron.quantiles import median
@@ -244,18 +244,15 @@ def _by_poses(
     if recording.gyroscope is None:
         return alone
     if turns_deg is not None:
-        turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
-        shared = shared_errors(turns, accelerometer, gravity)
-        return _together(alone, *calibrate_turns(recording, turns, resting_spans(segments), shared_errors=shared))
+        turns = turn_axes.stated_turns(recording, segments, accelerometer, gravity, turns_deg)
+        shared = turn_axes.shared_errors(turns, accelerometer, gravity)
+        static = turn_axes.resting_spans(segments)
+        return _together(alone, *calibrate_turns(recording, turns, static, shared_errors=shared))
     try:
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            pull = pull_on_accelerometer(accelerometer, both.accelerometer)
-            if pull <= pull_allowed(accelerometer):
-                return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
-            # Moves that contradict the poses must not bias the accelerometer, which the poses determine alone.
-            alone = replace(alone, findings=(*found, Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)))
+            return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except REFUSALS as error:
         return _without_gyroscope(alone, str(error))
@@ -284,7 +281,8 @@ def _by_faces(
     assert sigma_mean is not None
     up = faces_up(mean, unit, faces)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
-    opposite = opposite_on_faces(recording, segments, up, turns_deg)
+    stated = () if turns_deg is None else turns_deg
+    opposite = opposite_headings(recording, segments, turn_axes.moves_on_faces(segments, up), stated)
     try:
         accelerometer, found = calibrate_faces(
             mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
@@ -297,7 +295,7 @@ def _by_faces(
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    turns = turns_on_faces(segments, up, turns_deg)
+    turns = turn_axes.turns_on_faces(recording, segments, up, turns_deg)
     scale: float | np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None = nominal
     tolerance = SCALE_TOLERANCE
     if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
@@ -306,7 +304,7 @@ def _by_faces(
             scale, tolerance = by_gravity
     try:
         gyroscope, more = calibrate_turns(
-            recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
+            recording, turns, turn_axes.resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
         )
     except REFUSALS as error:
         if turns_deg is not None:

@@ -10,13 +10,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
-from trihedron.estimate.gyroscope.turn_design import (
-    PlannedMove,
-    design_bias_first,
-    design_least_squares,
-    design_moves,
-)
-from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
+from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
+from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 _KINDS = np.count_nonzero(np.abs(CANDIDATES) > 1e-9, axis=1)
@@ -78,10 +73,7 @@ def plan(
             raise RefusedError(f"the {name} must be a positive number, got {value:g}")
         if not 1e-15 < value < 1e9:
             raise RefusedError(f"a {name} of {value:g} is that of no experiment")
-    angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
-    axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
-    arguments = (axes, angles, [turn_s] * len(angles), pose_s, gyroscope_density, sigma_turn_rad)
-    both, first = design_least_squares(*arguments), design_bias_first(*arguments)
+    turns = design_turns(turns_deg, turn_s, pose_s, gyroscope_density, sigma_turn_rad)
     sigma = accelerometer_density / math.sqrt(pose_s) / gravity_m_s2
     angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))
     return ExperimentPlan(
@@ -90,16 +82,7 @@ def plan(
         gravity_m_s2=gravity_m_s2,
         pose_s=pose_s,
         sigma_turn_rad=sigma_turn_rad,
-        turns=TurnPlan(
-            n_turns=len(axes) // 3,
-            angles_deg=tuple(float(angle) for angle in turns_deg if angle != 0.0),
-            duration_s=turn_s,
-            static_s=pose_s,
-            scale=float(both.scale.max()),
-            bias=both.bias,
-            scale_bias_first=float(first.scale.max()),
-            bias_bias_first=first.bias,
-        ),
+        turns=turns,
         poses=tuple(_poses(name, up, sigma, gravity_m_s2) for name, up in POSE_SETS.items()),
         moves=_moves(angle_noise),
     )

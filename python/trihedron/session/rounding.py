@@ -31,8 +31,9 @@ LEAST_WHITE = 1e-2
 
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
-    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small against the LSB ``quantum`` (3,) to dither."""
-    return (quantum > 0.0) & (sigma < UNDITHERED * quantum)
+    """Axes (3,) whose noise does not dither the LSB ``quantum`` (3,), by the scatter ``sigma`` (3,) of readings."""
+    white = np.sqrt(np.maximum(sigma**2 - quantum**2 / 12.0, 0.0))
+    return (quantum > 0.0) & (white < UNDITHERED * quantum)
 
 
 def rounding_variance(

@@ -41,8 +41,7 @@ def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
     sigma, sigma_mean = segments.accelerometer_sigma, segments.accelerometer_sigma_mean
     if sigma is None or sigma_mean is None:
         return None
-    white = np.sqrt(np.maximum(sigma**2 - step**2 / 12.0, 0.0))
-    return np.where(undithered_axes(step, white), np.min(sigma_mean, axis=0) ** 2, 0.0)
+    return np.where(undithered_axes(step, sigma), np.min(sigma_mean, axis=0) ** 2, 0.0)
 
 
 def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: FloatArray | None = None) -> Placements:

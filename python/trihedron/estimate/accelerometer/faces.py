@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import probability
-from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import REFUSALS
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, inputs, verdict
 from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
+from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import words
@@ -28,13 +28,34 @@ METHOD = "faces of the case on a level table"
 class _Estimate:
     """Fit of the distort direction ``a' = S_a f + b_a``; ``tilt_rad`` is the rms tilt added to each variance."""
 
-    S_a: FloatArray
-    b_a: FloatArray
+    fit: KnownFit
     covariance: FloatArray
-    residual: FloatArray
     tilt_rad: float
     chi2_noise: float
-    dof: int
+
+    def residual_m_s2(self, seen: _Faces) -> FloatArray:
+        """(n, 3) residuals of the readings in the body frame."""
+        residual = seen.rows().residual(self.fit.S_a, self.fit.b_a)
+        return np.asarray(np.linalg.solve(self.fit.S_a, residual.T).T)
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Readings ``values`` (n, 3) with their ``noise`` (n, 3, 3), the face (n,) that is up in each, and |g|."""
+
+    values: FloatArray
+    noise: FloatArray
+    faces: IntArray
+    g: float
+
+    def rows(self) -> KnownVectors:
+        """The readings as those of gravity."""
+        vectors = self.g * face_poses.direction_of(self.faces)
+        return KnownVectors(self.values, vectors, np.ones(len(vectors)), self.noise, np.zeros((len(vectors), 3, 0)))
+
+    def tilted(self, S_a: FloatArray, tilt_rad: float | FloatArray) -> _Faces:
+        """The readings with the variance of a tilt of ``tilt_rad`` rms in every pose."""
+        return replace(self, noise=face_poses.tilted(self.noise, self.faces, S_a, self.g, tilt_rad))
 
 
 def calibrate_faces(
@@ -68,16 +89,19 @@ def calibrate_faces(
     used = np.flatnonzero(faces)
     face_poses.check_sufficient(faces[used])
     estimate = _estimate_placements(values, noise, faces, g, shared, opposite)
-    S, b = other_form(estimate.S_a, estimate.b_a)
-    quality, apart = _quality(values, noise, faces, g, estimate)
+    S_a, b_a = estimate.fit.S_a, estimate.fit.b_a
+    S, b = other_form(S_a, b_a)
+    seen = _Faces(values[used], noise[used], faces[used], g)
+    widened = fit_known(seen.tilted(S_a, estimate.tilt_rad).rows())
+    apart = np.full((len(values), 2), np.nan)
+    apart[used] = _held_out(seen, estimate, widened)
     findings = [
         *face_poses.left_out(faces, values),
-        *_tilt_findings(estimate, S, faces[used], used),
+        *_tilt_findings(seen, estimate, used),
         *verdict.model_findings(S, unit, signs_are_known=up is not None),
-        *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.dof),
+        *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.fit.dof),
     ]
-    observability = _observability(noise[used], faces[used], estimate, g)
-    jacobian = other_form_jacobian(estimate.S_a, estimate.b_a)
+    jacobian = other_form_jacobian(S_a, b_a)
     sensor = SensorCalibration(
         S=S,
         b=b,
@@ -85,8 +109,8 @@ def calibrate_faces(
         raw_unit=unit.value,
         si_unit="m/s^2",
         method=METHOD + ", least squares",
-        quality=quality,
-        observability=observability,
+        quality=_quality(seen, estimate, faces != 0, apart),
+        observability=_observability(widened, faces[used]),
     )
     return sensor, tuple(findings)
 
@@ -100,25 +124,20 @@ def _estimate_placements(
     opposite: OppositeHeadings | None,
 ) -> _Estimate:
     """Fit with one mean for each placement of the case: poses between turns on one face share their tilt."""
-    used = np.flatnonzero(faces)
-    seen = with_opposite(values, noise, faces, opposite)
-    placed = placements(*seen, shared)
-    if len(placed.means) == len(used):
-        return _estimate(values[used], noise[used], faces[used], g)
-    spread = placed.noise
+    placed = placements(*with_opposite(values, noise, faces, opposite), shared)
+    if len(placed.means) == np.count_nonzero(faces):
+        used = faces != 0
+        return _estimate(_Faces(values[used], noise[used], faces[used], g))
+    seen = _Faces(placed.means, placed.noise, placed.faces, g)
+    if placed.scatter is None:
+        return _estimate(seen)
+    S_a = fit_known(seen.rows()).S_a
+    tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
     # Readings half a turn apart have opposite tilts, which cancel in their mean.
-    is_cancelled = opposite is not None and len(opposite.pose) == len(placed.means)
-    if placed.scatter is not None:
-        S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
-        tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
-        # Misalignments couple the tilt into the reading of the vertical axis.
-        if not is_cancelled:
-            spread = face_poses.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
-    estimate = _estimate(placed.means, spread, placed.faces, g)
-    if placed.scatter is not None:
-        estimate = _with_doubt(estimate, tilt2, 0.0 if is_cancelled else g)
-    residual = values[used] - g * face_poses.direction_of(faces[used]) @ estimate.S_a.T - estimate.b_a
-    return replace(estimate, residual=residual)
+    if opposite is not None and len(opposite.pose) == len(placed.means):
+        return _with_doubt(_estimate(seen), tilt2, 0.0)
+    # Misalignments couple the tilt into the reading of the vertical axis.
+    return _with_doubt(_estimate(seen.tilted(S_a, np.sqrt(tilt2 / placed.n_headings))), tilt2, g)
 
 
 def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
@@ -127,150 +146,84 @@ def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
     A tilted face reads ``g cos t``: the scale may be too small by ``tilt2``. Misalignments are uncertain by the tilt:
     coupled into the vertical axis it changes the bias by up to ``g tilt2``. Neither is corrected: scatter may have
     other causes."""
-    scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
+    S_a = estimate.fit.S_a
+    scale = np.concatenate([S_a.ravel(), np.zeros(3)])
     covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2
-    covariance[9:, 9:] += (g * tilt2) ** 2 * estimate.S_a @ estimate.S_a.T
+    covariance[9:, 9:] += (g * tilt2) ** 2 * S_a @ S_a.T
     return replace(estimate, covariance=covariance, tilt_rad=float(np.sqrt(estimate.tilt_rad**2 + tilt2)))
 
 
-def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> _Estimate:
+def _estimate(seen: _Faces) -> _Estimate:
     """Fit with the noise alone; if χ² rejects it, with the rms tilt per pose that makes χ² equal its dof."""
-    S_a, b_a, covariance = _least_squares(values, noise, faces, g)
-    dof = 3 * len(values) - 12
-    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
-    chi2_noise = _chi2(values, noise, faces, g)
-    if dof <= 0 or chi2_noise <= probability.chdtri(dof, verdict.SIGNIFICANCE):
-        return _Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof)
+    fit = fit_known(seen.rows())
+    if fit.dof <= 0 or fit.chi2 <= probability.chdtri(fit.dof, verdict.SIGNIFICANCE):
+        return _Estimate(fit, fit.covariance, 0.0, fit.chi2)
     low, high = 0.0, 0.5
     for _ in range(60):
         tilt = 0.5 * (low + high)
-        if _chi2(values, face_poses.tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
-            low = tilt
-        else:
-            high = tilt
-    widened = face_poses.tilted(noise, faces, S_a, g, high)
-    S_a, b_a, covariance = _least_squares(values, widened, faces, g)
-    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
+        is_too_small = fit_known(seen.tilted(fit.S_a, tilt).rows()).chi2 > fit.dof
+        low, high = (tilt, high) if is_too_small else (low, tilt)
+    widened = fit_known(seen.tilted(fit.S_a, high).rows())
     # A tilt estimated with few degrees of freedom has Student's tails: 1.96 standard uncertainties shall cover 95 %.
-    covariance = covariance * face_poses.widened(dof, len(values)) ** 2
-    return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2, g)
+    covariance = widened.covariance * face_poses.widened(fit.dof, len(seen.values)) ** 2
+    return _with_doubt(_Estimate(widened, covariance, 0.0, fit.chi2), high**2, seen.g)
 
 
-def _inverses(noise: FloatArray) -> FloatArray:
-    """Inverse covariances (n, 3, 3); the variance of a stuck axis is a millionth of the trace instead of zero."""
-    variance, axes = np.linalg.eigh(noise)
-    variance = np.maximum(variance, 1e-6 * variance.sum(axis=1, keepdims=True))
-    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes))
+def _held_out(seen: _Faces, estimate: _Estimate, widened: KnownFit) -> FloatArray:
+    """(n, 2) norm residual of each pose predicted by the others, and its standard error, m/s²."""
+    residual, covariance, _ = widened.left_out()
+    S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
+    force = seen.values @ S.T + b
+    along = force / np.linalg.norm(force, axis=1, keepdims=True) @ S
+    sigma2 = np.einsum("ni,nij,nj->n", along, covariance, along)
+    return np.column_stack([np.einsum("ni,ni->n", along, residual), np.sqrt(sigma2)])
 
 
-def _design(faces: IntArray, g: float) -> FloatArray:
-    """(n, 3, 12) derivative of each reading with respect to S_a row by row, then b_a."""
-    f = g * face_poses.direction_of(faces)
-    design = np.zeros((len(f), 3, 12))
-    for row in range(3):
-        design[:, row, 3 * row : 3 * row + 3] = f
-        design[:, row, 9 + row] = 1.0
-    return design
-
-
-def _least_squares(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    design = _design(faces, g)
-    weighted = np.einsum("nij,njk->nik", _inverses(noise), design)
-    # Columns of S_a have size |g|, those of b_a 1: both are scaled for a well-conditioned inverse.
-    scale = np.concatenate([np.full(9, g), np.ones(3)])
-    normal = np.einsum("nij,nik->jk", design, weighted) / np.outer(scale, scale)
-    # The mean is subtracted: counts near 32768 would otherwise lose digits.
-    centre = values.mean(axis=0)
-    right = np.einsum("nij,ni->j", weighted, values - centre) / scale
-    covariance = np.linalg.inv(normal) / np.outer(scale, scale)
-    solution = np.linalg.solve(normal, right) / scale
-    return solution[:9].reshape(3, 3), solution[9:] + centre, covariance
-
-
-def _chi2(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> float:
-    """χ² of the least-squares fit with these weights."""
-    S_a, b_a, _ = _least_squares(values, noise, faces, g)
-    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
-    return float(np.einsum("ni,nij,nj->", residual, _inverses(noise), residual))
-
-
-def _quality(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, estimate: _Estimate
-) -> tuple[FitQuality, FloatArray]:
-    """``FitQuality``: norm residuals (NaN where no face), χ² of the vectors; (n, 2) held-out norm residuals and σ."""
-    used = np.flatnonzero(faces)
-    S, b = other_form(estimate.S_a, estimate.b_a)
-    residual, sigma = (np.full(len(values), np.nan) for _ in range(2))
-    residual[used], sigma[used] = norm_residual(values[used] @ S.T + b, S, noise[used], g)
-    apart = np.full((len(values), 2), np.nan)
-    for pose in map(int, used):
-        others = used[used != pose]
-        try:
-            face_poses.check_sufficient(faces[others])
-        except REFUSALS:
-            continue
-        apart[pose] = _left_out_pose(values, noise, faces, g, pose, others, estimate.tilt_rad)
-    seen = np.isfinite(apart[:, 0])
-    in_m_s2 = estimate.residual @ S.T
-    floor = np.einsum("ij,njk,ik->", S, noise[used], S) / (3 * len(used))
-    quality = FitQuality(
+def _quality(seen: _Faces, estimate: _Estimate, is_face: BoolArray, apart: FloatArray) -> FitQuality:
+    """Norm residuals in sample and held out (NaN where no face), and χ² of the vectors."""
+    S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
+    in_m_s2 = estimate.residual_m_s2(seen)
+    residual, sigma = (np.full(len(is_face), np.nan) for _ in range(2))
+    residual[is_face], sigma[is_face] = norm_residual(seen.values @ S.T + b, S, seen.noise, seen.g)
+    is_held, dof = np.isfinite(apart[:, 0]), estimate.fit.dof
+    floor = np.einsum("ij,njk,ik->", S, seen.noise, S) / (3 * len(seen.values))
+    return FitQuality(
         unit="m/s^2",
         residual=residual,
         sigma=sigma,
         chi2=estimate.chi2_noise,
-        dof=max(estimate.dof, 0),
+        dof=dof,
         rms=float(np.sqrt(np.mean(in_m_s2**2))),
-        rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / estimate.dof)) if estimate.dof > 0 else float("nan"),
+        rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / dof)) if dof > 0 else float("nan"),
         floor=float(np.sqrt(floor)),
         held_out=apart[:, 0],
         held_out_sigma=apart[:, 1],
-        held_out_rms=float(np.sqrt(np.mean(apart[seen, 0] ** 2))) if seen.any() else None,
+        held_out_rms=float(np.sqrt(np.mean(apart[is_held, 0] ** 2))) if is_held.any() else None,
         stopped_because=words("linear-least-squares"),
     )
-    return quality, apart
 
 
-def _left_out_pose(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, pose: int, others: IntArray, tilt_rad: float
-) -> tuple[float, float]:
-    """Held-out norm residual of one pose, from a fit to the other poses, and its standard error, m/s²."""
-    S_a, _, _ = _least_squares(values[others], noise[others], faces[others], g)
-    widened = face_poses.tilted(noise[others], faces[others], S_a, g, tilt_rad)
-    S_a, b_a, covariance = _least_squares(values[others], widened, faces[others], g)
-    S, b = other_form(S_a, b_a)
-    f = values[pose] @ S.T + b
-    error, sigma = norm_residual(f[None], S, noise[pose][None], g)
-    up = f / np.linalg.norm(f)
-    slope = np.concatenate([np.outer(up, values[pose]).ravel(), up]) @ other_form_jacobian(S_a, b_a)
-    return float(error[0]), float(np.sqrt(sigma[0] ** 2 + slope @ covariance @ slope))
-
-
-def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> Iterator[Finding]:
-    """Finding where faces contradict each other beyond noise, with the tilt and the worst pose."""
+def _tilt_findings(seen: _Faces, estimate: _Estimate, used: IntArray) -> Iterator[Finding]:
+    """Finding where faces contradict each other beyond noise, with the tilt and the pose of the worst residual."""
     if estimate.tilt_rad == 0.0:
         return
-    horizontal = estimate.residual @ S.T
-    horizontal[np.arange(len(faces)), np.abs(faces) - 1] = 0.0
+    horizontal = estimate.residual_m_s2(seen)
+    horizontal[np.arange(len(used)), np.abs(seen.faces) - 1] = 0.0
     worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
     tilt_deg = degrees_from_radians(estimate.tilt_rad)
     yield Finding.of(
         FindingCode.TABLE_TILT,
-        chi2_per_dof=estimate.chi2_noise / estimate.dof,
+        chi2_per_dof=estimate.chi2_noise / estimate.fit.dof,
         severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
         tilt_deg=tilt_deg,
         pose=int(used[worst]) + 1,
-        face=face_poses.face_in_words(int(faces[worst])),
+        face=face_poses.face_in_words(int(seen.faces[worst])),
     )
 
 
-def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:
-    """Observability of the twelve parameters, from the whitened and column-scaled design matrix."""
-    roots = np.linalg.cholesky(_inverses(face_poses.tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
-    rows = np.einsum("nji,njk->nik", roots, _design(faces, g)).reshape(-1, 12)
-    rows = rows / np.linalg.norm(rows, axis=0)
-    s = np.linalg.svd(rows, compute_uv=False)
+def _observability(widened: KnownFit, faces: IntArray) -> Observability:
+    """Observability of the twelve parameters by the fit with the tilt in its weights."""
+    s = widened.singular_values()
     present = {int(face) for face in faces}
     missing = tuple(face_poses.face_in_words(face) for face in face_poses.FACES if face not in present)
     return Observability(

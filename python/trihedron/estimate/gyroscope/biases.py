@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.estimate.known_vectors import KnownVectors, fit_known
 from trihedron.probability import MEDIAN_CHI2, fdtrc
 
 FALSE_ALARM = 1e-4
@@ -41,24 +42,18 @@ def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArra
     design = np.column_stack([np.ones(n), force])
     if n < 9 or np.linalg.matrix_rank(design, tol=1e-2 * float(np.linalg.norm(force, 2))) < 4:
         return None
-    A, var_z0 = np.zeros((3, 3)), np.zeros(3)
-    chi2_mean = chi2_line = 0.0
-    for axis in range(3):
-        weight = 1.0 / np.maximum(var_bias[:, axis], 1e-30 + 1e-24 * zero[:, axis] ** 2)
-        root = np.sqrt(weight)
-        mean = float(np.average(zero[:, axis], weights=weight))
-        solution, *_ = np.linalg.lstsq(design * root[:, None], zero[:, axis] * root, rcond=None)
-        rest = zero[:, axis] - design @ solution
-        mean_square = float(np.sum(weight * rest**2)) / (n - 4)
-        covariance = np.linalg.inv((design * weight[:, None]).T @ design) * max(mean_square, 1.0)
-        A[axis], var_z0[axis] = solution[1:], covariance[0, 0]
-        chi2_mean += float(np.sum(weight * (zero[:, axis] - mean) ** 2))
-        chi2_line += float(np.sum(weight * rest**2))
+    var_bias = np.maximum(var_bias, 1e-30 + 1e-24 * zero**2)
+    rows = KnownVectors(zero, force, np.ones(n), var_bias[:, :, None] * np.eye(3), np.zeros((n, 3, 0)))
+    fit = fit_known(rows)
+    mean = np.average(zero, axis=0, weights=1.0 / var_bias)
+    chi2_mean, chi2_line = float(np.sum((zero - mean) ** 2 / var_bias)), fit.chi2
+    per_dof = np.sum(rows.residual(fit.S_a, fit.b_a) ** 2 / var_bias, axis=0) / (n - 4)
+    var_z0 = np.diag(fit.covariance)[9:] * np.maximum(per_dof, 1.0)
     ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
     # Where noise alone explains the pose biases, the ratio of two small sums is not tested.
     p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
     left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
-    return AttitudeDependence(A, var_z0, p_value, left)
+    return AttitudeDependence(fit.S_a, var_z0, p_value, left)
 
 
 def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

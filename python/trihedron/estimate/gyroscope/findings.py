@@ -48,7 +48,7 @@ def findings_of(
             dof=solution.moves_dof,
         )
     yield from _attitude_findings(measured, S)
-    yield from _drift_findings(measured, S)
+    yield from drift_findings("poses", measured.bias, measured.bias_excess, S)
 
 
 def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
@@ -117,19 +117,20 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Fi
     )
 
 
-def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Finding]:
-    dof = len(measured.bias) - 1
-    if dof < 1 or chdtrc(dof, float(measured.bias_excess.max())) > FALSE_ALARM / 3.0:
+def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArray) -> Iterator[Finding]:
+    """Finding where raw biases (n, 3) of ``case`` (poses, turns) differ: χ² ``excess`` (3,) of their constancy."""
+    dof = len(bias) - 1
+    if dof < 1 or chdtrc(dof, float(excess.max())) > FALSE_ALARM / 3.0:
         return
     rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
-    change = np.ptp(measured.bias, axis=0) * rates
-    axis = int(np.argmax(measured.bias_excess))
+    change = np.ptp(bias, axis=0) * rates
+    axis = int(np.argmax(excess))
     yield Finding.of(
         FindingCode.GYRO_BIAS_DRIFT,
-        "poses",
+        case,
         change_rad_s=change[axis],
         axis=axis + 1,
-        times=np.sqrt(measured.bias_excess[axis] / dof),
+        times=np.sqrt(excess[axis] / dof),
     )
 
 

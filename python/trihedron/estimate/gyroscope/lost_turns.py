@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
@@ -126,17 +126,9 @@ def left_out_as_by_losses(
 
 def _lost_at_each_instant(rate: FloatArray, force: FloatArray, step_s: float) -> FloatArray:
     """(n, 3) error of gravity after the move [m/s²] by a sample lost at each instant, from rates (n, 3) [rad/s]."""
-    onward = _core.rotation_from_vector(np.ascontiguousarray(-rate * step_s))
-    carried = np.empty((len(rate), 3))
-    for k, turn in enumerate(onward):
-        force = turn @ force
-        carried[k] = force
-    off: FloatArray = np.cross(rate, carried) * step_s
-    to_end = np.eye(3)
-    for k in range(len(rate) - 1, -1, -1):
-        off[k] = to_end @ off[k]
-        to_end = to_end @ onward[k]
-    return off
+    to_start = integrate_rate(np.arange(len(rate)) * step_s, rate)
+    to_end = to_start[-1].T @ to_start
+    return np.cross(np.einsum("kij,kj->ki", to_end, rate), to_start[-1].T @ force) * step_s
 
 
 def losses_that_fit(

@@ -98,7 +98,8 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     samples it is valid for filtered gyros, whose neighbouring samples are correlated. The lower limit is the rounding
     of the ADC, ``LSB²/12`` per sample.
     """
-    gyroscope = _required(recording.gyroscope, "gyroscope")
+    gyroscope = recording.gyroscope
+    assert gyroscope is not None
     step_s = 1.0 / recording.rate_hz
     kept = [(k, *part) for k, pose in enumerate(segments.poses) for part in pose.undisturbed()]
     owner, *edges = np.array(kept, dtype=np.int64).reshape(-1, 3).T
@@ -125,18 +126,23 @@ def measure_moves(
     poses would be wrong in the middle of a move. Raises ``RefusedError`` when a sensor is missing or there is no move
     between two poses.
     """
-    gyroscope = _required(recording.gyroscope, "gyroscope")
-    raw_force = _required(recording.accelerometer, "accelerometer")
+    gyroscope, raw_force = recording.gyroscope, recording.accelerometer
+    if gyroscope is None or raw_force is None:
+        raise RefusedError(f"the recording has no {'gyroscope' if gyroscope is None else 'accelerometer'}")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
+    assert segments.accelerometer_sigma_mean is not None
+    assert segments.gyroscope_sigma_mean is not None
     moves = _moves_of(recording, segments)
     in_log = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
     links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
     rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
     reading, bias = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
-    var_bias = _mean_variance(segments.gyroscope_sigma_mean)
+    # The variance of pose means includes their rounding error (docs/segmentation.md).
+    var_bias, var_reading = segments.gyroscope_sigma_mean**2, segments.accelerometer_sigma_mean**2
     force = reading @ accelerometer.S.T + accelerometer.b
-    undithered = _undithered(quantum, segments.gyroscope_sigma)
+    scatter = np.full(3, np.inf) if segments.gyroscope_sigma is None else segments.gyroscope_sigma
+    undithered = undithered_axes(quantum, scatter)
     attitude = attitude_dependence(bias, var_bias, force)
     if attitude is not None and attitude.is_present:
         rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
@@ -149,7 +155,6 @@ def measure_moves(
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
     time_s = recording.time_s[rows]
-    var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     bias_read, var_bias_read = bias, var_bias
     mean, excess, _ = pool_biases(bias, var_bias)
     bias, var_bias = shrink(bias, var_bias, mean)
@@ -219,7 +224,8 @@ def _with_hidden_bias(
 ) -> tuple[FloatArray, FloatArray]:
     # Rounding gives the bias of every pose the same error: it is fitted to the moves as one offset.
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
-    own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
+    assert segments.gyroscope_sigma_mean is not None
+    own = np.maximum(segments.gyroscope_sigma_mean**2 - hidden, 0.0)
     return common_bias(bias, np.where(undithered, own, var_bias), undithered)
 
 
@@ -230,32 +236,10 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
 
 
-def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
-    """Axes (3,) whose noise does not reach the LSB ``quantum`` (3,)."""
-    # The noise of one reading is that without the variance of rounding; readings of a single code show none.
-    white = (
-        np.full(3, np.inf) if sigma is None else np.sqrt(np.maximum(np.asarray(sigma) ** 2 - quantum**2 / 12.0, 0.0))
-    )
-    return undithered_axes(quantum, white)
-
-
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
         raise RefusedError("moves need the pose means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
-
-
-def _required(readings: FloatArray | None, name: str) -> FloatArray:
-    if readings is None:
-        raise RefusedError(f"the recording has no {name}: moves need both sensors")
-    return readings
-
-
-def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
-    """Variance (n, 3) of the pose means, including their rounding error (docs/segmentation.md)."""
-    if sigma_mean is None:
-        raise RefusedError("the segments do not say the uncertainty of their pose means")
-    return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 
 def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArray:

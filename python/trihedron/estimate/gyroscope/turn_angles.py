@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron._core import integrate_raw_rate
+from trihedron._core import block_differences, integrate_raw_rate
 from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
-from trihedron.estimate.gyroscope.turn_rounding import HiddenAngles, hidden_angles
+from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
 
@@ -32,88 +32,72 @@ SLACK_RAD = math.radians(10.0)
 
 @dataclass(frozen=True)
 class Turn:
-    """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known.
+    """Samples ``[start, stop)`` of a turn about the unit vector ``direction`` in the body frame.
 
-    ``direction`` (3,) is the unit axis in the body frame where it is no axis of the case, ``sigma_direction_rad`` the
-    standard error of each of its two components. ``face`` (±1, ±2, ±3) is the axis of the case that points up, 0 where
-    unknown: a face that is not flat tilts all turns on it equally.
+    ``angle_rad`` is its signed angle where known, ``sigma_direction_rad`` the standard error of each of the direction's
+    two components. ``face`` (±1, ±2, ±3) is the axis of the case that points up, 0 where unknown: a face that is not
+    flat tilts all turns on it equally.
     """
 
     start: int
     stop: int
-    axis: int | None = None
+    direction: tuple[float, float, float]
     angle_rad: float | None = None
-    direction: tuple[float, float, float] | None = None
     sigma_direction_rad: float = 0.0
     face: int = 0
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
             raise RefusedError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
-        if self.axis is not None and self.axis not in (0, 1, 2):
-            raise RefusedError(f"the axis of a turn is 0, 1 or 2, got {self.axis}")
         if self.angle_rad is not None and not math.isfinite(self.angle_rad):
             raise RefusedError("the angle of a turn must be finite")
-        if self.direction is not None and not 0.99 < math.hypot(*self.direction) < 1.01:
+        if not 0.99 < math.hypot(*self.direction) < 1.01:
             raise RefusedError("the direction of a turn must be a unit vector")
 
     @property
-    def stated(self) -> FloatArray | None:
-        """Rotation vector (3,) [rad] where both angle and axis are stated, else ``None``."""
-        if self.angle_rad is None or (self.axis is None and self.direction is None):
-            return None
-        return self.angle_rad * _unit(self.axis or 0, self.direction)
+    def axis(self) -> int:
+        """Nearest axis of the case: 0, 1 or 2."""
+        return int(np.argmax(np.abs(self.direction)))
 
 
 @dataclass(frozen=True)
 class KnownTurn:
-    """An identified turn: ``angle_rad`` about ``axis``; ``is_used`` is false when the readings contradict these.
+    """A turn with its known ``angle_rad``; ``is_used`` is false when the readings contradict it.
 
-    ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` the angle between its axis and the case axis.
-    ``direction`` is the axis where it is none of the case's, ``axis`` then the nearest one. ``is_ambiguous``: the scale
-    is too uncertain to identify the multiple of 90°.
+    ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` the angle between its axis and the turn's.
+    ``is_ambiguous``: the scale is too uncertain to identify the multiple of 90°.
     """
 
-    axis: int
+    turn: Turn
     angle_rad: float
     is_used: bool
     seen_rad: float
     off_axis_rad: float
-    was_given: bool
-    direction: tuple[float, float, float] | None = None
     is_ambiguous: bool = False
-
-    @property
-    def vector(self) -> FloatArray:
-        """Rotation about the turn's axis, (3,), rad."""
-        return self.angle_rad * _unit(self.axis, self.direction)
-
-
-def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray:
-    if direction is not None:
-        return np.array(direction, dtype=np.float64)
-    unit = np.zeros(3)
-    unit[axis] = 1.0
-    return unit
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTurns:
-    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns and of the static intervals, and their noise.
+    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the ``bias`` (3,) at rest, and their noise.
 
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``bias_spread`` (3,) the variance of the true bias between static
-    intervals, ``bias_excess`` (3,) χ² of its constancy. ``hidden`` holds the rounding errors of a coarse ADC.
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s, ``var_bias`` (3,) that of the bias; ``bias_spread`` (3,) the variance
+    of the true bias between intervals without rotation, whose rates are ``static_rates`` (z, 3), ``bias_excess`` (3,)
+    χ² of its constancy. ``hidden`` (k + 1, 3, m) are errors by rounding, of the turns and of the bias.
     """
 
     raw_angle: FloatArray
     duration_s: FloatArray
-    static_angle: FloatArray
-    static_duration_s: FloatArray
+    bias: FloatArray
     var_rate: FloatArray
+    var_bias: FloatArray
     bias_spread: FloatArray
     bias_excess: FloatArray
-    bias_mean: FloatArray
-    hidden: HiddenAngles | None = None
+    static_rates: FloatArray
+    hidden: FloatArray
+
+    def turned(self) -> FloatArray:
+        """(k, 3) raw angles less those of the bias."""
+        return self.raw_angle - np.outer(self.duration_s, self.bias)
 
 
 def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
@@ -128,34 +112,26 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[
         raise RefusedError("--method faces needs turns: none were given and none were found")
     if not static:
         raise RefusedError("--method faces needs a stretch without rotation: keep the sensor still for some seconds")
-    gyroscope = recording.gyroscope
+    gyroscope, step_s, quantum = recording.gyroscope, 1.0 / recording.rate_hz, recording.facts.of("gyroscope").step
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
-    static_edges = np.array([[a, b] for a, b in static], dtype=np.int64)
+    static_edges = np.array(static, dtype=np.int64)
     static_angle, static_duration = integrate_raw_rate(recording.time_s, gyroscope, static_edges, 1)
-    step_s = 1.0 / recording.rate_hz
-    sums, count = np.zeros(3), 0
-    for start, stop in static:
-        block = gyroscope[start:stop]
-        block = block[np.all(np.isfinite(block), axis=1)]
-        length = min(max(1, round(BLOCK_S / step_s)), len(block) // 4)
-        if length < 1:
-            continue
-        means = block[: len(block) // length * length].reshape(-1, length, 3).mean(axis=1)
-        sums += 0.5 * np.sum(np.diff(means, axis=0) ** 2, axis=0) * length * step_s
-        count += len(means) - 1
+    squares, count = block_differences(
+        gyroscope, static_edges, np.arange(len(static_edges)), max(1, round(BLOCK_S / step_s))
+    )
     if count < 4:
         raise RefusedError(
             "the stretches without rotation are too short to measure the gyro's noise: keep still for some seconds"
         )
-    var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
-    static_s = np.array(static_duration)
-    rates = static_angle / static_s[:, None]
-    mean, excess, spread = pool_biases(rates, var_rate / static_s[:, None])
-    hidden = hidden_angles(
-        gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], static, raw_angle
-    )
-    return MeasuredTurns(raw_angle, np.array(duration), static_angle, static_s, var_rate, spread, excess, mean, hidden)
+    # At least the variance of rounding, which also covers codes that a turn passes through.
+    var_rate = np.maximum(np.array(squares) / count, quantum**2 / 12.0) * step_s
+    static_s = np.array(static_duration)[:, None]
+    static_rates = static_angle / static_s
+    bias, excess, spread = pool_biases(static_rates, var_rate / static_s)
+    var_bias = 1.0 / np.sum(1.0 / np.maximum(var_rate / static_s + spread, 1e-300), axis=0)
+    hidden = hidden_angles(gyroscope, step_s, quantum, edges, static_edges, raw_angle)
+    return MeasuredTurns(raw_angle, np.array(duration), bias, var_rate, var_bias, spread, excess, static_rates, hidden)
 
 
 AMBIGUOUS = (
@@ -192,16 +168,12 @@ def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArra
 
     Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
     """
-    rows = [(index, turn.stated) for index, turn in enumerate(turns)]
-    known = [(index, vector) for index, vector in rows if vector is not None and np.any(vector != 0.0)]
-    if len(known) < 3:
+    is_stated = np.array([bool(turn.angle_rad) for turn in turns])
+    directions = np.array([turn.direction for turn in turns])[is_stated]
+    if not spans_three_axes(directions):
         return None
-    index = np.array([i for i, _ in known])
-    angles = np.array([vector for _, vector in known])
-    directions = angles / np.linalg.norm(angles, axis=1, keepdims=True)
-    if np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
-        return None
-    raw = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean))[index]
+    angles = directions * np.array([turn.angle_rad for turn in turns if turn.angle_rad])[:, None]
+    raw = measured.turned()[is_stated]
     # Initial weights are equal in relative error; later ones are the inverse of the relative misfit.
     size = np.linalg.norm(angles, axis=1)
     weight: FloatArray = 1.0 / size
@@ -215,52 +187,44 @@ def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArra
     return np.asarray(np.linalg.inv(solution.T), dtype=np.float64)
 
 
+def spans_three_axes(directions: FloatArray) -> bool:
+    """Whether unit vectors (k, 3) along turns determine all of S."""
+    return len(directions) >= 3 and bool(np.linalg.svd(directions, compute_uv=False)[-1] >= MIN_SPREAD)
+
+
 def identify_turns(
     measured: MeasuredTurns, turns: Sequence[Turn], nominal: FloatArray, tolerance: float = SCALE_TOLERANCE
 ) -> list[KnownTurn]:
-    """Nearest case axis and nearest multiple of 90° for every turn without a stated one.
+    """Nearest multiple of 90° for every turn without a stated angle.
 
     Small turns are identified first: each refines the scale for the next larger one, so that eight whole turns are
     identified although the nominal scale has the relative error ``tolerance``.
     """
-    seen = (measured.raw_angle - np.outer(measured.duration_s, measured.bias_mean)) @ nominal.T
-    size = np.linalg.norm(seen, axis=1)
-    axes = [_axis_of(turn, vector) for turn, vector in zip(turns, seen, strict=True)]
+    seen = measured.turned() @ nominal.T
     sums = np.zeros((3, 2))
-    known: list[KnownTurn | None] = [None] * len(turns)
-    for index in sorted(range(len(turns)), key=lambda i: size[i]):
-        turn, axis, vector = turns[index], axes[index], seen[index]
-        scale = sums[axis, 0] / sums[axis, 1] if sums[axis, 1] > 0.0 else 1.0
-        unit = _unit(axis, turn.direction)
-        along = float(vector @ unit) / scale
-        off_axis = math.atan2(float(np.linalg.norm(np.cross(vector, unit))), abs(float(vector @ unit)))
-        angle = turn.angle_rad if turn.angle_rad is not None else QUARTER * round(along / QUARTER)
-        is_ambiguous = False
-        if turn.angle_rad is None:
-            unsure = abs(along) * (tolerance if sums[axis, 1] == 0.0 else 0.1 * tolerance)
-            # A turn is identified only if the scale's uncertainty is below half of 90°.
-            is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * QUARTER)
-            is_ambiguous = unsure >= 0.5 * QUARTER
-            is_used = is_used and not is_ambiguous
-        else:
-            is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))
-        is_used = is_used and off_axis < 2.0 * SLACK_RAD
-        known[index] = KnownTurn(
-            axis=axis,
-            angle_rad=float(angle),
-            is_used=bool(is_used),
-            seen_rad=float(along),
-            off_axis_rad=off_axis,
-            was_given=turn.angle_rad is not None,
-            direction=turn.direction,
-            is_ambiguous=is_ambiguous,
-        )
-        if is_used:
-            sums[axis] += (float(vector @ unit) * angle, angle * angle)
-    return [turn for turn in known if turn is not None]
+    known: dict[int, KnownTurn] = {}
+    for index in np.argsort(np.linalg.norm(seen, axis=1), kind="stable").tolist():
+        turn, vector, of_axis = turns[index], seen[index], sums[turns[index].axis]
+        unit = np.array(turn.direction)
+        is_first = of_axis[1] == 0.0
+        along = float(vector @ unit) if is_first else float(vector @ unit) / (of_axis[0] / of_axis[1])
+        known[index] = one = _identified(turn, vector, along, tolerance if is_first else 0.1 * tolerance)
+        if one.is_used:
+            of_axis += (float(vector @ unit) * one.angle_rad, one.angle_rad**2)
+    return [known[index] for index in range(len(turns))]
 
 
-def _axis_of(turn: Turn, seen: FloatArray) -> int:
-    if turn.axis is not None:
-        return turn.axis
-    return int(np.argmax(np.abs(seen if turn.direction is None else turn.direction)))
+def _identified(turn: Turn, seen: FloatArray, along: float, tolerance: float) -> KnownTurn:
+    """A turn seen as (3,) with the nominal scale, by ``along`` [rad] with the one refined to ``tolerance``."""
+    unit = np.array(turn.direction)
+    off_axis = math.atan2(float(np.linalg.norm(np.cross(seen, unit))), abs(float(seen @ unit)))
+    if turn.angle_rad is None:
+        angle, unsure = QUARTER * round(along / QUARTER), abs(along) * tolerance
+        # A turn is identified only if the scale's uncertainty is below half of 90°.
+        is_ambiguous = unsure >= 0.5 * QUARTER
+        limit = 0.0 if is_ambiguous else SLACK_RAD + min(unsure, 0.2 * QUARTER)
+    else:
+        angle, is_ambiguous = turn.angle_rad, False
+        limit = max(SLACK_RAD, 0.3 * abs(angle))
+    is_used = angle != 0.0 and abs(along - angle) < limit and off_axis < 2.0 * SLACK_RAD
+    return KnownTurn(turn, float(angle), is_used, along, off_axis, is_ambiguous)

@@ -8,81 +8,43 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.errors import RefusedError
+from trihedron.records.plan import TurnPlan
 from trihedron.transforms import cross_matrix
 
 
-@dataclass(frozen=True, eq=False)
-class TurnDesign:
-    """Standard uncertainties: ``scale`` (3,) of the elements of each column of ``S_w``, ``bias`` of ``b_w``, in the
-    unit of the noise. With the noise in rad/s/√Hz, ``scale`` is relative and ``bias`` in rad/s."""
+def design_turns(
+    angles_deg: Sequence[float], turn_s: float, static_s: float, noise_density: float, sigma_turn_rad: float = 0.0
+) -> TurnPlan:
+    """The same turns about every axis, each of ``turn_s``, by rows ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i``.
 
-    scale: FloatArray
-    bias: float
-
-
-def design_least_squares(
-    axes: Sequence[int],
-    angles_rad: Sequence[float],
-    durations_s: Sequence[float],
-    static_s: float,
-    noise_density: float,
-    sigma_turn_rad: float = 0.0,
-) -> TurnDesign:
-    """All rows ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` at once: the manual's problem 4.
-
-    With ``v_i = N² Δt_i + σ_turn²``, ``Q_j = Σ φ²/v``, ``P_j = Σ φ Δt/v`` over the turns about axis j, and ``T = Σ
-    Δt²/v + Δt_0/N²``: ``var b = 1/(T - Σ_j P_j²/Q_j)`` and ``var S_j = 1/Q_j + (P_j/Q_j)² var b``. Raises
-    ``RefusedError`` when the turns do not determine an axis, or the bias is not determined.
+    With ``v = N² Δt + σ_turn²``, ``Q = Σ φ²/v``, ``P = Σ φ Δt/v`` about one axis and ``T = Σ Δt²/v + Δt_0/N²`` of all:
+    ``var S = 1/Q + (P/Q)² var b``. By all rows at once ``var b = 1/(T - 3 P²/Q)`` (the manual's problem 4); with
+    ``b_w = φ'_0/Δt_0`` from the static interval first, ``var b = N²/Δt_0`` (problem 3). With the noise in rad/s/√Hz the
+    scale is relative and the bias in rad/s. Raises ``RefusedError`` when there is no turn or a figure is not positive.
     """
     if not 1e-30 < noise_density < 1e30:
         raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
-    q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
-    information = t + static_s / noise_density**2 - float(np.sum(p**2 / q))
-    if not information > 1e-12 * (t + static_s / noise_density**2):
-        raise RefusedError("nothing determines the bias: turn there and back, or keep still for some seconds")
-    var_bias = 1.0 / information
-    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
-
-
-def design_bias_first(
-    axes: Sequence[int],
-    angles_rad: Sequence[float],
-    durations_s: Sequence[float],
-    static_s: float,
-    noise_density: float,
-    sigma_turn_rad: float = 0.0,
-) -> TurnDesign:
-    """``b_w = φ'_0/Δt_0`` from the static interval, then ``S_w`` from the turns less that bias: the manual's problem 3.
-
-    ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``. Raises
-    ``RefusedError`` when the turns do not determine an axis, or there is no static interval.
-    """
-    q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
-    if not static_s > 0.0:
-        raise RefusedError("this route needs a stretch without rotation: keep still for some seconds")
-    var_bias = noise_density**2 / static_s
-    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_bias), math.sqrt(var_bias))
-
-
-def _sums(
-    axes: Sequence[int],
-    angles_rad: Sequence[float],
-    durations_s: Sequence[float],
-    noise_density: float,
-    sigma_turn_rad: float,
-) -> tuple[FloatArray, FloatArray, float]:
-    if not noise_density > 0.0 or sigma_turn_rad < 0.0 or min(durations_s, default=0.0) <= 0.0:
+    if sigma_turn_rad < 0.0 or turn_s <= 0.0 or static_s <= 0.0:
         raise RefusedError("noise and durations must be positive")
-    which, angle, time = np.asarray(axes), np.asarray(angles_rad), np.asarray(durations_s)
-    weight = 1.0 / (noise_density**2 * time + sigma_turn_rad**2)
-    q = np.array([float(np.sum((weight * angle**2)[which == axis])) for axis in range(3)])
-    p = np.array([float(np.sum((weight * angle * time)[which == axis])) for axis in range(3)])
-    if np.any(q <= 0.0):
-        missing = " and ".join(XYZ[axis] for axis in np.flatnonzero(q <= 0.0))
-        raise RefusedError(f"no turn about {missing}: each axis needs one of its own")
-    return q, p, float(np.sum(weight * time**2))
+    angles = np.radians([angle for angle in angles_deg if angle != 0.0])
+    if not len(angles):
+        raise RefusedError("no turn about any axis: give angles other than 0")
+    weight = 1.0 / (noise_density**2 * turn_s + sigma_turn_rad**2)
+    q, p = weight * float(angles @ angles), weight * turn_s * float(np.sum(angles))
+    of_static = static_s / noise_density**2
+    bias2, bias_first2 = 1.0 / (of_static + 3.0 * (weight * turn_s**2 * len(angles) - p**2 / q)), 1.0 / of_static
+    return TurnPlan(
+        n_turns=len(angles),
+        angles_deg=tuple(float(angle) for angle in angles_deg if angle != 0.0),
+        duration_s=turn_s,
+        static_s=static_s,
+        scale=math.sqrt(1.0 / q + (p / q) ** 2 * bias2),
+        bias=math.sqrt(bias2),
+        scale_bias_first=math.sqrt(1.0 / q + (p / q) ** 2 * bias_first2),
+        bias_bias_first=math.sqrt(bias_first2),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -65,92 +64,49 @@ def _still(away: FloatArray) -> int | None:
 AT_REST = 0.75
 """LSB from the bias within which a reading at the ends of a turn is static: the code of a bias may toggle."""
 
-Group = tuple[int, float, int]
-
-
-@dataclass(frozen=True, eq=False)
-class HiddenAngles:
-    """Rounding errors: raw angle errors of ``turns`` (k, 3, m) and ``static`` (z, 3, m) per σ of m independent errors.
-
-    ``passing`` (k, 3), raw², is the variance from codes that a turn passes through, in which the errors of all readings
-    but one cancel.
-    """
-
-    turns: FloatArray
-    static: FloatArray
-    passing: FloatArray
-
-    def variance_of_turns(self) -> FloatArray:
-        """(k, 3) variance of the turns by rounding, raw²."""
-        return np.asarray(np.sum(self.turns**2, axis=2) + self.passing)
-
-    def variance_of_biases(self) -> FloatArray:
-        """(z, 3) variance of the static intervals by rounding, raw²."""
-        return np.asarray(np.sum(self.static**2, axis=2))
-
 
 def hidden_angles(
-    readings: FloatArray,
-    step_s: float,
-    quantum: FloatArray,
-    turns: Sequence[tuple[int, int]],
-    static: Sequence[tuple[int, int]],
-    raw_angle: FloatArray,
-) -> HiddenAngles | None:
-    """Angle errors of turns and static intervals by rounding to ``quantum`` (3,); ``None`` if noise dithers all axes.
+    readings: FloatArray, step_s: float, quantum: FloatArray, turns: IntArray, static: IntArray, raw_angle: FloatArray
+) -> FloatArray:
+    """(k + 1, 3, m) errors by rounding to ``quantum`` (3,): angles of turns (k, 2), rate of static intervals (z, 2),
+    raw, per σ of m independent errors; m = 0 where noise dithers all axes.
 
     While a rate stays inside an LSB its error is constant, uniform with variance q²/12: over T seconds the angle error
     is ``q T/√12`` rms. Turns about one axis in one sense with the same code may have one rate (a table's): they share
     the error, and so do all static intervals. Another code, sense or axis has an independent error: with w' = z at rest
     and z ± mω across a turn there and back, all in one code, (z, mω) is uniform on ``|z| + |mω| < q/2``, where mω has
-    the variance q²/24 that two independent errors give it.
+    the variance q²/24 that two independent errors give it. Codes that a turn passes through cancel but for one reading.
     """
-    still = np.concatenate([readings[a:b] for a, b in static])
-    axes = _undithered(still, quantum)
-    if not np.any(axes):
-        return None
+    still = np.concatenate([readings[a:b] for a, b in static.tolist()])
     rest = np.nanmedian(still, axis=0)
-    groups: dict[Group, int] = {}
-    entries: list[tuple[int, int, int, float]] = []
-    passing = np.zeros((len(turns), 3))
-    for axis in map(int, np.flatnonzero(axes)):
+    columns: dict[tuple[int, ...], FloatArray] = {}
+    for axis in np.flatnonzero(undithered_axes(quantum, np.nanstd(still, axis=0))).tolist():
         size = float(quantum[axis]) / np.sqrt(12.0)
-        for row, (a, b) in enumerate(turns):
+        at_rest = columns.setdefault((axis,), np.zeros((len(turns) + 1, 3)))
+        at_rest[-1, axis] = size
+        for row, (a, b) in enumerate(turns.tolist()):
             # Axis and sense of the turn: those of the largest raw angle.
             main = int(np.argmax(np.abs(raw_angle[row])))
             sense = (main + 1) * int(np.sign(raw_angle[row, main]))
-            for first, last, level, is_passed in _dwells(readings[a:b, axis]):
-                time = (last - first) * step_s
-                if is_passed:
-                    passing[row, axis] += (size * step_s) ** 2
-                    continue
+            for first, last, level in _dwells(readings[a:b, axis]):
                 is_end = (first == 0) != (last == b - a)
-                at_rest = is_end and abs(level - rest[axis]) < AT_REST * quantum[axis]
-                key = (axis, 0.0, 0) if at_rest else (axis, round(level / float(quantum[axis])), sense)
-                entries.append((row, axis, groups.setdefault(key, len(groups)), size * time))
-        for row, (a, b) in enumerate(static):
-            key = (axis, 0.0, 0)
-            entries.append((len(turns) + row, axis, groups.setdefault(key, len(groups)), size * (b - a) * step_s))
-    out = np.zeros((len(turns) + len(static), 3, len(groups)))
-    for row, axis, group, angle in entries:
-        out[row, axis, group] += angle
-    return HiddenAngles(out[: len(turns)], out[len(turns) :], passing)
+                is_rest = is_end and abs(level - rest[axis]) < AT_REST * quantum[axis]
+                key = (axis,) if is_rest else (axis, round(level / float(quantum[axis])), sense)
+                error = columns.setdefault(key, np.zeros((len(turns) + 1, 3)))
+                error[row, axis] += size * (last - first) * step_s
+    return np.stack(list(columns.values()), axis=2) if columns else np.zeros((len(turns) + 1, 3, 0))
 
 
-def _undithered(still: FloatArray, quantum: FloatArray) -> BoolArray:
-    """Axes (3,) whose static noise, less the variance of rounding, does not dither the LSB ``quantum`` (3,)."""
-    white = np.sqrt(np.maximum(np.nanvar(still, axis=0) - quantum**2 / 12.0, 0.0))
-    return undithered_axes(quantum, white)
-
-
-def _dwells(readings: FloatArray) -> Iterator[tuple[int, int, float, bool]]:
-    """Stretches of one code without toggling: first, last (exclusive), reading, and whether the rate passes through."""
+def _dwells(readings: FloatArray) -> Iterator[tuple[int, int, float]]:
+    """Stretches of one code without toggling, except those that the rate passes through: first, last (exclusive),
+    reading."""
     codes = _core.running_median(np.ascontiguousarray(np.where(np.isfinite(readings), readings, np.inf)), CHATTER)
     begins = np.concatenate([[0], np.flatnonzero(codes[1:] != codes[:-1]) + 1])
     ends = np.concatenate([begins[1:], [len(codes)]])
     level = codes[begins]
     with np.errstate(invalid="ignore"):
         sense = np.sign(np.diff(level))
-    for k, (first, last) in enumerate(zip(begins, ends, strict=True)):
+    for k, (first, last) in enumerate(zip(begins.tolist(), ends.tolist(), strict=True)):
         is_passed = 0 < k < len(level) - 1 and sense[k - 1] * sense[k] > 0.0
-        yield int(first), int(last), float(level[k]) if np.isfinite(level[k]) else 0.0, is_passed
+        if not is_passed:
+            yield first, last, float(level[k]) if np.isfinite(level[k]) else 0.0

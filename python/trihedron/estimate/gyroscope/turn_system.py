@@ -1,58 +1,45 @@
-"""The linear system of method 1: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` weighted by noise."""
+"""Known turns as rows of one least squares, and the errors that their readings do not show alone."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
+from trihedron.probability import MEDIAN_CHI2, chdtrc
+
+FALSE_ALARM = 1e-3
+"""False alarm rate of each kind of statistical finding on turns."""
+LARGEST_SIGMA_TURN = math.radians(20.0)
+FLATNESS_RAD, FLATNESS_SPREAD = math.radians(0.05), 0.9
+"""Prior of a face's deviation from its nominal plane, one component: 0.04 mm over 50 mm, within a factor of 2.5 either
+way (turned and moulded cases: 0.02 to 0.1°); the second is σ of the logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
 class TurnSystem:
-    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) converts their errors in rad into raw units.
+    """Turns by known ``angles`` (k, 3) [rad], and the bias as a last row, in rad by the scale ``to_rad`` (3, 3).
 
-    ``sigma_turn`` [rad] is the standard error along a turn, ``sigma_tilt`` [rad] that across it (tilt of table, case).
+    ``sigma_turn`` [rad] is the standard error along a turn, ``sigma_tilt`` that across it (tilt of table, case).
     ``sigma_directions`` (k,) [rad] is the standard error of each turn's measured axis, per component across it.
     ``faces`` (k,) is the face (±1, ±2, ±3; 0 unknown) of each turn, ``sigma_face`` [rad] the standard deviation of the
-    tilt of a face, one component, which all turns on that face share in either sense.
+    tilt of a face, one component, which all turns on that face share in either sense. ``shared`` (k, 3, m) [rad] are
+    other errors that turns share, one standard deviation each.
     """
 
     measured: MeasuredTurns
     angles: FloatArray
-    S_w: FloatArray
+    to_rad: FloatArray
+    sigma_directions: FloatArray
+    faces: IntArray
+    shared: FloatArray
     sigma_turn: float = 0.0
     sigma_tilt: float = 0.0
-    sigma_directions: FloatArray | None = None
-    faces: IntArray | None = None
     sigma_face: float = 0.0
-
-    def covariances(self) -> FloatArray:
-        """(k, 3, 3) covariance of each raw turn: rate noise ``N² Δt``, bias drift between poses, error of the turn."""
-        axis = self.axes @ self.S_w.T
-        along = (self.sigma_turn**2 - self.sigma_tilt**2) * axis[:, :, None] * axis[:, None, :]
-        covariance: FloatArray = self.noise() + along + self.sigma_tilt**2 * self.S_w @ self.S_w.T
-        if self.sigma_directions is not None:
-            across = np.eye(3) - self.axes[:, :, None] * self.axes[:, None, :]
-            size = (self.sigma_directions * np.linalg.norm(self.angles, axis=1)) ** 2
-            covariance += size[:, None, None] * (self.S_w @ across @ self.S_w.T)
-        return covariance
-
-    def factor(self, used: BoolArray) -> FloatArray:
-        """(3n, 3n) whitening matrix of the used raw turns, with the correlation by ``sigma_face``."""
-        n = int(np.count_nonzero(used))
-        covariance = np.zeros((n, 3, n, 3))
-        covariance[np.arange(n), :, np.arange(n)] = self.covariances()[used]
-        if self.faces is not None and self.sigma_face > 0.0:
-            faces, angles = self.faces[used], self.angles[used]
-            for face in set(faces[faces != 0].tolist()):
-                across = np.delete(np.eye(3), abs(face) - 1, axis=1)
-                size = np.where(faces == face, angles[:, abs(face) - 1], 0.0)
-                moved = self.sigma_face * size[:, None, None] * (self.S_w @ across)
-                covariance += np.einsum("ija,kla->ijkl", moved, moved)
-        return np.linalg.inv(np.linalg.cholesky(covariance.reshape(3 * n, 3 * n)))
 
     @property
     def axes(self) -> FloatArray:
@@ -60,126 +47,129 @@ class TurnSystem:
         size = np.linalg.norm(self.angles, axis=1, keepdims=True)
         return self.angles / np.where(size > 0.0, size, 1.0)
 
-    def noise(self) -> FloatArray:
-        """(k, 3, 3) covariance of the raw turns from the sensor alone."""
-        hidden = self.measured.hidden
-        return self._noise(self.measured.duration_s, None if hidden is None else hidden.variance_of_turns())
-
-    def noise_of_biases(self) -> FloatArray:
-        """(z, 3, 3) covariance of the raw integrals of the static intervals."""
-        hidden = self.measured.hidden
-        return self._noise(self.measured.static_duration_s, None if hidden is None else hidden.variance_of_biases())
-
-    def _noise(self, duration_s: FloatArray, rounding: FloatArray | None) -> FloatArray:
-        t = duration_s[:, None]
-        variance = self.measured.var_rate * t + self.measured.bias_spread * t**2
-        if rounding is not None:
-            variance = variance + rounding
-        return variance[:, :, None] * np.eye(3)
-
-    @staticmethod
-    def designs(angles: FloatArray, duration_s: FloatArray) -> FloatArray:
-        """(k, 3, 12) derivative of the raw turns with respect to (S_w row by row, b_w)."""
-        matrix = np.zeros((len(angles), 3, 12))
-        for i in range(3):
-            matrix[:, i, 3 * i : 3 * i + 3] = angles
-            matrix[:, i, 9 + i] = duration_s
-        return matrix
-
-    def whitened(self, used: BoolArray, with_biases: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the static intervals."""
+    def rows(self) -> KnownVectors:
+        """The k turns and the bias."""
         measured = self.measured
-        factor = self.factor(used)
-        design = factor @ self.designs(self.angles[used], measured.duration_s[used]).reshape(-1, 12)
-        side = factor @ measured.raw_angle[used].ravel()
-        if with_biases:
-            still = self.designs(np.zeros_like(measured.static_angle), measured.static_duration_s)
-            of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
-            design = np.concatenate([design, (of_biases @ still).reshape(-1, 12)])
-            side = np.concatenate([side, (of_biases @ measured.static_angle[:, :, None]).ravel()])
-        return design, side
+        time = measured.duration_s[:, None]
+        variance = np.concatenate([measured.var_rate * time + measured.bias_spread * time**2, [measured.var_bias]])
+        variance += np.sum(self._apart() ** 2, axis=2)
+        noise = self.to_rad @ (variance[:, :, None] * np.eye(3)) @ self.to_rad.T
+        along = self.axes[:, :, None] * self.axes[:, None, :]
+        across2 = self.sigma_tilt**2 + (self.sigma_directions * np.linalg.norm(self.angles, axis=1)) ** 2
+        noise[:-1] += self.sigma_turn**2 * along + across2[:, None, None] * (np.eye(3) - along)
+        of_turns = np.concatenate([self.shared, self._by_faces()], axis=2)
+        return KnownVectors(
+            raw=np.concatenate([measured.raw_angle, [measured.bias]]) @ self.to_rad.T,
+            vectors=np.concatenate([self.angles, np.zeros((1, 3))]),
+            times=np.append(measured.duration_s, 1.0),
+            noise=noise,
+            shared=np.concatenate([of_turns, np.zeros((1, *of_turns.shape[1:]))]),
+        )
 
-    def pull(self, fit: Solution, used: BoolArray, errors: FloatArray) -> FloatArray:
-        """(12, m) change of the solution by shared errors of the turns (k, 3, m), rad."""
-        matrix, _ = self.whitened(used, with_biases=False)
-        moved = (fit.S_w @ errors[used]).reshape(len(matrix), -1)
-        return fit.covariance @ matrix.T @ (self.factor(used) @ moved)
+    def _by_faces(self) -> FloatArray:
+        """(k, 3, m) changes of the turns by a standard deviation of each tilt of a face."""
+        tilts = [np.zeros((len(self.angles), 3, 0))]
+        for face in sorted(set(self.faces[self.faces != 0].tolist())) if self.sigma_face > 0.0 else []:
+            across = np.delete(np.eye(3), abs(face) - 1, axis=1)
+            size = np.where(self.faces == face, self.angles[:, abs(face) - 1], 0.0)
+            tilts.append(self.sigma_face * size[:, None, None] * across)
+        return np.concatenate(tilts, axis=2)
 
-    def correlation(self, fit: Solution, used: BoolArray) -> FloatArray:
-        """(12, 12) to add to the solution's covariance for shared rounding errors, which have independent weights."""
-        hidden = self.measured.hidden
-        if hidden is None:
-            return np.zeros((12, 12))
-        matrix, _ = self.whitened(used)
-        n = 3 * int(np.count_nonzero(used))
-        of_biases = np.linalg.inv(np.linalg.cholesky(self.noise_of_biases()))
-        errors = np.concatenate([hidden.turns[used], hidden.static])
-        # (n, 12, 3): derivative of the solution by an error of each turn or static interval.
-        pulls = matrix @ fit.covariance
-        of_turns = (self.factor(used).T @ pulls[:n]).reshape(-1, 3, 12)
-        still = np.swapaxes(of_biases, 1, 2) @ pulls[n:].reshape(-1, 3, 12)
-        gain = np.swapaxes(np.concatenate([of_turns, still]), 1, 2)
-        together = np.einsum("rjk,rkm->jm", gain, errors)
-        apart = np.einsum("rjk,rk,rlk->jl", gain, np.sum(errors**2, axis=2), gain)
-        return np.asarray(together @ together.T - apart)
+    def _apart(self) -> FloatArray:
+        """(k + 1, 3, m) errors by rounding in the weights: as if independent in every turn and interval at rest."""
+        apart = self.measured.hidden.copy()
+        apart[-1] /= math.sqrt(len(self.measured.static_rates))
+        return apart
 
-    def residuals(self, fit: Solution) -> FloatArray:
-        """(k, 3) measured minus predicted raw turns."""
-        return self.measured.raw_angle - self.angles @ fit.S_w.T - np.outer(self.measured.duration_s, fit.b_w)
+    def solve(self, used: BoolArray) -> KnownFit:
+        """Fit of the ``used`` (k,) turns and the bias."""
+        return fit_known(self.rows().of(np.append(used, True)))
+
+    def refined(self, used: BoolArray) -> TurnSystem:
+        """The system in rad by the scale of its own fit."""
+        return replace(self, to_rad=np.asarray(np.linalg.solve(self.solve(used).S_a, self.to_rad), dtype=np.float64))
+
+    def loosely(self, used: BoolArray) -> TurnSystem:
+        """The system with the scatter of turn angles from the median squared prediction error, robust to wrong ones."""
+        system = self
+        for _ in range(3):
+            error2 = system.along(system.left_out(used)[0])[used] ** 2
+            if not np.any(np.isfinite(error2)):
+                return system
+            system = system._beyond_noise(float(np.nanmedian(error2)) / MEDIAN_CHI2[1])
+        return system
+
+    def scattered(self, used: BoolArray) -> TurnSystem:
+        """The system with the scatter of turn angles by moments, where noise and tilts do not explain the residuals."""
+        system = replace(self, sigma_turn=0.0, sigma_tilt=0.0).tilted(used)
+        fit = system.solve(used)
+        if fit.dof < 1 or chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
+            return system
+        for _ in range(3):
+            error = system.along(system.residual(system.solve(used)))[used]
+            # One parameter per axis is fitted along the turns.
+            system = system._beyond_noise(float(error @ error) / max(len(error) - 3, 1)).tilted(used)
+        return system
+
+    def correlation(self, fit: KnownFit, used: BoolArray) -> FloatArray:
+        """(12, 12) to add to a fit's covariance for errors by rounding that turns share; their weights are independent.
+
+        They are uniform and equal only where the rate repeats: differences that cancel them are not to be relied on.
+        """
+        gain, rows = fit.gain() @ self.to_rad, np.append(used, True)
+        together = np.einsum("njk,nkm->jm", gain, self.measured.hidden[rows])
+        apart = gain @ self._apart()[rows]
+        return np.asarray(together @ together.T - np.einsum("njm,nlm->jl", apart, apart))
+
+    def residual(self, fit: KnownFit) -> FloatArray:
+        """(k, 3) measured minus predicted turns [rad] by the scale of the system."""
+        return self.rows().residual(fit.S_a, fit.b_a)[:-1]
+
+    def left_out(self, used: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Residual (k, 3) of each turn predicted by the others, its covariance (k, 3, 3), χ² (k,); NaN where none."""
+        residual, covariance, distance2 = self.solve(used).left_out()
+        return _spread(residual[:-1], used), _spread(covariance[:-1], used), _spread(distance2[:-1], used)
+
+    def along(self, residual: FloatArray) -> FloatArray:
+        """Components (k,) of residuals (k, 3) along the turns."""
+        return np.asarray(np.einsum("ki,ki->k", residual, self.axes))
+
+    def _beyond_noise(self, mean_square: float) -> TurnSystem:
+        beyond2 = max(mean_square - self._noise2(), 0.0)
+        return replace(self, sigma_turn=min(math.sqrt(beyond2), LARGEST_SIGMA_TURN))
+
+    def _noise2(self) -> float:
+        """Median variance of a component of a turn by noise, rad²."""
+        quiet = replace(self, sigma_directions=np.zeros(len(self.angles)), sigma_turn=0.0, sigma_tilt=0.0).rows()
+        return float(np.median(np.einsum("kii->k", quiet.noise[:-1]))) / 3.0
+
+    def tilted(self, used: BoolArray) -> TurnSystem:
+        """The system with the tilt of faces, which has a prior, and the tilt that differs from turn to turn: posterior
+        mean variances of both by restricted likelihood on a grid.
+
+        Turns on one face share its tilt, which their scatter does not show; opposite faces differ by it. With one face
+        alone the prior is kept. Where faces are unknown, every turn has its own tilt.
+        """
+        noise2 = self._noise2()
+        log_faces, log_owns, flatness = np.zeros(1), np.linspace(-2.0, 7.0, 7), 0.0
+        if np.all(self.faces[used] != 0):
+            log_faces, flatness = np.linspace(-3.0, 3.0, 9) * FLATNESS_SPREAD, FLATNESS_RAD
+        log_weights = np.empty((len(log_faces), len(log_owns)))
+        for i, log_face in enumerate(log_faces):
+            for j, log_own in enumerate(log_owns):
+                own = math.sqrt(noise2) * math.exp(log_own)
+                tried = replace(self, sigma_face=flatness * math.exp(log_face), sigma_tilt=own)
+                prior = -0.5 * (log_face / FLATNESS_SPREAD) ** 2 + log_own - math.log1p(math.exp(2.0 * log_own))
+                log_weights[i, j] = prior + tried.solve(used).log_likelihood
+        weights = np.exp(log_weights - log_weights.max())
+        weights /= weights.sum()
+        face2 = float(weights.sum(axis=1) @ np.exp(2.0 * log_faces)) * flatness**2
+        own2 = float(weights.sum(axis=0) @ np.exp(2.0 * log_owns)) * noise2
+        return replace(self, sigma_face=math.sqrt(face2), sigma_tilt=math.sqrt(own2))
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Inverse form ``S_w``, ``b_w``, its covariance (12, 12) for the stated noise, χ² and degrees of freedom."""
-
-    S_w: FloatArray
-    b_w: FloatArray
-    covariance: FloatArray
-    chi2: float
-    dof: int
-
-
-def solve(system: TurnSystem, used: BoolArray) -> Solution:
-    """Weighted least squares over turns and static intervals at once."""
-    matrix, side = system.whitened(used)
-    size = np.linalg.norm(matrix, axis=0)
-    q, r = np.linalg.qr(matrix / size)
-    inverse = np.linalg.inv(r)
-    solution = (inverse @ (q.T @ side)) / size
-    covariance = (inverse @ inverse.T) / np.outer(size, size)
-    chi2 = float(np.sum((side - matrix @ solution) ** 2))
-    return Solution(solution[:9].reshape(3, 3), solution[9:], covariance, chi2, len(side) - 12)
-
-
-@dataclass(frozen=True, eq=False)
-class LeftOut:
-    """Turns predicted by all others: raw ``residual`` (k, 3), its ``covariance`` (k, 3, 3), ``distance2`` (k,).
-
-    NaN where the others do not determine the prediction, and for turns that are not used.
-    """
-
-    residual: FloatArray
-    covariance: FloatArray
-    distance2: FloatArray
-
-
-def left_out(system: TurnSystem, used: BoolArray) -> LeftOut:
-    """Leave-one-out prediction in closed form: ``r₋ᵢ = (Pᵢᵢ)⁻¹ (P y)ᵢ`` with ``P = V⁻¹ − V⁻¹X(XᵀV⁻¹X)⁻¹XᵀV⁻¹``."""
-    k, n = len(used), 3 * int(np.count_nonzero(used))
-    out = LeftOut(np.full((k, 3), np.nan), np.full((k, 3, 3), np.nan), np.full(k, np.nan))
-    matrix, side = system.whitened(used)
-    fit = solve(system, used)
-    factor = system.factor(used)
-    residual = (side - matrix @ np.concatenate([fit.S_w.ravel(), fit.b_w]))[:n]
-    projected = factor.T @ (np.eye(n) - matrix[:n] @ fit.covariance @ matrix[:n].T) @ factor
-    told = factor.T @ residual
-    sizes = np.linalg.cholesky(system.covariances())
-    for row, index in enumerate(np.flatnonzero(used)):
-        block = slice(3 * row, 3 * row + 3)
-        remaining = projected[block, block]
-        if np.linalg.eigvalsh(sizes[index].T @ remaining @ sizes[index])[0] < 1e-6:
-            continue
-        out.covariance[index] = np.linalg.inv(remaining)
-        out.residual[index] = out.covariance[index] @ told[block]
-        out.distance2[index] = float(told[block] @ out.residual[index])
+def _spread(values: FloatArray, used: BoolArray) -> FloatArray:
+    """Values of the ``used`` (k,) turns as values of all; NaN for the others."""
+    out = np.full((len(used), *values.shape[1:]), np.nan)
+    out[used] = values
     return out

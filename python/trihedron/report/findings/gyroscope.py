@@ -165,10 +165,10 @@ _TURNS = {
         "Repeat the turns against a wall.",
     ),
     (Code.GYRO_BIAS_DRIFT, "turns", NOTE): Words(
-        "the gyro's bias changes between poses by {times:.1f} times its noise ({axis:axis}).",
+        "the gyro's bias changes between poses by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times its "
+        "noise.",
         _BIAS_CHANGES,
         "Let the sensor warm up; keep still before and after every turn.",
-        numbers=("chi2_per_dof",),
     ),
 }
 
