@@ -117,7 +117,6 @@ _OF_THE_LINEAR_FIT = (
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
     FindingCode.NONLINEAR_RESIDUAL,
-    FindingCode.JOINT_FIT_LEFT,
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.GYRO_BIAS_DRIFT,
     FindingCode.LOSSES_POSSIBLE,

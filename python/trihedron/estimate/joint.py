@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from trihedron import probability
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.session.carried import norm_quality
 from trihedron.estimate.session.fit import SessionSolution
@@ -15,27 +14,6 @@ from trihedron.records.calibration import Calibration, FitQuality, SensorCalibra
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-
-FALSE_ALARM = 1e-3
-"""Probability that the moves of a sound recording are found to contradict its poses."""
-
-
-def pull_allowed(alone: SensorCalibration) -> float:
-    """Limit of :func:`pull_on_accelerometer`: χ² with 9 degrees of freedom; F where the norms exceed their noise."""
-    quality = alone.quality
-    if quality is None or quality.dof < 1 or probability.chdtrc(quality.dof, quality.chi2) >= 0.01:
-        return float(probability.chdtri(9, FALSE_ALARM))
-    return float(9.0 * quality.chi2 / quality.dof * probability.fdtri(9, quality.dof, 1.0 - FALSE_ALARM))
-
-
-def pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """Increase of χ² of the poses' norms by the moves: χ² with at most 9 degrees of freedom if both agree.
-
-    Bias drift raises χ² without a contradiction: the increase is divided by the joint fit's ``covariance_scale``.
-    """
-    if alone.quality is None or joint.quality is None:
-        return 0.0
-    return (joint.quality.chi2 - alone.quality.chi2) / joint.quality.covariance_scale
 
 
 def calibrate_joint(

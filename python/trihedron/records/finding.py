@@ -94,7 +94,6 @@ class FindingCode(str, Enum):
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     GYRO_G_SENSITIVITY = "gyro-g-sensitivity"
     NOT_CONVERGED = "not-converged"
-    JOINT_FIT_LEFT = "joint-fit-left"
     TURNTABLE = "turntable"
     GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
     # diagnose, extended calibration

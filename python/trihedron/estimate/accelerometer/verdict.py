@@ -101,7 +101,7 @@ def _unseen(design: PoseDesign) -> list[str]:
 
 
 def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: FloatArray, dof: int) -> list[Finding]:
-    """Findings for outlier poses (externally studentised, Bonferroni), or for held-out residuals above uncertainty."""
+    """Findings for outlier poses (externally studentised, Bonferroni)."""
     seen = np.isfinite(held_out)
     n = int(seen.sum())
     if n == 0 or dof < 2:
@@ -110,15 +110,10 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     z = np.zeros(len(held_out))
     z[seen] = held_out[seen] / (sigma[seen] * spread[seen])
     limit = float(-probability.stdtrit(dof - 1, SIGNIFICANCE / (2 * n)))
-    found = [
+    return [
         Finding.of(FindingCode.OUTLIER_POSE, pose=int(i) + 1, held_out_m_s2=held_out[i], z=z[i], limit=limit)
         for i in np.flatnonzero(np.abs(z) > limit)
     ]
-    mean_square = float(np.mean(z[seen] ** 2))
-    # Held-out z are correlated (shared training poses) and heavy-tailed (Student's t): the factor 2 covers both.
-    if not found and n >= 12 and mean_square > 2.0 * probability.chdtri(n, SIGNIFICANCE) / n:
-        found.append(Finding.of(FindingCode.HELD_OUT_WORSE, "poses", held_out_z_rms=np.sqrt(mean_square)))
-    return found
 
 
 def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known: bool) -> Iterator[Finding]:

@@ -52,11 +52,6 @@ ENTRIES = {
         "The sensor was touched or not still in this pose, or a reading clipped.",
         "Exclude the pose, or use a robust loss (--loss).",
     ),
-    (Code.HELD_OUT_WORSE, "poses", WARNING): Words(
-        "Cross-validated poses have {held_out_z_rms:.2g} times their predicted error.",
-        "The fit follows its own poses too closely: too few of them, or an effect that a linear model does not have.",
-        "Record more poses; see `trihedron diagnose`.",
-    ),
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_cubic:?a cubic nonlinearity|{is_quadratic:?a quadratic "
         "nonlinearity|a scale that differs between + and -}} (p = {p:.1g}): S and b are off by up to "

@@ -15,14 +15,6 @@ _CALIBRATE = {
         "Neither --gravity nor --latitude was given.",
         "Give --latitude DEG (and --height M), or --gravity M_S2.",
     ),
-    (Code.JOINT_FIT_LEFT, "", NOTE): Words(
-        "The moves contradict the poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
-        "explains 28); the accelerometer was therefore fitted to the poses alone, and the gyro to the moves with "
-        "that accelerometer.",
-        "An effect in the moves that the model does not have, which one fit of both would spread over the "
-        "accelerometer.",
-        "Use --method separate to choose this from the start.",
-    ),
     (Code.TURN_ANGLE_UNKNOWN, "", SERIOUS): Words(
         "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
         "Give the angles with --turns.",
