@@ -205,6 +205,6 @@ def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(true, bel
 )
 def test_malformed_questions_are_refused_in_plain_words(change, message):
     table, readings, start, pose = article_readings(14, ARTICLE_MIX)
-    asked = {"readings": readings, "references": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
+    asked = {"readings": readings, "table": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
     with pytest.raises(ValueError, match=message):
         calibrate_with_references(**asked)

@@ -32,7 +32,7 @@ def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, A
 
 def calibrate_with_references(
     readings: npt.ArrayLike,
-    references: PoseTable | npt.ArrayLike,
+    table: PoseTable,
     noise: AxisNoise | Sequence[AxisNoise],
     *,
     start_s: npt.ArrayLike,
@@ -42,14 +42,13 @@ def calibrate_with_references(
 ) -> KalmanCalibration:
     """Calibrate a triad from mean readings in known attitudes, by all methods after every pose (docs/kalman.md, eq. 2).
 
-    ``readings`` (n, 3) are the mean raw readings of the poses, ``references`` a table or the specific force (n, 3) in
-    the body [m/s²], ``noise`` that of one axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start
-    and length of the poses [s], ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model.
+    ``readings`` (n, 3) are the mean raw readings of the poses in the attitudes of the ``table``, ``noise`` that of one
+    axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start and length of the poses [s],
+    ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model.
 
     Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
     constants.
     """
-    table = references if isinstance(references, PoseTable) else PoseTable(np.asarray(references, dtype=np.float64))
     f = table.specific_force
     z = np.array(readings, dtype=np.float64)
     if z.shape != f.shape:
