@@ -86,11 +86,11 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
     likeness: dict[Sensor, float] = {}
-    both = ((recording.accelerometer, model.accel_S), (recording.gyroscope, model.gyro_S))
-    for sensor, (readings, S) in zip(SENSORS, both, strict=True):
-        if readings is None or S is None:
+    for sensor in SENSORS:
+        readings, fitted = getattr(recording, sensor), getattr(model, sensor)
+        if readings is None or fitted is None:
             continue
-        si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
+        si = readings / np.linalg.norm(np.linalg.inv(fitted.S), axis=1)
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except REFUSALS:

@@ -27,7 +27,7 @@ from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
-from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
+from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
 from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
@@ -122,11 +122,12 @@ def _diagnosed(
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
-    start = start_state(obs, calibration)
+    begin = calibration
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
-        start, prior = nominal_start(obs, calibration)
-    run = _run(obs, start, prior, alpha, tell)
+        begin = nominal(recording, segments, (calibration.gravity_m_s2, calibration.gravity_source))
+        prior = prior_of(obs, begin, is_weak=True)
+    run = _run(obs, start_state(obs, begin), prior, alpha, tell)
     answer = run.answer
     model = answer.found.model
     relations = records(answer.found.related)

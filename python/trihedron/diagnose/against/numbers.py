@@ -14,19 +14,11 @@ from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.diagnose.against.fitted import FittedModel
-from trihedron.invariants import (
-    PAIRS,
-    Invariants,
-    invariants,
-    jacobian,
-    rotation_vector,
-    triad_jacobian,
-    triad_rotation,
-)
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
+from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import ParameterDifference
 from trihedron.records.words import words
-from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
 
@@ -167,60 +159,35 @@ def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One sensor of one fitted model: S, b, their covariance (12, 12), SI per reading where its unit states it, and
-    the variance (3,) of the bias between sessions."""
-
-    S: FloatArray
-    b: FloatArray
-    raw_unit: str
-    covariance: FloatArray
-    si: float | None
-    drift: FloatArray
-
-    @property
-    def spread(self) -> FloatArray:
-        """(9, 9) covariance of the invariants."""
-        J = jacobian(self.S, self.b)
-        return np.asarray(J @ self.covariance @ J.T)
-
-
-def _sides(model: FittedModel) -> tuple[_Side, _Side | None]:
-    """The accelerometer, and the gyro where there is one."""
-    C, unit = model.covariance, model.accel_unit
-    known = acceleration_to_si(AccelerationUnit(unit))
-    accel = _Side(model.accel_S, model.accel_b, unit, C[:12, :12], known, model.accel_bias_drift)
-    if model.gyro_S is None or model.gyro_b is None:
-        return accel, None
-    unit = model.gyro_unit
-    known = rate_to_si(RateUnit(unit))
-    return accel, _Side(model.gyro_S, model.gyro_b, unit, C[12:, 12:], known, model.gyro_bias_drift)
-
-
 def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[CommonFactor, ...]]:
-    groups: list[_Group] = []
-    factors: list[CommonFactor] = []
-    prefixes: tuple[Literal["accel", "gyro"], ...] = ("accel", "gyro")
-    for prefix, given, seen in zip(prefixes, _sides(model), _sides(recording), strict=True):
-        if given is not None and seen is not None:
-            more, factor = _sensor(prefix, given, seen)
-            groups += more
-            factors += [factor] if factor else []
-            groups += [_triads(model, recording)] if prefix == "gyro" else []
-    return groups, tuple(factors)
+    C_m, C_r = model.covariance, recording.covariance
+    groups, factor = _sensor("accel", (model.accelerometer, C_m[:12, :12]), (recording.accelerometer, C_r[:12, :12]))
+    factors = [factor]
+    if model.gyroscope is not None and recording.gyroscope is not None:
+        more, factor = _sensor("gyro", (model.gyroscope, C_m[12:, 12:]), (recording.gyroscope, C_r[12:, 12:]))
+        groups += [
+            *more,
+            _triads((model.accelerometer, model.gyroscope, C_m), (recording.accelerometer, recording.gyroscope, C_r)),
+        ]
+        factors.append(factor)
+    return groups, tuple(one for one in factors if one is not None)
 
 
-def _sensor(prefix: Literal["accel", "gyro"], given: _Side, seen: _Side) -> tuple[list[_Group], CommonFactor | None]:
-    """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised."""
+def _sensor(
+    prefix: Literal["accel", "gyro"], model: tuple[FittedSensor, FloatArray], recording: tuple[FittedSensor, FloatArray]
+) -> tuple[list[_Group], CommonFactor | None]:
+    """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised; both
+    sides with the covariance (12, 12) of S and b."""
+    (given, C_given), (seen, C_seen) = model, recording
     a, r, units = invariants(given.S, given.b), invariants(seen.S, seen.b), (given.si, seen.si)
-    covariance = given.spread + seen.spread
+    spread = given.spread(C_given)
+    covariance = spread + seen.spread(C_seen)
     # A calibration file has no bias change between sessions: that of the recording is used.
     before = given.drift if np.any(given.drift) else seen.drift
     covariance[:3, :3] += np.diag(before + seen.drift)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
-    log_m, log_r, is_relative = _log_scales(a, r, units, given.raw_unit == seen.raw_unit)
+    log_m, log_r, is_relative = _log_scales(a, r, units, given.unit == seen.unit)
     common = _common_factor(sensor, log_r - log_m, _sizes_in_si(a, r, units))
     if common is not None:
         log_m = log_m + math.log(common.factor)
@@ -233,7 +200,7 @@ def _sensor(prefix: Literal["accel", "gyro"], given: _Side, seen: _Side) -> tupl
     # S is SI per raw unit: a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
         _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
-               _never_added(prefix, a.bias, r.bias, given.spread, given.drift)),
+               _never_added(prefix, a.bias, r.bias, spread, given.drift)),
         _Group(
             f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), log_r - log_m, of_scale, "1",
             remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
@@ -298,15 +265,14 @@ def _log_scales(
     return a.log_scale - a.log_scale.mean(), r.log_scale - r.log_scale.mean(), True
 
 
-def _triads(model: FittedModel, recording: FittedModel) -> _Group:
-    """The rotation of the gyro triad against the accelerometer triad: ``log(R_r R_mᵀ)``."""
-    assert model.gyro_S is not None
-    assert recording.gyro_S is not None
+def _triads(*sides: tuple[FittedSensor, FittedSensor, FloatArray]) -> _Group:
+    """The rotation of the gyro triad against the accelerometer triad: ``log(R_r R_mᵀ)``; ``sides`` model, recording."""
     zero = np.zeros(3)
-    pairs = ((model.accel_S, model.gyro_S), (recording.accel_S, recording.gyro_S))
-    turned = [triad_rotation(invariants(accel, zero), invariants(gyro, zero)) for accel, gyro in pairs]
-    J_m, J_r = (triad_jacobian(*pair) for pair in pairs)
-    covariance = J_m @ model.covariance @ J_m.T + J_r @ recording.covariance @ J_r.T
+    turned = [triad_rotation(invariants(accel.S, zero), invariants(gyro.S, zero)) for accel, gyro, _ in sides]
+    covariance = np.zeros((3, 3))
+    for accel, gyro, of_both in sides:
+        J = triad_jacobian(accel.S, gyro.S)
+        covariance += J @ of_both @ J.T
     difference = rotation_vector(turned[1] @ turned[0].T)
     before, after = rotation_vector(turned[0]), rotation_vector(turned[1])
     return _Group("triad-alignment", "both", AXES, before, after, difference, covariance, "rad")

@@ -40,8 +40,6 @@ def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> Floa
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep undetermined directions finite and belong to no domain."""
 
-_LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
-
 
 @dataclass(frozen=True, eq=False)
 class Prior:
