@@ -28,7 +28,7 @@ from trihedron.diagnose.search import Found, search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
-from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
@@ -36,6 +36,7 @@ from trihedron.records.diagnosis import Candidate, Diagnosis, Verdict
 from trihedron.records.domains import DomainTest, Where
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
+from trihedron.session.model import Prior, SessionState
 from trihedron.session.noise import Strengths
 
 FEWEST_RECORDINGS = 2

@@ -14,17 +14,9 @@ from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
-from trihedron.diagnose.session.state import (
-    Distortion,
-    Prior,
-    SessionState,
-    contiguous,
-    core_model,
-    core_state,
-    stacked,
-    state_of,
-)
+from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
+from trihedron.session.model import Prior, SessionState, contiguous, core_state, state_of
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 from trihedron.threads import side_by_side
 
@@ -158,7 +150,7 @@ def hypothesis(
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
-    core = core_model(obs, start.gravity, prior, is_scatter_free=True).fit(
+    core = obs.model(start.gravity, prior, is_scatter_free=True).fit(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
     )  # fmt: skip

@@ -13,8 +13,9 @@ from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, Prior, SessionState
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records.diagnosis import Candidate
+from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState
 
 VISIBLE = 0.98
 """A correction of the readings must lower the held-out misfit of some domain by at least this factor."""

@@ -14,10 +14,11 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_r
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
-from trihedron.diagnose.session.state import NO_DISTORTION, STATIC_ACCEL
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
+from trihedron.session.model import STATIC_ACCEL
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""

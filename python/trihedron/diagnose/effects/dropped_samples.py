@@ -15,10 +15,11 @@ from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.effects.lost_samples import Loss, bridge, find_losses, hidden_losses, most_lost, residual_after
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
+from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.session.model import Prior, SessionState
 
 CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from zero."""

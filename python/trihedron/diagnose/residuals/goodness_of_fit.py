@@ -11,9 +11,9 @@ from scipy.special import fdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.probability import f_upper
 from trihedron.records.domains import Domain, DomainTest, Where
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.session.noise import NOISE_CORNER_S
 
 ROW_DOMAINS: dict[int, Domain] = {

@@ -15,7 +15,8 @@ from trihedron.errors import RefusedError
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.lines_at_rest import means_beside_lines
-from trihedron.session.noise import Along, along_gradient, measure_noise
+from trihedron.session.model import Prior, SessionReadings
+from trihedron.session.noise import along_gradient, measure_noise
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
@@ -24,25 +25,22 @@ LONGEST_MOVE_S = 180.0
 """Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
 
-@dataclass(frozen=True, eq=False)
-class Observations:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Observations(SessionReadings):
     """Raw readings of one recording, centred, with the layout of its poses and moves.
 
     ``segments`` has its poses cut at disturbances, ``whole`` as they were found.
-    ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
-    the poses): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
-    the centred pose means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
-    half-open sample ranges that include the last sample of the pose before and the first of the pose after, so that
-    static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and ``rate_density``
-    (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sampling instants about their timestamps,
-    once a diagnosis has found it; ``disturbed_s`` are disturbed intervals of poses, s.
+    ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin``, the means over
+    the poses. ``move_ranges`` are half-open sample ranges that include the last sample of the pose before and the first
+    of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
+    is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
+    disturbed intervals of poses, s.
     ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
     ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
     ``pose_rate_sigma``.
-    ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    and ``rate_scatter`` are the bias scatter that 1/f noise explains, raw; ``averaging`` is the share of the sample
-    interval that the sensors average over (0 to 1).
+    ``rate_scatter`` is the gyro bias scatter that 1/f noise explains; ``averaging`` is the share of the sample interval
+    that the sensors average over (0 to 1).
     """
 
     recording: Recording
@@ -51,30 +49,14 @@ class Observations:
     time_s: FloatArray
     raw_force: FloatArray
     raw_rate: FloatArray | None
-    force_origin: FloatArray
-    rate_origin: FloatArray
-    pose_force: FloatArray
-    pose_rate: FloatArray | None
-    pose_force_sigma: FloatArray
-    pose_rate_sigma: FloatArray | None
-    pose_time_s: FloatArray
     move_ranges: tuple[tuple[int, int], ...]
     move_poses: npt.NDArray[np.intp]
-    force_density: FloatArray
-    rate_density: FloatArray | None
     jitter_s: float = 0.0
     disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     pose_settling: FloatArray | None = None
-    force_up: Along | None = None
-    force_scatter: float = 0.0
     rate_scatter: float = 0.0
     averaging: float = 0.0
-
-    @property
-    def n_poses(self) -> int:
-        """Number of poses."""
-        return len(self.pose_force)
 
     @property
     def n_moves(self) -> int:
@@ -156,6 +138,11 @@ class Observations:
             away = away - away.mean(axis=0)
             out[i] = away.T @ away / len(away)
         return out
+
+    def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
+        """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""
+        timing_s = float(self.jitter_s), 1.0 / self.recording.rate_hz
+        return self.core_model(gravity_m_s2, self.core_moves, timing_s, prior, is_scatter_free=is_scatter_free)
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:

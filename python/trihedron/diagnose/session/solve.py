@@ -14,17 +14,15 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import (
+from trihedron.diagnose.session.state import Distortion
+from trihedron.session.model import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,
     STATIC_GYRO,
-    Distortion,
     Prior,
     SessionState,
     contiguous,
-    core_model,
-    core_poses,
     core_state,
     state_of,
 )
@@ -104,7 +102,7 @@ class Fit:
     @property
     def accel_white(self) -> FloatArray:
         """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
-        return core_poses(self.obs).force_white() @ np.linalg.inv(self.state.accel_S)
+        return self.obs.core_poses().force_white() @ np.linalg.inv(self.state.accel_S)
 
     @property
     def gyro_white(self) -> FloatArray | None:
@@ -128,7 +126,7 @@ class Fit:
         """
         core = self.core
         if not self.has_free_strengths:
-            core = core_model(self.obs, self.state.gravity, self.prior, is_scatter_free=True).fit(
+            core = self.obs.model(self.state.gravity, self.prior, is_scatter_free=True).fit(
                 state=core_state(self.state), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
                 force_effect=contiguous(self.distortion.force), rate_effect=contiguous(self.distortion.rate),
             )  # fmt: skip
@@ -146,7 +144,7 @@ def fit(
     """Gauss-Newton on every row to convergence, noise corners as in ``start`` (eq. 11.9), or free ``within`` bounds."""
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
-    core = core_model(obs, start.gravity, prior).fit(
+    core = obs.model(start.gravity, prior).fit(
         state=core_state(start), strengths=(start.strengths[0], *START_STRENGTHS[1:]),
         force_effect=contiguous(distortion.force), rate_effect=contiguous(distortion.rate), within=within,
     )  # fmt: skip
@@ -160,12 +158,12 @@ def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, p
 
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
     """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
-    return np.asarray(core_model(obs, state.gravity, None).move_residuals(core_state(state)))
+    return np.asarray(obs.model(state.gravity, None).move_residuals(core_state(state)))
 
 
 def wrt_lost_time(obs: Observations, state: SessionState, m: int) -> FloatArray:
     """(samples, 5) derivatives of the residuals after move m by time [s] lost at each of its samples."""
-    return core_model(obs, state.gravity, None).wrt_lost_time(core_state(state), m)
+    return obs.model(state.gravity, None).wrt_lost_time(core_state(state), m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.state import Prior, SessionState
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import LinearModel
 from trihedron.sensor_model import in_frame
+from trihedron.session.model import LOWER, Prior, SessionState
 from trihedron.units import acceleration_to_si, rate_to_si
 
 OPEN_BIAS_M_S2, OPEN_SCALE = 0.3, 0.03
@@ -24,8 +24,6 @@ LEAST_ANGLE_RAD = 0.5
 """Angle between two verticals from which a move determines the gyro scale: errors of 1° each make it 5 % at worst."""
 PUBLISHED_DIGITS = 1e-6
 """Relative standard uncertainty of a calibration published without one: its last printed digits."""
-_LOWER = np.flatnonzero(np.tril(np.ones((3, 3))))
-"""Places of a lower-triangular S among its nine elements, row by row."""
 
 
 def start_state(obs: Observations, calibration: Calibration) -> SessionState:
@@ -33,17 +31,14 @@ def start_state(obs: Observations, calibration: Calibration) -> SessionState:
     lower = in_frame(calibration, "lower")
     accel_S, gyro_S = lower.accelerometer.S, np.eye(3) if lower.gyroscope is None else lower.gyroscope.S
     accel_b = lower.accelerometer.b + accel_S @ obs.force_origin
-    force, none = obs.pose_force @ accel_S.T + accel_b, np.zeros((obs.n_poses, 3))
-    up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    bias = none if obs.pose_rate is None else obs.pose_rate @ gyro_S.T
-    return SessionState(calibration.gravity_m_s2, accel_S, accel_b, gyro_S, up, bias, none, np.zeros(0))
+    return obs.at_means(calibration.gravity_m_s2, accel_S, accel_b, gyro_S)
 
 
 def prior_of(obs: Observations, calibration: Calibration, *, is_weak: bool = False) -> Prior:
     """A calibration as a prior on the 18 unknowns, in the lower frame on centred readings."""
     lower = in_frame(calibration, "lower")
     to_unknowns = np.zeros((18, 24))
-    to_unknowns[:6, :9] = np.eye(9)[_LOWER]
+    to_unknowns[:6, :9] = np.eye(9).reshape(3, 3, 9)[LOWER]
     to_unknowns[6:9, :9] = np.kron(np.eye(3), obs.force_origin)  # b' = b + S origin
     to_unknowns[6:9, 9:12] = np.eye(3)
     to_unknowns[9:, 12:21] = np.eye(9)

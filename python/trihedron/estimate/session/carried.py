@@ -14,11 +14,12 @@ from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import Calibration, FitQuality
 from trihedron.records.segments import Segments
 from trihedron.session.averaging import sharpened
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
 
 N_GYROSCOPE = 9
@@ -70,7 +71,7 @@ def held_out(
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
-    is_pose = is_reading & (labels[:, 0] == STATIC_FORCE)
+    is_pose = is_reading & (labels[:, 0] == STATIC_ACCEL)
     is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
     is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
     rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
