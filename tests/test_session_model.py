@@ -9,7 +9,6 @@ from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
@@ -33,7 +32,7 @@ def fitted_to(recording, gravity):
     )
     calibration = calibrate_joint(recording, segments, accelerometer, gravity, "test")
     obs = observe(recording, segments)
-    return tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None), calibration
+    return tune_noise(obs, start_state(obs, calibration), None), calibration
 
 
 def scattered(readings, segments, sigma_raw, rng):

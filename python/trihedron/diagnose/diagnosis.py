@@ -28,7 +28,6 @@ from trihedron.diagnose.search import Found, search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
-from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
@@ -183,7 +182,7 @@ class _Run:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior, alpha)
+    predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
     context = Context(predicted.obs, predicted)
     tell(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
@@ -214,7 +213,7 @@ LOUD: Strengths = ((2.0, 2.0), (5.0,) * 4, (1.0, 1.0), (5.0, 5.0))
 
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    first = hypothesis(observed.obs, replace(observed.fitted.state, effect=np.zeros(0)), prior)
+    first = hypothesis(observed.obs, observed.fitted.state, prior)
     # Two starts, low and high noise strengths: the evidence may have an optimum at each.
     loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
@@ -227,7 +226,7 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
     found = settling(context)
     if found.score < threshold(alpha):
         return predicted
-    return tune_noise(with_settling(context, found), start, NO_DISTORTION, prior)
+    return tune_noise(with_settling(context, found), start, prior)
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:

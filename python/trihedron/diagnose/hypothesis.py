@@ -13,10 +13,10 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
+from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
 from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
-from trihedron.session.model import Prior, SessionState, contiguous, core_state, state_of
+from trihedron.session.model import Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 from trihedron.threads import side_by_side
 
@@ -150,11 +150,7 @@ def hypothesis(
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
-    core = obs.model(start.gravity, prior, is_scatter_free=True).fit(
-        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
-    )  # fmt: skip
-    fitted = Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths=True)
+    fitted = solved(obs, start, prior, distortion, strengths, within, sizes, has_free_strengths=True)
     return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 

@@ -13,7 +13,6 @@ from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState
 
@@ -89,7 +88,7 @@ def _with_one(
         found = [*(one.evidence for one in observed.seen), evidence]
         obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
-        fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
+        fitted = tune_noise(obs, begin, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})
         gain = _explained(observed.fitted, fitted)

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
+from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -95,7 +96,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if k < len(sigmas):
-            halves, lasts = _second_halves_minus_first(readings, spans), np.diff(spans, axis=1)[:, 0] * step_s
+            halves, lasts = _steps(readings, spans, np.eye(3)[None], 2)[:, 0], np.diff(spans, axis=1)[:, 0] * step_s
             variances[:, k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
@@ -120,14 +121,6 @@ def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray)
     return np.asarray(np.sqrt(np.where(known, (across**2 * sigma**2).sum(axis=1) + own, plain)))
 
 
-def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatArray:
-    """(n, 3) differences of the means of the two halves of every span (n, 2)."""
-    middle = spans[:, 0] + (spans[:, 1] - spans[:, 0] + 1) // 2
-    halves = np.column_stack([spans[:, 0], middle, middle, spans[:, 1]]).reshape(-1, 2)
-    means, _ = _core.means_by_owner(readings, halves, np.arange(len(halves)), len(halves))
-    return means[1::2] - means[::2]
-
-
 def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
     """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
 
@@ -145,9 +138,9 @@ def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: 
 
 # Slow noise of the sensors inside moves, estimated from the poses (eq. 8.2b).
 
-QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
-"""Quantile over the poses of the change between halves, and that quantile of |x| for a normal x: slow noise is in all
-poses alike, a bias that jumps only in some."""
+QUIET = 0.3
+"""Quantile over the poses of the change between halves: slow noise is in all poses alike, a bias that jumps only in
+some."""
 MAY_EXCEED = 2.5
 """Largest ratio of the colour of all poses to that of the quiet ones, whose quantile is good to a factor of two."""
 
@@ -169,7 +162,7 @@ def coloured_variance(
     (poses, 3) the mean of every pose's second half minus that of its first, ``density`` (3,) white noise per √Hz; raw.
     """
     white = density / np.sqrt(pose_duration_s)[:, None]
-    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
+    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * ndtri(0.5 + 0.5 * QUIET))) ** 2
     pooled = medians((pose_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     return np.outer(move_duration_s, (colour - 1.0) * density**2)
@@ -181,8 +174,6 @@ PARTS = 8
 """Parts of a pose: neighbouring ones differ by white noise, its halves by white noise and flicker."""
 FEWEST_POSES = 6
 FEWEST_READINGS = 4 * PARTS
-MEDIAN_OF_SQUARE = 0.4549
-"""Median of a standard normal's square."""
 FAR = 9.0
 """Squares beyond so many variances are disturbances by hand, not noise."""
 SEEN = 1.0
@@ -202,9 +193,7 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
     if np.count_nonzero(usable) < FEWEST_POSES:
         return 0.0
     spans, size, up = spans[usable], size[usable], up[usable]
-    halves = _steps(readings, spans, up[:, None, :], 2)
-    parts = _steps(readings, spans, up[:, None, :], PARTS)
-    return float(_between_poses(halves, parts, spans)[0])
+    return float(_between_poses(*(_steps(readings, spans, up[:, None, :], n) for n in (2, PARTS)), spans)[0])
 
 
 def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
@@ -212,8 +201,7 @@ def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
     spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
     if len(spans) < FEWEST_POSES:
         return 0.0
-    axes = np.broadcast_to(np.eye(3), (len(spans), 3, 3))
-    found = _between_poses(_steps(readings, spans, axes, 2), _steps(readings, spans, axes, PARTS), spans)
+    found = _between_poses(*(_steps(readings, spans, np.eye(3)[None], n) for n in (2, PARTS)), spans)
     return float(np.sqrt(np.mean(found**2)))
 
 
@@ -234,14 +222,15 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> Fl
 
 
 def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> FloatArray:
-    """(h, n - 1, k) differences of the means of ``n`` neighbouring parts of every pose along directions (h, k, 3)."""
+    """(h, n - 1, k) differences of the means of ``n`` neighbouring parts of every pose along directions (h, k, 3), or
+    along those of one (1, k, 3) for all."""
     edges = spans[:, :1] + (spans[:, 1:] - spans[:, :1]) * np.arange(n + 1) // n
     ranges = np.stack([edges[:, :-1], edges[:, 1:]], axis=2).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, ranges, np.arange(len(ranges)), len(ranges))
-    return np.diff(np.einsum("hnc,hkc->hnk", means.reshape(len(spans), n, 3), along), axis=1)
+    return np.diff(means.reshape(len(spans), n, 3) @ np.swapaxes(along, 1, 2), axis=1)
 
 
 def _mean_square(x: FloatArray) -> float:
     squares = x**2
-    near = squares <= FAR * np.median(squares) / MEDIAN_OF_SQUARE
+    near = squares <= FAR * np.median(squares) / MEDIAN_CHI2[1]
     return float(np.mean(squares[near]))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.state import NO_DISTORTION, Distortion
 from trihedron.session.model import (
     DYNAMICS,
     MOVES,
@@ -26,7 +26,7 @@ from trihedron.session.model import (
     core_state,
     state_of,
 )
-from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
+from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds, Strengths
 
 FOLDS = 8
 """Blocks of poses, and of moves, that are held out in turn."""
@@ -124,36 +124,46 @@ class Fit:
 
         It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
-        core = self.core
+        free = self
         if not self.has_free_strengths:
-            core = self.obs.model(self.state.gravity, self.prior, is_scatter_free=True).fit(
-                state=core_state(self.state), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
-                force_effect=contiguous(self.distortion.force), rate_effect=contiguous(self.distortion.rate),
-            )  # fmt: skip
+            strengths = self.core.strengths[0], *START_STRENGTHS[1:]
+            free = solved(self.obs, self.state, self.prior, self.distortion, strengths, has_free_strengths=True)
         origins = (np.ascontiguousarray(one) for one in (self.obs.force_origin, self.obs.rate_origin))
-        return core.linear_covariance(*origins)
+        return free.core.linear_covariance(*origins)
 
 
-def fit(
+def solved(
     obs: Observations,
     start: SessionState,
+    prior: Prior | None,
     distortion: Distortion,
-    prior: Prior | None = None,
+    strengths: Strengths,
     within: Bounds | None = None,
+    sizes: FloatArray | None = None,
+    *,
+    has_free_strengths: bool,
 ) -> Fit:
-    """Gauss-Newton on every row to convergence, noise corners as in ``start`` (eq. 11.9), or free ``within`` bounds."""
-    if len(start.effect) != distortion.n_parameters:
-        start = replace(start, effect=np.zeros(distortion.n_parameters))
-    core = obs.model(start.gravity, prior).fit(
-        state=core_state(start), strengths=(start.strengths[0], *START_STRENGTHS[1:]),
-        force_effect=contiguous(distortion.force), rate_effect=contiguous(distortion.rate), within=within,
+    """Gauss-Newton on every row to convergence (eq. 11.9); noise strengths as given or likeliest ``within`` bounds.
+
+    ``sizes`` are the prior σ of the effects' parameters.
+    """
+    core = obs.model(start.gravity, prior, is_scatter_free=has_free_strengths).fit(
+        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),
     )  # fmt: skip
-    return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
+    return Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths)
 
 
-def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, prior: Prior | None) -> Fit:
+def fit(obs: Observations, start: SessionState, prior: Prior | None, within: Bounds | None = None) -> Fit:
+    """The session without effects, noise corners as in ``start``, or free ``within`` bounds."""
+    start = replace(start, effect=np.zeros(0))
+    strengths = start.strengths[0], *START_STRENGTHS[1:]
+    return solved(obs, start, prior, NO_DISTORTION, strengths, within, has_free_strengths=False)
+
+
+def tune_noise(obs: Observations, start: SessionState, prior: Prior | None) -> Fit:
     """As :func:`fit`, with bias walks of maximum likelihood, bounded by the noise of parts (eq. 11.18)."""
-    return fit(obs, start, distortion, prior, PART_NOISE)
+    return fit(obs, start, prior, PART_NOISE)
 
 
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
