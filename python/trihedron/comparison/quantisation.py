@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, TINY
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.draws import NAMES
 from trihedron.comparison.noise import SENSORS, Sampled, Sensor
@@ -64,7 +64,7 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     model = density
     solution, sigma = np.zeros(2), math.inf
     for _ in range(_ROUNDS):
-        weight = 1.0 / np.maximum(model * relative, 1e-300)
+        weight = 1.0 / np.maximum(model * relative, TINY)
         scaled = design * weight[:, None]
         norms = np.linalg.norm(scaled, axis=0)
         solution = np.linalg.lstsq(scaled / norms, density * weight, rcond=None)[0] / norms

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.arrays import TINY
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
@@ -24,12 +25,11 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, HeldOut
+from trihedron.session.model import misfits
 
 HEADLINE = 0.5
 """Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
 after the effects that explain poses and moves."""
-LEAST_P = 1e-300
-"""Smallest p-value that a double holds with full precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Answer:
     def shares(self) -> list[float]:
         """Share of the misfit explained by each: its gain over the sum of all gains and the remaining ``excess``."""
         gains = self.gains
-        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), 1e-9)
+        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), TINY)
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
@@ -86,11 +86,8 @@ class Answer:
 
 def excess(fitted: Fit) -> float:
     """Chi-square beyond the degrees of freedom, summed over the domains where it is positive."""
-    used, out = fitted.leverage, 0.0
-    for domain in ROW_DOMAINS:
-        rows = fitted.system.domain == domain
-        out += max(float((fitted.system.residual[rows] ** 2).sum() - (1.0 - used[rows]).sum()), 0.0)
-    return out
+    chi2, dof = misfits(fitted.core)
+    return float(np.maximum(chi2 - dof, 0.0).sum())
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:
@@ -115,13 +112,12 @@ def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acce
         parameters = effect.parameters(variant, value, covariance)
         columns = variant.distortion.force, variant.distortion.rate
         curves = () if effect.is_local else effect_curves(found.model.context, columns, value, covariance, residuals)
-        record = _record(
+        out.append(_record(
             effect, parameters, effect.statement(parameters), _p_of(value, covariance), found.scores[k],
-            found.rivals[k], held_out_records(found.without[k], found.model),
+            held_out_records(found.without[k], found.model), found.rivals[k], curves,
             variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
             values=[float(v) for v in value],
-        )  # fmt: skip
-        out.append(replace(record, curves=curves))
+        ))  # fmt: skip
     return out
 
 
@@ -139,20 +135,18 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         held = held_out_records(one.without, model)
         rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
-        record = _record(one.effect, one.parameters, one.statement, one.p_value, one.score, rivals, held, **extra)
-        out.append(replace(record, curves=curves))
+        out.append(
+            _record(one.effect, one.parameters, one.statement, one.p_value, one.score, held, rivals, curves, **extra)
+        )
     return out
 
 
 def _of_samples(answer: Answer) -> list[AcceptedEffect]:
-    context = Context(answer.numbers.obs, answer.numbers.fitted)
-    out = []
+    context, out = Context(answer.numbers.obs, answer.numbers.fitted), []
     for one in answer.seen:
-        evidence = one.evidence
-        parameters = evidence.parameters if evidence.restate is None else evidence.restate(context)
-        out.append(
-            _record(one.effect, parameters, evidence.statement, evidence.p_value, one.gain, (), evidence.held_out)
-        )
+        said = one.evidence
+        parameters = said.parameters if said.restate is None else said.restate(context)
+        out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
 
 
@@ -166,19 +160,19 @@ def _record(
     statement: str,
     p_value: float,
     score: float,
-    rivals: tuple[str, ...],
     held_out: tuple[HeldOut, ...],
+    rivals: tuple[str, ...] = (),
+    curves: tuple[EffectCurve, ...] = (),
     **model: Any,
 ) -> AcceptedEffect:
-    by_id = {one.id: one for one in catalogue()}
-    either = (effect, by_id[rivals[0]]) if rivals else ()
+    either = (effect, by_id()[rivals[0]]) if rivals else ()
     said = {"variant": "", "shape": {}, "values": [], **model, "applies_to_other_recordings": effect.applies_elsewhere}
     return AcceptedEffect(
         id=effect.id, statement=statement, parameters=parameters,
-        p_adjusted=min(1.0, max(p_value, LEAST_P) * len(catalogue())), delta_bic=float(score), held_out=held_out,
+        p_adjusted=min(1.0, max(p_value, TINY) * len(catalogue())), delta_bic=float(score), held_out=held_out,
         confounded_with=rivals,
         separating_experiment=" / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
-        model=MappingProxyType(said),
+        model=MappingProxyType(said), curves=curves,
     )  # fmt: skip
 
 
@@ -212,7 +206,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)
         out[term.effect.id] = Candidate(
-            term.effect.id, max(_p_of(value, covariance), LEAST_P), True, "", found.scores[k], size
+            term.effect.id, max(_p_of(value, covariance), TINY), True, "", found.scores[k], size
         )
     return tuple(out[key] for key in sorted(out))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
@@ -44,7 +44,7 @@ class Tried:
         """Wald test of its parameters, with the noise strengths refitted beside it."""
         value, covariance = self.asked.value, self.asked.covariance
         wald = float(value @ np.linalg.solve(covariance, value))
-        return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
+        return float(max(chdtrc(len(value), max(wald, 0.0)), TINY))
 
 
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.state import smoothed_slope
@@ -62,7 +62,7 @@ class Context:
     @cached_property
     def elapsed(self) -> FloatArray:
         """(points,) time from 0 at the first to 1 at the last sample of the recording."""
-        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9))
+        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], TINY))
 
     # -- motion ---------------------------------------------------------------------------------------------------
     @property
@@ -230,7 +230,7 @@ class Context:
              for pose in obs.segments.poses]
         )  # fmt: skip
         quiet = np.quantile(inside, 0.1, axis=0)
-        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), 1e-300)
+        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), TINY)
         for where in self.moves:
             out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
         return out
@@ -242,7 +242,7 @@ class Context:
         for where, (before, after) in zip(self.moves, self.obs.move_poses, strict=True):
             size = np.linalg.norm(self.rate[where], axis=1)
             turned = np.concatenate([[0.0], np.cumsum(0.5 * (size[1:] + size[:-1]) * np.diff(self.time_s[where]))])
-            blend = (turned / max(turned[-1], 1e-12)).reshape(-1, *([1] * (per_pose.ndim - 1)))
+            blend = (turned / max(turned[-1], TINY)).reshape(-1, *([1] * (per_pose.ndim - 1)))
             out[where] = per_pose[before] * (1 - blend) + per_pose[after] * blend
         return out
 

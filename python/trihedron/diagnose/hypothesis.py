@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
@@ -176,9 +176,9 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], 1e-300)))
+        gain = float(np.log(rms_before[d] / max(rms_after[d], TINY)))
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
-        before_over_it = left * (rms_before[d] / max(rms_after[d], 1e-300)) ** 2
+        before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2
         out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
     return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.candidates import PRIOR_SCALES, terms_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
@@ -55,7 +55,7 @@ class Information:
     def known(self) -> tuple[FloatArray, FloatArray]:
         """Eigenvalues and eigenvectors of the precision for the directions that this recording determines."""
         values, vectors = np.linalg.eigh(self.precision)
-        keeps = values > KNOWN * max(float(values[-1]), 1e-300)
+        keeps = values > KNOWN * max(float(values[-1]), TINY)
         return values[keeps], vectors[:, keeps]
 
     @property
@@ -129,12 +129,11 @@ class _Held:
 
     models: tuple[Hypothesis, ...]
     n_added: int
-    cost: tuple[float, ...]
 
     def without(self, k: int) -> _Held:
         """Without the shared effect ``k``."""
         fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
-        return _Held(fewer, self.n_added - 1, tuple(p for j, p in enumerate(self.cost) if j != k))
+        return _Held(fewer, self.n_added - 1)
 
     def _at(self, model: Hypothesis, k: int) -> int:
         return len(model.terms) - self.n_added + k
@@ -145,7 +144,7 @@ class _Held:
 
 
 def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]:
-    held = _Held(tuple(models), 0, ())
+    held = _Held(tuple(models), 0)
     names: set[str] = set()
     while True:
         tried = _tried(held.models, names)
@@ -157,7 +156,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
             again(m, [*m.terms, replace(t, sizes=t.sizes * best.scale)])
             for m, t in zip(held.models, best.terms, strict=True)
         )
-        held = _Held(larger, held.n_added + 1, (*held.cost, best.terms[0].cost))
+        held = _Held(larger, held.n_added + 1)
 
 
 def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:

@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaincc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
@@ -59,7 +59,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
             continue
         white = sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]
         # Ratio of the errors of means to white noise: a line does not change the slow noise.
-        colour = np.maximum(np.median(error / np.maximum(white, 1e-300), axis=0), 1.0)
+        colour = np.maximum(np.median(error / np.maximum(white, TINY), axis=0), 1.0)
         new_mean, new_error = mean.copy(), error.copy()
         for k, pose in enumerate(segments.poses):
             part = readings[pose.start : pose.stop]
@@ -153,7 +153,7 @@ def _swing(part: FloatArray, lines: Sequence[float]) -> FloatArray:
 
 def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
     """Least-squares frequency within 1.5 bins of ``near``, the known lines fitted jointly."""
-    scale = np.maximum(np.std(part, axis=0), 1e-300)
+    scale = np.maximum(np.std(part, axis=0), TINY)
     reduced = part / scale
 
     def left(f: float) -> float:
@@ -179,7 +179,7 @@ def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray
     for axis in range(part.shape[1]):
         a, b = coefficient[1 : 1 + m, axis], coefficient[1 + m :, axis]
         slope = t * (b * cosines - a * sines)
-        size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+        size = np.maximum(np.linalg.norm(slope, axis=0), TINY)
         columns = np.hstack([basis, slope / size])
         error[axis] = level[axis] * np.sqrt(np.linalg.pinv(columns.T @ columns)[0, 0])
     edges = np.linspace(0, n, BLOCKS + 1).astype(int)

@@ -130,6 +130,13 @@ class SessionReadings:
         return SessionState(gravity_m_s2, accel_S, accel_b, gyro_S, up, bias, none, np.zeros(n_effects))
 
 
+def misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
+    """χ² (4,) and degrees of freedom (4,) of a fit by domain, the label of the rows."""
+    domain, n = core.labels[:, 0], PRIOR + 1
+    chi2, dof = (np.bincount(domain, of_rows, n)[:PRIOR] for of_rows in (core.residual**2, 1.0 - core.leverage()))
+    return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)
+
+
 def core_state(state: SessionState) -> _core.SessionState:
     """A state of the session as input of the Rust model: biases in raw units."""
     return _core.SessionState(

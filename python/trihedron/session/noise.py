@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import RefusedError
 from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
@@ -76,13 +76,13 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     ):
         raise RefusedError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
-    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
+    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
     sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]
     densities = [np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)]
     spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
     of_rate = 0.0
     if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
-        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), 1e-300))
+        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY))
         densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
         of_rate = expected_scatter_of_axes(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
@@ -133,7 +133,7 @@ def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: 
         out[0] = np.nanmedian(along[1])
     if rate_sigma is not None:
         out[1] = np.sqrt(np.mean(medians(rate_sigma) ** 2))
-    return np.maximum(out, 1e-300)
+    return np.maximum(out, TINY)
 
 
 # Slow noise of the sensors inside moves, estimated from the poses (eq. 8.2b).

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, TINY, FloatArray
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import ParameterDifference
@@ -73,9 +73,9 @@ class _Group:
     def p_value(self) -> float:
         """d'C⁻¹d/n ~ F(n, dof)."""
         n = len(self.difference)
-        ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, 1e-300)
+        ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, TINY)
         distance = float(self.difference @ np.linalg.solve(self.covariance + ridge * np.eye(n), self.difference))
-        return max(float(f_distribution.sf(distance / n, n, self.dof)), 1e-300)
+        return max(float(f_distribution.sf(distance / n, n, self.dof)), TINY)
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _sensor(
     """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised; both
     sides with the covariance (12, 12) of S and b."""
     (given, C_given), (seen, C_seen) = model, recording
-    a, r, units = invariants(given.S, given.b), invariants(seen.S, seen.b), (given.si, seen.si)
+    a, r = invariants(given.S, given.b), invariants(seen.S, seen.b)
     spread = given.spread(C_given)
     covariance = spread + seen.spread(C_seen)
     # A calibration file has no bias change between sessions: that of the recording is used.
@@ -187,13 +187,22 @@ def _sensor(
     covariance[:3, :3] += np.diag(before + seen.drift)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
-    log_m, log_r, is_relative = _log_scales(a, r, units, given.unit == seen.unit)
-    common = _common_factor(sensor, log_r - log_m, _sizes_in_si(a, r, units))
+    log_m, log_r, sizes = a.log_scale, r.log_scale, None
+    is_same_unit = given.unit == seen.unit
+    if given.si is not None and seen.si is not None:
+        in_si = log_m + math.log(given.si), log_r + math.log(seen.si)
+        # ln of reading over truth: zero for a healthy sensor.
+        sizes = float(np.median(in_si[0])), float(np.median(in_si[1]))
+        log_m, log_r = (log_m, log_r) if is_same_unit else in_si
+    # Counts against SI: only differences between axes can be compared.
+    is_relative = not is_same_unit and sizes is None
+    if is_relative:
+        log_m, log_r = log_m - log_m.mean(), log_r - log_r.mean()
+    common = _common_factor(sensor, log_r - log_m, sizes)
     if common is not None:
         log_m = log_m + math.log(common.factor)
     of_scale = covariance[3:6, 3:6]
     if is_relative:
-        # Counts against SI: only differences between axes can be compared.
         centre = np.eye(3) - np.ones((3, 3)) / 3.0
         of_scale = centre @ of_scale @ centre.T + np.ones((3, 3)) * np.trace(of_scale) / 3.0
     pairs = tuple(AXES[i] + AXES[j] for i, j in PAIRS)
@@ -203,7 +212,8 @@ def _sensor(
                _never_added(prefix, a.bias, r.bias, spread, given.drift)),
         _Group(
             f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), log_r - log_m, of_scale, "1",
-            remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
+            remark=_relative_to(prefix, a, r, is_recording=seen.si is None) if is_relative else "",
+            is_relative=is_relative,
         ),
         _Group(f"{prefix}-misalignment", sensor, pairs, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"),
     ]  # fmt: skip
@@ -214,7 +224,7 @@ def _never_added(
     prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, drift: FloatArray
 ) -> str:
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, 1e-300))
+    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
     is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_BIAS, 3))
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
     if not (is_none and would_show):
@@ -223,20 +233,13 @@ def _never_added(
     return words("biases-never-added", sensor=name)
 
 
-def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:
+def _relative_to(prefix: str, a: Invariants, r: Invariants, *, is_recording: bool) -> str:
     """Remark that scales of counts and of SI have no common factor to compare, and the size of a count."""
-    counts, side = (r, "recording") if units[1] is None else (a, "model")
+    counts, side = (r, "recording") if is_recording else (a, "model")
     per_si = math.exp(float(counts.log_scale.mean()))
     if prefix == "gyro":
         return words("gyro-scales-relative", side=side, per_deg_s=per_si * math.radians(1.0))
     return words("accelerometer-scales-relative", side=side, per_g=per_si * STANDARD_GRAVITY_M_S2)
-
-
-def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:
-    """ln of reading over truth of both sides, where both state their unit: zero for a healthy sensor."""
-    if units[0] is None or units[1] is None:
-        return None
-    return float(np.median(a.log_scale)) + math.log(units[0]), float(np.median(r.log_scale)) + math.log(units[1])
 
 
 def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float] | None) -> CommonFactor | None:
@@ -252,17 +255,6 @@ def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float
             return CommonFactor(sensor, 1.0 / times, written, taken, "model")
     nearest = round(float(np.median(change)) / math.log(2.0))
     return CommonFactor(sensor, 2.0**nearest) if nearest and is_near(2.0**nearest) else None
-
-
-def _log_scales(
-    a: Invariants, r: Invariants, units: tuple[float | None, float | None], is_same_unit: bool
-) -> tuple[FloatArray, FloatArray, bool]:
-    """ln of sensitivities of both sides in one unit; True where these are known only up to a common factor."""
-    if is_same_unit:
-        return a.log_scale, r.log_scale, False
-    if units[0] is not None and units[1] is not None:
-        return a.log_scale + math.log(units[0]), r.log_scale + math.log(units[1]), False
-    return a.log_scale - a.log_scale.mean(), r.log_scale - r.log_scale.mean(), True
 
 
 def _triads(*sides: tuple[FittedSensor, FittedSensor, FloatArray]) -> _Group:

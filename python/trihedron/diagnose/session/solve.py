@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.state import NO_DISTORTION, Distortion
 from trihedron.session.model import (
@@ -199,7 +199,7 @@ class Prediction:
     @property
     def per_row(self) -> FloatArray:
         """(domains,) innovation chi-square per row."""
-        return self.chi2 / np.maximum(self.n_rows, 1e-9)
+        return self.chi2 / np.maximum(self.n_rows, TINY)
 
 
 def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:

@@ -14,7 +14,7 @@ from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
-from trihedron.session.model import DYNAMICS, MOVES, SessionState, core_state, state_of
+from trihedron.session.model import DYNAMICS, MOVES, SessionState, core_state, misfits, state_of
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
 
 FALSE_ALARM = 1e-3
@@ -88,7 +88,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
     weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
-    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(weighted))
+    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     return _solution(observed, weighted if is_expected else core)
 
@@ -110,7 +110,7 @@ def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     inflation = core.strengths[3]
-    chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
+    chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     away = core.pose_force_bias @ S_a.T
@@ -174,10 +174,3 @@ def _fit(observed: Observed, state: SessionState, strengths: Strengths, within: 
         state=core_state(state), strengths=strengths, force_effect=force, rate_effect=rate, within=within,
         sizes=observed.effect_sigma.tolist(),
     )  # fmt: skip
-
-
-def _misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
-    """χ² (4,) and degrees of freedom (4,) by domain (label of the rows)."""
-    domain = core.labels[:, 0]
-    chi2, dof = (np.bincount(domain, of_rows, DYNAMICS + 1) for of_rows in (core.residual**2, 1.0 - core.leverage()))
-    return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)

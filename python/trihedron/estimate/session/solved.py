@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
@@ -187,7 +187,7 @@ def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> Senso
 
 def _standard_errors(covariance: FloatArray) -> FloatArray:
     """Principal errors: rows (k, 12) whose outer products sum to the covariance (12, 12)."""
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(covariance), TINY))
     # Scaled to a correlation matrix: in counts and m/s² the variances span many decades.
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     keep = values > 1e-10 * float(values.max())
