@@ -8,11 +8,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import TINY
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
-from trihedron.diagnose.candidates import Tried
+from trihedron.diagnose.candidates import Tried, wald_p
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
@@ -113,7 +112,7 @@ def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acce
         columns = variant.distortion.force, variant.distortion.rate
         curves = () if effect.is_local else effect_curves(found.model.context, columns, value, covariance, residuals)
         out.append(_record(
-            effect, parameters, effect.statement(parameters), _p_of(value, covariance), found.scores[k],
+            effect, parameters, effect.statement(parameters), wald_p(value, covariance), found.scores[k],
             held_out_records(found.without[k], found.model), found.rivals[k], curves,
             variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
             values=[float(v) for v in value],
@@ -148,10 +147,6 @@ def _of_samples(answer: Answer) -> list[AcceptedEffect]:
         parameters = said.parameters if said.restate is None else said.restate(context)
         out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
-
-
-def _p_of(value: np.ndarray, covariance: np.ndarray) -> float:
-    return float(chdtrc(len(value), float(value @ np.linalg.solve(covariance, value))))
 
 
 def _record(
@@ -205,9 +200,7 @@ def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, Bia
     for k, term in enumerate(found.model.terms):
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)
-        out[term.effect.id] = Candidate(
-            term.effect.id, max(_p_of(value, covariance), TINY), True, "", found.scores[k], size
-        )
+        out[term.effect.id] = Candidate(term.effect.id, wald_p(value, covariance), True, "", found.scores[k], size)
     return tuple(out[key] for key in sorted(out))
 
 

@@ -7,13 +7,13 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
 from trihedron.diagnose.session.state import Distortion
+from trihedron.probability import chdtrc
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
@@ -42,9 +42,13 @@ class Tried:
     @property
     def p_value(self) -> float:
         """Wald test of its parameters, with the noise strengths refitted beside it."""
-        value, covariance = self.asked.value, self.asked.covariance
-        wald = float(value @ np.linalg.solve(covariance, value))
-        return float(max(chdtrc(len(value), max(wald, 0.0)), TINY))
+        return wald_p(self.asked.value, self.asked.covariance)
+
+
+def wald_p(value: FloatArray, covariance: FloatArray) -> float:
+    """p-value of parameters (k,) against zero, by their covariance (k, k)."""
+    wald = float(value @ np.linalg.solve(covariance, value))
+    return max(chdtrc(len(value), max(wald, 0.0)), TINY)
 
 
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:

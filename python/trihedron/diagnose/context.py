@@ -153,7 +153,7 @@ class Context:
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):
             force[pose.start : pose.stop] = state.gravity * state.up[i]
-        return np.asarray(_finite(force) @ np.linalg.inv(self.accel_axes).T)
+        return np.asarray(np.where(np.isfinite(force), force, 0.0) @ np.linalg.inv(self.accel_axes).T)
 
     def _logged(self, name: str) -> FloatArray | None:
         """A logged channel (n,) of the recording, if it has any value."""
@@ -164,7 +164,7 @@ class Context:
     def temperature(self) -> FloatArray | None:
         """(points,) logged temperature minus its mean, °C."""
         logged = self._logged("temperature_degc")
-        return None if logged is None else _finite(self.at_points(logged) - self.references["temperature_degc"])
+        return None if logged is None else np.nan_to_num(self.at_points(logged) - self.references["temperature_degc"])
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
@@ -179,7 +179,7 @@ class Context:
     def supply(self) -> FloatArray | None:
         """(points,) relative deviation of the logged supply voltage from its mean."""
         logged = self._logged("supply_v")
-        return None if logged is None else _finite(self.at_points(logged) / self.references["supply_v"] - 1.0)
+        return None if logged is None else np.nan_to_num(self.at_points(logged) / self.references["supply_v"] - 1.0)
 
     @property
     def references(self) -> Mapping[str, float]:
@@ -283,10 +283,6 @@ class Context:
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
     return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
-
-
-def _finite(values: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:

@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.candidates import PRIOR_SCALES, terms_beside
@@ -20,6 +19,7 @@ from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import MOST_EFFECTS, threshold
+from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
 
@@ -79,7 +79,7 @@ def agreement(parts: Sequence[Information]) -> float:
     """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
     whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
     dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
-    return float(chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0))) if dof > 0 else 1.0
+    return chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0)) if dof > 0 else 1.0
 
 
 @dataclass(frozen=True, eq=False)

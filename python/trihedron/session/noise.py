@@ -27,14 +27,14 @@ Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
 in units of the scatter, factors on the noise of moves. Pairs: accelerometer and gyro; of moves gravity and velocity."""
 NO_SCATTER = 1e-3
 """Scatter that counts as zero."""
-START_STRENGTHS: Strengths = ((160.0, 160.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
-"""Start of the search for strengths."""
 Bounds = tuple[Pair, Pair, Pair]
 """Shortest corner times [s], largest scatter, largest factors on the noise of moves: each for the pairs above."""
 ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
 NOISE_CORNER_S = 20.0
 """Shortest corner time that the part's noise explains, where white noise and bias walk have equal Allan deviation: in
 consumer parts it is this or later. Every hypothesis allows a walk of any strength; a stronger one is called drift."""
+START_STRENGTHS: Strengths = ((8.0 * NOISE_CORNER_S,) * 2, (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
+"""Start of the search for strengths."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
 """Bounds of a part whose noise is that of its samples."""
 

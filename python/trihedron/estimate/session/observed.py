@@ -14,6 +14,7 @@ from trihedron.records.segments import Segments
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
+from trihedron.session.rounding import UNIFORM
 
 DELAY_S = 0.005
 """Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
@@ -110,7 +111,7 @@ def arranged(
         force_effect=effects[0],
         rate_effect=effects[1],
         effect_sigma=np.array(
-            [*measured.quantum[coarse] / np.sqrt(12.0), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S]
+            [*measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S]
         ),
         n_hidden=len(coarse),
         force_up=noise.force_up,

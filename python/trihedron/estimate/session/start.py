@@ -10,7 +10,6 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import N_GYROSCOPE, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
@@ -121,7 +120,7 @@ def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     if nominal is not None or rate_to_si(log.recording.gyroscope_unit) is not None:
         return found
     missed = _usually_missed_deg(log, measured, found)
-    again = turned_starts(measured, log.accelerometer, first[0]) if missed > ASTRAY_DEG else None
+    again = turned_starts(log, measured, first[0]) if missed > ASTRAY_DEG else None
     if again is None:
         return found
     other = _nearest(log, measured, again)
@@ -270,42 +269,24 @@ def starts(
     return np.ascontiguousarray(np.stack(found))
 
 
-def turned_starts(
-    measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
-) -> FloatArray | None:
+def turned_starts(log: Log, measured: MoveMeasurements, linear: FloatArray) -> FloatArray | None:
     """Initial scales (k, 3, 3) with the least tilt errors among scales equal on all axes; ``None`` with too few moves.
 
     In moves of tenths of a second, through hundreds of degrees, accelerations exceed gravity: the ``linear`` start then
     fails. The axes are tried parallel to the accelerometer's, and rotated as those of the ``linear`` start.
     """
-    force = measured.reading @ accelerometer.S.T + accelerometer.b
-    up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    courses = []
-    for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
+    longest = 0.0
+    for (a, b), (before, after) in zip(measured.edges, measured.links, strict=True):
         rate = measured.rate[a:b] - 0.5 * (measured.bias[before] + measured.bias[after])
-        if not lost and b - a > 1 and np.isfinite(rate).all():
-            courses.append((measured.time_s[a:b], rate, up[before], up[after]))
-    if len(courses) < FEWEST_MOVES:
-        return None
-    sizes = [(time, np.linalg.norm(rate, axis=1)) for time, rate, _, _ in courses]
-    most = max(float(0.5 * np.diff(time) @ (size[1:] + size[:-1])) for time, size in sizes)
-    if not most > 0.0:
+        longest = max(longest, float(np.nansum(np.linalg.norm(rate, axis=1))) * measured.nominal_step_s)
+    if np.count_nonzero(~measured.is_lost) < FEWEST_MOVES or longest == 0.0:
         return None
     left, _, right = np.linalg.svd(linear)
-    turns = [np.eye(3), left @ right]
-    tried = [
-        (angle / most) * turn for turn in turns for angle in np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
-    ]
-    missed = [
-        np.median([_missed_rad(time, rate @ S.T, before, after) for time, rate, before, after in courses])
-        for S in tried
-    ]
+    angles = np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
+    tried = [(angle / longest) * turn for turn in (np.eye(3), left @ right) for angle in angles]
+    S_a, b_a = log.accelerometer.S, log.accelerometer.b
+    missed = [_usually_missed_deg(log, measured, (S_a, b_a, S)) for S in tried]
     return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
-
-
-def _missed_rad(time: FloatArray, rate: FloatArray, before: FloatArray, after: FloatArray) -> float:
-    turned = integrate_rate(time, rate, last_only=True).T @ before
-    return float(np.arccos(np.clip(turned @ after, -1.0, 1.0)))
 
 
 _ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
