@@ -14,7 +14,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.session.noise import START_STRENGTHS, Along, Strengths, scatter_unit
+from trihedron.session.noise import START_STRENGTHS, SessionNoise, Strengths
 
 LOWER = np.tril_indices(3)
 """Indices of a lower-triangular scale, row by row."""
@@ -64,26 +64,15 @@ def contiguous(values: FloatArray | None) -> FloatArray | None:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SessionReadings:
-    """Pose means of a session in raw units, relative to ``force_origin``, ``rate_origin`` (3,): counts around 32768
-    would cost the normal equations ten digits.
-
-    ``pose_force``, ``pose_rate`` (h, 3) with their standard errors ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3);
-    ``force_density``, ``rate_density`` (3,) white noise per √Hz. ``force_up`` are verticals (h, 3), unit vectors, and
-    the errors (h,) of the means along them; ``force_scatter`` is the bias scatter that 1/f noise explains.
-    """
+class SessionReadings(SessionNoise):
+    """Pose means ``pose_force``, ``pose_rate`` (h, 3) of a session with their noise, relative to ``force_origin``,
+    ``rate_origin`` (3,): counts around 32768 would cost the normal equations ten digits."""
 
     force_origin: FloatArray
     rate_origin: FloatArray
     pose_time_s: FloatArray
     pose_force: FloatArray
-    pose_force_sigma: FloatArray
-    force_density: FloatArray
     pose_rate: FloatArray | None
-    pose_rate_sigma: FloatArray | None
-    rate_density: FloatArray | None
-    force_up: Along | None = None
-    force_scatter: float = 0.0
 
     @property
     def n_poses(self) -> int:
@@ -113,7 +102,7 @@ class SessionReadings:
 
         ``timing_s``: scatter of the sampling instants, and the sample interval.
         """
-        unit = scatter_unit(self.pose_force_sigma, self.pose_rate_sigma, self.force_up)
+        unit = self.scatter_unit()
         return _core.SessionModel(
             gravity_m_s2=gravity_m_s2, poses=self.core_poses(), moves=moves, noise=timing_s,
             prior=None if prior is None else (contiguous(prior.mean), contiguous(prior.covariance), prior.is_weak),

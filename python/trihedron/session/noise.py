@@ -39,29 +39,44 @@ PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER)
 """Bounds of a part whose noise is that of its samples."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SessionNoise:
     """Noise of one session in raw units.
 
-    Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
-    of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
-    than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
-    those of the axes apply; ``None`` where no vertical is known. ``force_scatter`` and ``rate_scatter`` [raw]: scatter
-    of the bias from pose to pose that 1/f noise explains, 0 where poses show none.
+    Standard errors of pose means ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3), white noise ``force_density``,
+    ``rate_density`` (3,) per √Hz. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along
+    them, NaN where those of the axes apply; ``None`` where no vertical is known. ``force_scatter``, ``rate_scatter``:
+    scatter of the bias from pose to pose that 1/f noise explains, 0 where poses show none.
     """
 
-    force_sigma: FloatArray
+    pose_force_sigma: FloatArray
     force_density: FloatArray
-    rate_sigma: FloatArray | None
+    pose_rate_sigma: FloatArray | None
     rate_density: FloatArray | None
-    unresolved: FloatArray
     force_up: Along | None = None
     force_scatter: float = 0.0
     rate_scatter: float = 0.0
 
+    def scatter_unit(self) -> FloatArray:
+        """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
 
-def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
-    """Noise of poses and of the moves in half-open sample ``ranges``.
+        One size for three axes: an axis with more noise need not scatter more. The accelerometer's is that along the
+        vertical where it is known, because static poses show no other scatter.
+        """
+        out = np.ones((2, 3))
+        out[0] = np.sqrt(np.mean(medians(self.pose_force_sigma) ** 2))
+        if self.force_up is not None and np.isfinite(self.force_up[1]).any():
+            out[0] = np.nanmedian(self.force_up[1])
+        if self.pose_rate_sigma is not None:
+            out[1] = np.sqrt(np.mean(medians(self.pose_rate_sigma) ** 2))
+        return np.maximum(out, TINY)
+
+
+def measure_noise(
+    recording: Recording, segments: Segments, ranges: list[tuple[int, int]]
+) -> tuple[SessionNoise, FloatArray]:
+    """Noise of poses, and variance (m, 2, 3) of the integrals of every move, force and rate, (raw unit · s)², by motion
+    faster than the samples and by noise slower than a move, in the half-open sample ``ranges`` of the moves.
 
     Raises
     ------
@@ -102,7 +117,11 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
     scatter = 0.0 if along is None else expected_scatter(recording.accelerometer, spans, along[0])
     rate_sigma, rate_density = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
-    return SessionNoise(sigmas[0], densities[0], rate_sigma, rate_density, variances, along, scatter, of_rate)
+    noise = SessionNoise(
+        pose_force_sigma=sigmas[0], force_density=densities[0], pose_rate_sigma=rate_sigma, rate_density=rate_density,
+        force_up=along, force_scatter=scatter, rate_scatter=of_rate,
+    )  # fmt: skip
+    return noise, variances
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
@@ -119,21 +138,6 @@ def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray)
     known = np.isfinite(error)
     own = share**2 * np.where(known, error, 0.0) ** 2
     return np.asarray(np.sqrt(np.where(known, (across**2 * sigma**2).sum(axis=1) + own, plain)))
-
-
-def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
-    """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
-
-    One size for three axes: an axis with more noise need not scatter more. The accelerometer's is that along the
-    vertical where it is known, because static poses show no other scatter.
-    """
-    out = np.ones((2, 3))
-    out[0] = np.sqrt(np.mean(medians(force_sigma) ** 2))
-    if along is not None and np.isfinite(along[1]).any():
-        out[0] = np.nanmedian(along[1])
-    if rate_sigma is not None:
-        out[1] = np.sqrt(np.mean(medians(rate_sigma) ** 2))
-    return np.maximum(out, TINY)
 
 
 # Slow noise of the sensors inside moves, estimated from the poses (eq. 8.2b).

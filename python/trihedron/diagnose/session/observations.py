@@ -39,8 +39,7 @@ class Observations(SessionReadings):
     by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
     ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
     ``pose_rate_sigma``.
-    ``rate_scatter`` is the gyro bias scatter that 1/f noise explains; ``averaging`` is the share of the sample interval
-    that the sensors average over (0 to 1).
+    ``averaging`` is the share of the sample interval that the sensors average over (0 to 1).
     """
 
     recording: Recording
@@ -55,7 +54,6 @@ class Observations(SessionReadings):
     disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     pose_settling: FloatArray | None = None
-    rate_scatter: float = 0.0
     averaging: float = 0.0
 
     @property
@@ -201,21 +199,22 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
             poses.append((move.pose_before, move.pose_after))
-    noise = measure_noise(recording, segments, ranges)
-    if noise.rate_sigma is not None:
+    noise, of_moves = measure_noise(recording, segments, ranges)
+    if noise.pose_rate_sigma is not None:
         lasts = np.array([t[pose.stop - 1] - t[pose.start] for pose in segments.poses])
-        swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
-    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, poses, strict=True)]
+        swing = swing + np.stack(
+            [np.zeros((segments.n_poses, 3)), _turned_at_ends(noise.pose_rate_sigma, lasts)], axis=1
+        )
+    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(of_moves, poses, strict=True)]
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
-        pose_force_sigma=noise.force_sigma, pose_rate_sigma=noise.rate_sigma,
+        **vars(noise),
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
-        force_density=noise.force_density, rate_density=noise.rate_density, disturbed_s=bumped,
-        force_up=noise.force_up, force_scatter=noise.force_scatter, rate_scatter=noise.rate_scatter,
+        disturbed_s=bumped,
         unresolved=dict(zip(poses, unresolved, strict=True)), averaging=averaging,
     )  # fmt: skip
 

@@ -69,11 +69,10 @@ def arranged(
             continue
         ranges.append((a, b))
         before.append(pose)
-    noise = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
+    noise, unresolved = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
     force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
-    assert noise.rate_sigma is not None
+    assert noise.pose_rate_sigma is not None
     assert noise.rate_density is not None
-    unresolved = noise.unresolved
     if measured.reading_variance is not None:
         # Variance of rounding and of bridged clipping, in addition to that of any session.
         for k, (a, b) in enumerate(ranges):
@@ -83,40 +82,35 @@ def arranged(
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
     lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
     of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
-    effects = _effects(recording, measured, readings, ranges)
-    return Observed(
-        gravity_m_s2=gravity_m_s2,
-        force_origin=force_origin,
-        rate_origin=rate_origin,
+    # Without dither the rounding error does not average out: the larger of both standard errors is used.
+    own = {
+        "pose_force_sigma": np.maximum(noise.pose_force_sigma, np.sqrt(measured.var_reading_noise)),
+        "pose_rate_sigma": np.where(
+            is_coarse, of_coarse, np.maximum(noise.pose_rate_sigma, np.sqrt(measured.var_bias_read))
+        ),
+        "rate_density": np.where(is_coarse, measured.noise_density, noise.rate_density),
+    }
+    effects, moves_before = _effects(recording, measured, readings, ranges), np.array(before, dtype=np.int64)
+    moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
-        pose_force=measured.reading - force_origin,
-        # Without dither the rounding error does not average out: the larger of both standard errors is used.
-        pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
-        force_density=noise.force_density,
-        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin,
-        pose_rate_sigma=np.where(is_coarse, of_coarse, np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read))),
-        rate_density=np.where(is_coarse, measured.noise_density, noise.rate_density),
-        moves=_core.SessionMoves(
-            pose_time_s=pose_time_s,
-            time_s=_samples_of(ranges, measured.time_s),
-            force=_samples_of(ranges, force) - force_origin,
-            rate=_samples_of(ranges, rate) - rate_origin,
-            ranges=_in_turn(ranges),
-            before=np.array(before, dtype=np.int64),
-            unresolved=unresolved,
-        ),
-        before=np.array(before, dtype=np.int64),
-        sigma_time_s=measured.sigma_time_s,
-        nominal_step_s=measured.nominal_step_s,
-        force_effect=effects[0],
-        rate_effect=effects[1],
-        effect_sigma=np.array(
-            [*measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S]
-        ),
-        n_hidden=len(coarse),
-        force_up=noise.force_up,
-        force_scatter=noise.force_scatter,
+        time_s=_samples_of(ranges, measured.time_s),
+        force=_samples_of(ranges, force) - force_origin,
+        rate=_samples_of(ranges, rate) - rate_origin,
+        ranges=_in_turn(ranges),
+        before=moves_before,
+        unresolved=unresolved,
     )
+    return Observed(
+        **(vars(noise) | own), gravity_m_s2=gravity_m_s2, force_origin=force_origin, rate_origin=rate_origin,
+        pose_time_s=pose_time_s, pose_force=measured.reading - force_origin,
+        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin, moves=moves,
+        before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
+        force_effect=effects[0], rate_effect=effects[1],
+        effect_sigma=np.array([
+            *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
+        ]),
+        n_hidden=len(coarse),
+    )  # fmt: skip
 
 
 def _effects(
