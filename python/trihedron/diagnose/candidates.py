@@ -54,12 +54,7 @@ def wald_p(value: FloatArray, covariance: FloatArray) -> float:
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
     terms, missing = terms_beside(model, ())
-    looks = model.gains(terms, PRIOR_SCALES) if terms else []
-    asked = [
-        AddedTerms(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
-        for look in looks
-    ]
-    return _best_of_each(terms, asked, model.log_evidence), missing
+    return _best_of_each(terms, model.at_its_strengths(terms, PRIOR_SCALES), model.log_evidence), missing
 
 
 def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:

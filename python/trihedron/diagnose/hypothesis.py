@@ -115,6 +115,13 @@ class Hypothesis:
         found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [AtStrengths(*one) for one in found]
 
+    def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
+        """As :meth:`with_added` at the noise strengths found, prior sizes times the best of ``scales``."""
+        return [
+            AddedTerms(self.log_evidence + float(look.gain[:, 0].max()), self.strengths, look.value, look.covariance)
+            for look in (self.gains(terms, scales) if terms else [])
+        ]
+
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""
         ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)

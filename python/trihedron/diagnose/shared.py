@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.candidates import PRIOR_SCALES, terms_beside
+from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, terms_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Effect
@@ -23,8 +23,6 @@ from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
 
-N_LEADERS = 4
-"""Candidates, best at fixed noise strengths, that are evaluated with the strengths refitted."""
 KNOWN = 1e-6
 """Relative precision, to that of the best direction, below which a recording does not determine a direction."""
 
@@ -185,14 +183,9 @@ def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Join
     if not common:
         return []
     terms = {key: tuple(one[key] for one in found) for key in common}
-    looks = [m.gains([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
-    glanced = []
-    for j, key in enumerate(common):
-        asked = [
-            AddedTerms(m.log_evidence + float(look[j].gain[0, 0]), m.strengths, look[j].value, look[j].covariance)
-            for m, look in zip(models, looks, strict=True)
-        ]
-        glanced.append(_joint(terms[key], asked, [m.log_evidence for m in models]))
+    looks = [m.at_its_strengths([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
+    plain = [m.log_evidence for m in models]
+    glanced = [_joint(terms[key], asked, plain) for key, *asked in zip(common, *looks, strict=True)]
     first = _best_of_each(glanced)
     full = [_full(models, one.terms) for one in first[:N_LEADERS]]
     return sorted([*full, *first[N_LEADERS:]], key=lambda one: -one.score)

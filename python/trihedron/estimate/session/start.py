@@ -11,7 +11,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import N_GYROSCOPE, carried
+from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
@@ -60,6 +60,14 @@ class Log:
         """(m, 2) times of the middles of the poses before and after each move [s]."""
         return self.segments.time_mid_s[measured.links]
 
+    def carried(self, measured: MoveMeasurements, near: Near) -> Carried:
+        """Tilt errors of the moves by S and b of the accelerometer and S of the gyro."""
+        return carried(measured, self.anchors_s(measured), *near)
+
+    def usual_deg(self, measured: MoveMeasurements, near: Near) -> float:
+        """Median of these tilt errors as of :func:`usual_deg`."""
+        return usual_deg(self.carried(measured, near).angle_deg, measured, *near[:2])
+
 
 def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]:
     """Moves of a session and initial values of its fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
@@ -73,7 +81,7 @@ def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]
     if np.any(bridged.clipped_s > 0.0) and not is_word:
         plain = log.measured(is_bridged=False)
         near = _near(log, plain, nominal)
-        if denies_cut(near[2], _missed_deg(log, plain, near), bridged, plain):
+        if denies_cut(near[2], log.carried(plain, near).angle_deg, bridged, plain):
             return plain, near
     return bridged, _near(log, bridged, nominal)
 
@@ -90,7 +98,7 @@ def near_one_another(log: Log, measured: MoveMeasurements, near: Near) -> BoolAr
     With too few moves none is excluded.
     """
     used = ~measured.is_lost
-    residual, covariance, slope = carried(measured, log.anchors_s(measured), *near).in_plane()
+    residual, covariance, slope = log.carried(measured, near).in_plane()
     used &= np.isfinite(residual).all(axis=1)
     white = np.linalg.inv(np.linalg.cholesky(covariance[used]))
     residual, slope = (white @ residual[used][:, :, None])[:, :, 0], white @ slope[used]
@@ -119,12 +127,12 @@ def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     found = _nearest(log, measured, first)
     if nominal is not None or rate_to_si(log.recording.gyroscope_unit) is not None:
         return found
-    missed = _usually_missed_deg(log, measured, found)
+    missed = log.usual_deg(measured, found)
     again = turned_starts(log, measured, first[0]) if missed > ASTRAY_DEG else None
     if again is None:
         return found
     other = _nearest(log, measured, again)
-    return other if _usually_missed_deg(log, measured, other) < missed else found
+    return other if log.usual_deg(measured, other) < missed else found
 
 
 def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
@@ -142,14 +150,6 @@ def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
     if not found:
         raise RefusedError("the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)")
     return S_a, b_a, min(found, key=lambda one: one[0])[1]
-
-
-def _missed_deg(log: Log, measured: MoveMeasurements, near: Near) -> FloatArray:
-    return carried(measured, log.anchors_s(measured), *near).angle_deg
-
-
-def _usually_missed_deg(log: Log, measured: MoveMeasurements, near: Near) -> float:
-    return usual_deg(_missed_deg(log, measured, near), measured, *near[:2])
 
 
 def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
@@ -285,7 +285,7 @@ def turned_starts(log: Log, measured: MoveMeasurements, linear: FloatArray) -> F
     angles = np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
     tried = [(angle / longest) * turn for turn in (np.eye(3), left @ right) for angle in angles]
     S_a, b_a = log.accelerometer.S, log.accelerometer.b
-    missed = [_usually_missed_deg(log, measured, (S_a, b_a, S)) for S in tried]
+    missed = [log.usual_deg(measured, (S_a, b_a, S)) for S in tried]
     return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
 
 
