@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -23,7 +23,7 @@ from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
-from trihedron.records.domains import DomainResiduals, HeldOut
+from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.session.model import misfits
 
 HEADLINE = 0.5
@@ -35,15 +35,24 @@ after the effects that explain poses and moves."""
 class Answer:
     """Everything accepted: effects with columns, bias processes, effects found by tests on the samples.
 
+    ``predicted`` and ``bare`` are the session without effects, in the part's noise and in noise of free strength.
     ``numbers`` is the hypothesis that parameters and uncertainties come from; its shape parameters are unknowns too.
+    ``asked`` are all bias processes tested, ``tested`` the results of the samples' own tests; ``domains`` are those of
+    the session without effects, ``remaining`` with them.
     """
 
+    predicted: Fit
+    bare: Hypothesis
     found: Found
     numbers: Hypothesis
     biases: Sequence[BiasStrength]
     seen: Sequence[Seen]
     judged: Fit
     """Fit with all accepted effects, noise strengths bounded to the part's noise; remaining misfit is judged on it."""
+    asked: Mapping[str, BiasStrength]
+    tested: Mapping[str, Candidate]
+    domains: tuple[DomainTest, ...]
+    remaining: tuple[DomainTest, ...] = ()
 
     @property
     def ids(self) -> set[str]:
@@ -171,9 +180,9 @@ def _record(
     )  # fmt: skip
 
 
-def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
+def held_out_stages(answer: Answer) -> tuple[Stage, ...]:
     """The recording predicted by the linear parameters and, where effects were accepted, by parameters and effects."""
-    stages = (Stage("parameters", _stage(bare)),)
+    stages = (Stage("parameters", _stage(answer.bare)),)
     return (*stages, Stage("effects", _stage(answer.found.model))) if answer.ids else stages
 
 
@@ -187,13 +196,13 @@ def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
     )
 
 
-def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, BiasStrength]) -> tuple[Candidate, ...]:
+def candidates(answer: Answer) -> tuple[Candidate, ...]:
     """Every effect tried, accepted or not: score, size, upper limit, and the effect that took its place."""
-    found, out = answer.found, dict(known)
-    out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in known}
+    found, out = answer.found, dict(answer.tested)
+    out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in out}
     for key, one in found.tried.items():
         out[key] = _candidate(one, found.against.get(key))
-    for key, bias in asked.items():
+    for key, bias in answer.asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
             out[key] = Candidate(key, bias.p_value, True, "", bias.score, bias.parameters, float(np.max(limit)))

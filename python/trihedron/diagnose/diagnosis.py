@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import ndtr
 
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
-from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths, noise_bounds
+from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
@@ -31,7 +31,7 @@ from trihedron.diagnose.session.starting_point import is_open, linear_model, nom
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Candidate, Diagnosis, Verdict
+from trihedron.records.diagnosis import Diagnosis, Verdict
 from trihedron.records.domains import DomainTest, Where
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
@@ -39,8 +39,6 @@ from trihedron.session.model import Prior, SessionState
 from trihedron.session.noise import START_STRENGTHS
 
 FEWEST_RECORDINGS = 2
-LARGEST_ALPHA = 0.5
-"""A test with a false-alarm rate of one half or more carries no information."""
 
 
 def diagnose_recording(
@@ -119,7 +117,8 @@ def _diagnosed(
     tell: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
-    if not 0.0 < alpha < LARGEST_ALPHA:
+    # A test with a false-alarm rate of one half or more carries no information.
+    if not 0.0 < alpha < 0.5:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
     begin = calibration
@@ -127,22 +126,21 @@ def _diagnosed(
     if prior is None and is_open(calibration):
         begin = nominal(recording, segments, (calibration.gravity_m_s2, calibration.gravity_source))
         prior = prior_of(obs, begin, is_weak=True)
-    run = _run(obs, start_state(obs, begin), prior, alpha, tell)
-    answer = run.answer
+    answer = _run(obs, start_state(obs, begin), prior, alpha, tell)
     model = answer.found.model
     relations = records(answer.found.related)
-    verdict = verdict_of(answer, run.domains, run.remaining, has_relations=bool(relations))
+    verdict = verdict_of(answer, has_relations=bool(relations))
     # Without missing effects S and b are those of a calibration of this recording.
-    base = run.bare.fitted
+    base = answer.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
-    residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
+    residuals = residuals_before_after(answer.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
-        verdict=verdict, domains=run.domains, effects=accepted_effects(answer, residuals), remaining=run.remaining,
-        candidates=candidates(answer, run.candidates, run.asked), baseline=with_covariance(linear_model(base), base),
+        verdict=verdict, domains=answer.domains, effects=accepted_effects(answer, residuals),
+        remaining=answer.remaining, candidates=candidates(answer), baseline=with_covariance(linear_model(base), base),
         extended=with_covariance(linear_model(final), final), noise=_noise(model),
         gravity_m_s2=calibration.gravity_m_s2, alpha=alpha, recording_source=recording.source,
         recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
-        residuals=residuals, relations=relations, stages=held_out_stages(run.bare, answer),
+        residuals=residuals, relations=relations, stages=held_out_stages(answer),
     )  # fmt: skip
     tell(1.0, "done")
     return result, model
@@ -167,20 +165,7 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """Fits of the session in the part's noise and, without effects, in noise of free strength; and the answer."""
-
-    predicted: Fit
-    bare: Hypothesis
-    answer: Answer
-    domains: tuple[DomainTest, ...]
-    remaining: tuple[DomainTest, ...]
-    candidates: dict[str, Candidate]
-    asked: dict[str, BiasStrength]
-
-
-def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
+def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> Answer:
     tell(0.05, "fitting the session")
     predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
     context = Context(predicted.obs, predicted)
@@ -200,13 +185,15 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     biases, asked = bias_strengths(found.related.model, alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
-    answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)
+    answer = Answer(
+        predicted, bare, found, with_shapes(found.model), biases, observed.seen, judged.fitted, asked, known, domains
+    )
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
     remaining = accounted_for(answer, remaining)
     if not answer.ids and not any(one.disagrees for one in remaining):
         domains = remaining  # 1/f noise inside the poses explains the disagreement
-    return _Run(predicted, bare, answer, domains, remaining, known, asked)
+    return replace(answer, domains=domains, remaining=remaining)
 
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
@@ -269,24 +256,18 @@ def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[Do
     )
 
 
-def verdict_of(
-    answer: Answer,
-    domains: tuple[DomainTest, ...],
-    remaining: tuple[DomainTest, ...] = (),
-    *,
-    has_relations: bool = False,
-) -> Verdict:
+def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
     """One word; ``not-testable`` where no pose domain could be tested and the samples show nothing either.
 
     Minor effects (a disturbed pose, a faint line) leave it at ``unexplained`` while something else disagrees.
     """
     if answer.ids:
-        is_left = has_relations or any(d.disagrees for d in remaining)
+        is_left = has_relations or any(d.disagrees for d in answer.remaining)
         says_why = not answer.are_footnotes and not answer.are_spread
         return "missing-physics" if says_why or not is_left else "unexplained"
-    if has_relations or any(d.disagrees for d in domains):
+    if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.
-    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):
+    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in answer.domains):
         return "not-testable"
     return "consistent"
