@@ -84,10 +84,7 @@ def compensate(
     ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
     ``gyroscope`` the extended model's ``(S, b)``. Effects that cannot be compensated are listed in ``left_out``.
 
-    Raises
-    ------
-    ValueError
-        When an effect is not written as a diagnosis writes it.
+    Refused when an effect is not written as a diagnosis writes it.
     """
     S_f, b_f = accelerometer
     S_w, b_w = gyroscope if gyroscope is not None else (np.eye(3), np.zeros(3))

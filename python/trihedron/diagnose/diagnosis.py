@@ -52,22 +52,11 @@ def diagnose_recording(
 ) -> Diagnosis:
     """Fit the sensor model to a recording and report the physical effects that it lacks (docs/diagnosis.md).
 
-    Parameters
-    ----------
-    recording, segments : Recording, Segments
-        Raw readings with their poses and moves.
-    calibration : Calibration
-            Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that
-            the recording is compared with that calibration and not with one fitted to it.
-    alpha : float
-        Chance that a healthy recording is called anything but consistent.
-    progress : callable (fraction, text), optional
-        Called as the work goes on.
+    ``calibration`` is the start of the fit; with ``calibration_is_given`` also its prior, so that the recording is
+    compared with that calibration and not with one fitted to it. ``alpha`` is the chance that a healthy recording is
+    called anything but consistent; ``progress`` is called with the fraction done and what is done.
 
-    Raises
-    ------
-    ValueError
-            When there is nothing to compare a model with: no accelerometer, fewer than two poses.
+    Refused when there is nothing to compare a model with: no accelerometer, fewer than two poses.
     """
     return _diagnosed(recording, segments, calibration, calibration_is_given, alpha, progress or _silently)[0]
 
@@ -75,22 +64,8 @@ def diagnose_recording(
 def diagnose_recordings(
     given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
 ) -> SharedDiagnosis:
-    """Diagnose every recording of one unit, and find the effects with one size common to all of them (eq. 11.21).
-
-    Parameters
-    ----------
-    given : sequence of (Recording, Segments, Calibration)
-        Two or more, each as for :func:`diagnose_recording`.
-    alpha : float
-        Chance that a healthy recording is called anything but consistent.
-    progress : callable (fraction, text), optional
-        Called as the work goes on.
-
-    Raises
-    ------
-    ValueError
-            When there are fewer than two, or nothing to compare a model with.
-    """
+    """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
+    all of them (eq. 11.21). Refused with fewer than two."""
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
     tell = progress or _silently

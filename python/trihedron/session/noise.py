@@ -78,10 +78,7 @@ def measure_noise(
     """Noise of poses, and variance (m, 2, 3) of the integrals of every move, force and rate, (raw unit · s)², by motion
     faster than the samples and by noise slower than a move, in the half-open sample ``ranges`` of the moves.
 
-    Raises
-    ------
-    ValueError
-            When the segments state no uncertainty of their means.
+    Refused when the segments state no uncertainty of their means.
     """
     if (
         recording.accelerometer is None

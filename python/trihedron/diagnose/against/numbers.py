@@ -114,19 +114,12 @@ def compare_numbers(
     linear: FittedModel | None = None,
     left_open: Mapping[str, float] = NOTHING_OPEN,
 ) -> ComparedNumbers:
-    """Compare the parameters of ``model`` with those of ``recording``.
+    """Compare the parameters of the given ``model`` with those of the fit of the ``recording`` with its effects.
 
-    Parameters
-    ----------
-    model, recording : FittedModel
-            The given model, and the fit of the recording with the effects found in it.
-    alpha : float
-            Chance that any group of one unit on one day is called different; half of it is used here (Holm).
-    linear : FittedModel, optional
-            The recording's fit without effects. A linear calibration absorbs part of an effect that it does not
-            contain: a group counts only where it differs from this fit too.
-    left_open : mapping from id to size, optional
-            Groups whose reference an accepted effect leaves undefined by so much: no smaller difference is significant.
+    ``alpha`` is the chance that any group of one unit on one day is called different; half of it is used here (Holm).
+    ``linear`` is the recording's fit without effects: a linear calibration absorbs part of an effect that it does not
+    contain, and a group counts only where it differs from this fit too. ``left_open`` are groups whose reference an
+    accepted effect leaves undefined by so much: no smaller difference is significant.
     """
     groups, factors = _groups(model, recording)
     p = np.array([group.p_value for group in groups])

@@ -166,10 +166,7 @@ class Observations(SessionReadings):
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
     """Observations of a segmented recording.
 
-    Raises
-    ------
-    ValueError
-        When the recording has no accelerometer or fewer than two poses: there is no session state to compare with.
+    Refused without an accelerometer or with fewer than two poses: there is no session state to compare with.
     """
     recording = recording.with_distinct_timestamps()
     segments, swing = means_beside_lines(recording, segments)
