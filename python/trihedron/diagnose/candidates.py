@@ -148,7 +148,7 @@ def _is_possible(term: Term, asked: AddedTerms) -> bool:
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.
 
-SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
 """Iterations of size and shape: the second changes them by a tenth of what the first does."""

@@ -20,6 +20,8 @@ TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
+QUIET = 0.1
+"""Quantile over the poses that is taken for the power of a pose without vibration."""
 LEAST_SWING_K = 0.2
 """A logged temperature that changes by less is ignored: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
 LEAST_SWING_V = 1e-4
@@ -211,7 +213,7 @@ class Context:
         """
         obs = self.obs
         poses = self.pose_power
-        floor = np.quantile(poses, 0.1, axis=0)
+        floor = np.quantile(poses, QUIET, axis=0)
         out = np.zeros((self.n_points, 3))
         out[: obs.n_poses] = np.maximum(poses - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
@@ -229,7 +231,7 @@ class Context:
             [rough(obs.raw_force[pose.start : pose.stop] @ self.fitted.state.accel_S.T).mean(axis=0)
              for pose in obs.segments.poses]
         )  # fmt: skip
-        quiet = np.quantile(inside, 0.1, axis=0)
+        quiet = np.quantile(inside, QUIET, axis=0)
         passed = (inside - quiet).sum() / max(float((poses - floor).sum()), TINY)
         for where in self.moves:
             out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)

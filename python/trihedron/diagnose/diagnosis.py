@@ -62,7 +62,7 @@ def diagnose_recording(
 
 
 def diagnose_recordings(
-    given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
+    given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float, progress: Progress | None = None
 ) -> SharedDiagnosis:
     """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
     all of them (eq. 11.21). Refused with fewer than two."""

@@ -17,14 +17,14 @@ from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_
 from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
 from trihedron.session.model import Prior, SessionState, contiguous
-from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
 from trihedron.threads import side_by_side
 
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
-ELSEWHERE: tuple[Strengths, ...] = (
-    ((640.0, 640.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0)),
-    ((300.0, 300.0), (3.0,) * 4, (0.5, 0.5), (2.0, 2.0)),
-    ((2.0, 2.0), (NO_SCATTER,) * 4, (1.0, 1.0), (5.0, 5.0)),
+ELSEWHERE = (
+    strengths_of_all(640.0),
+    strengths_of_all(300.0, scatter=3.0, between=0.5, moves=2.0),
+    strengths_of_all(2.0, moves=5.0),
 )
 """Low noise, biases that scatter, biases that walk: large noise strengths can absorb an effect that these show."""
 

@@ -33,8 +33,19 @@ ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
 NOISE_CORNER_S = 20.0
 """Shortest corner time that the part's noise explains, where white noise and bias walk have equal Allan deviation: in
 consumer parts it is this or later. Every hypothesis allows a walk of any strength; a stronger one is called drift."""
-START_STRENGTHS: Strengths = ((8.0 * NOISE_CORNER_S,) * 2, (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
+
+
+def strengths_of_all(
+    corner_s: float, scatter: float = NO_SCATTER, between: float = 1.0, moves: float = 1.0
+) -> Strengths:
+    """The same strengths of both sensors, all axes, gravity and velocity."""
+    return (corner_s, corner_s), (scatter,) * 4, (between, between), (moves, moves)
+
+
+START_STRENGTHS = strengths_of_all(8.0 * NOISE_CORNER_S)
 """Start of the search for strengths."""
+NOISE_DOF = 100.0
+"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
 """Bounds of a part whose noise is that of its samples."""
 

@@ -15,12 +15,10 @@ from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import DYNAMICS, MOVES, SessionState, core_state, misfits, state_of
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 
 FALSE_ALARM = 1e-3
 """Probability that moves of a sound session are found to exceed the noise of their samples."""
-NOISE_DOF = 100.0
-"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
 LOOSE = 100.0
