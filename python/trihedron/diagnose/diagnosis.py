@@ -17,7 +17,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import STEP_FACTOR, TimingJitter, common_time_error
-from trihedron.diagnose.hypothesis import ELSEWHERE, Hypothesis, again, hypothesis
+from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
@@ -36,7 +36,7 @@ from trihedron.records.domains import DomainTest, Where
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
-from trihedron.session.noise import START_STRENGTHS
+from trihedron.session.noise import strengths_of_all
 
 FEWEST_RECORDINGS = 2
 
@@ -171,11 +171,14 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     return replace(answer, domains=domains, remaining=remaining)
 
 
+LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
+
+
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    # The evidence may have an optimum at low and at high strengths of the noise.
-    starts = (START_STRENGTHS, *ELSEWHERE)
-    tried = [hypothesis(observed.obs, observed.fitted.state, prior, strengths=one) for one in starts]
-    bare = max(tried, key=lambda one: one.log_evidence)
+    first = hypothesis(observed.obs, observed.fitted.state, prior)
+    # Two starts, low and high noise strengths: the evidence may have an optimum at each.
+    loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
+    bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
 
 
