@@ -8,7 +8,6 @@ the sensor's noise (docs/model-session.md). The arithmetic is :class:`trihedron.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import overload
 
 import numpy as np
 
@@ -52,12 +51,6 @@ class SessionState:
     strengths: Strengths = START_STRENGTHS
 
 
-@overload
-def contiguous(values: FloatArray) -> FloatArray: ...
-@overload
-def contiguous(values: None) -> None: ...
-@overload
-def contiguous(values: FloatArray | None) -> FloatArray | None: ...
 def contiguous(values: FloatArray | None) -> FloatArray | None:
     """Values as a contiguous float64 array for the core."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
@@ -105,7 +98,7 @@ class SessionReadings(SessionNoise):
         unit = self.scatter_unit()
         return _core.SessionModel(
             gravity_m_s2=gravity_m_s2, poses=self.core_poses(), moves=moves, noise=timing_s,
-            prior=None if prior is None else (contiguous(prior.mean), contiguous(prior.covariance), prior.is_weak),
+            prior=None if prior is None else (prior.mean, prior.covariance, prior.is_weak),
             scatter=(unit, self.force_scatter / float(unit[0, 0])) if is_scatter_free else None,
         )  # fmt: skip
 
