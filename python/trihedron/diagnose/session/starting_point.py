@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
@@ -37,13 +38,12 @@ def start_state(obs: Observations, calibration: Calibration) -> SessionState:
 def prior_of(obs: Observations, calibration: Calibration, *, is_weak: bool = False) -> Prior:
     """A calibration as a prior on the 18 unknowns, in the lower frame on centred readings."""
     lower = in_frame(calibration, "lower")
-    to_unknowns = np.zeros((18, 24))
-    to_unknowns[:6, :9] = np.eye(9).reshape(3, 3, 9)[LOWER]
-    to_unknowns[6:9, :9] = np.kron(np.eye(3), obs.force_origin)  # b' = b + S origin
-    to_unknowns[6:9, 9:12] = np.eye(3)
-    to_unknowns[9:, 12:21] = np.eye(9)
+    every = np.eye(24)
+    bias = every[9:12].copy()
+    bias[:, :9] = np.kron(np.eye(3), obs.force_origin)  # b' = b + S origin
+    to_unknowns = np.concatenate([every[:9].reshape(3, 3, -1)[LOWER], bias, every[12:21]])
     sides = [(lower.accelerometer.S, lower.accelerometer.b), (np.eye(3), np.zeros(3))]
-    covariance = np.eye(24)
+    covariance = every.copy()
     if lower.gyroscope is not None:
         sides[1] = lower.gyroscope.S, lower.gyroscope.b
     covariance[: len(lower.covariance), : len(lower.covariance)] = lower.covariance
@@ -87,10 +87,7 @@ def nominal(recording: Recording, segments: Segments, gravity: tuple[float, str]
         rate = rate_to_si(recording.gyroscope_unit) or _rate_of_count(recording, segments)
         bias = -rate * np.nanmedian(recording.gyroscope, axis=0)
         gyroscope = sensor(rate, bias, rate * off, np.abs(bias), recording.gyroscope_unit.value, "rad/s")
-    covariance = np.zeros((12 if gyroscope is None else 24,) * 2)
-    covariance[:12, :12] = accelerometer.covariance
-    if gyroscope is not None:
-        covariance[12:, 12:] = gyroscope.covariance
+    covariance = block_diag(*(one.covariance for one in (accelerometer, gyroscope) if one is not None))
     return Calibration(accelerometer, gyroscope, covariance, "lower", *gravity)
 
 
