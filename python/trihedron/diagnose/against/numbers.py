@@ -180,7 +180,8 @@ def _sensor(
     covariance[:3, :3] += np.diag(before + seen.drift)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
-    log_m, log_r, sizes = a.log_scale, r.log_scale, None
+    log_m, log_r = a.log_scale, r.log_scale
+    sizes: tuple[float, float] | None = None
     is_same_unit = given.unit == seen.unit
     if given.si is not None and seen.si is not None:
         in_si = log_m + math.log(given.si), log_r + math.log(seen.si)
