@@ -10,7 +10,7 @@ import trihedron
 from small_session import SCENARIO
 from trihedron.api.disagreeing import disagree
 from trihedron.cli import main
-from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.simulate import Scenario, hand_session, simulate
@@ -27,7 +27,7 @@ def sensor(rng):
 
 def fitted(S_a, b_a, S_g, b_g, sigma=1e-6):
     covariance = np.diag(np.r_[np.full(9, sigma), np.full(3, 1e-3), np.full(9, sigma), np.full(3, 1e-5)] ** 2)
-    return FittedModel(S_a, b_a, "counts", S_g, b_g, "counts", covariance, np.zeros(3), np.zeros(3))
+    return FittedModel(FittedSensor(S_a, b_a, "counts"), FittedSensor(S_g, b_g, "counts"), covariance)
 
 
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from trihedron.comparison.frames import carried_gravity, sign_of_gravity
 from trihedron.comparison.noise import compare_noise, sampled
-from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 from trihedron.records import Pose
@@ -24,8 +24,8 @@ def model(accel_size, gyro_size, units=("m/s^2", "rad/s")):
     """Triads that read ``size`` times the truth, sides of one per cent between the axes."""
     covariance = np.diag(np.r_[np.full(9, 1e-6), np.full(3, 1e-3), np.full(9, 1e-6), np.full(3, 1e-5)] ** 2)
     return FittedModel(
-        np.eye(3) / accel_size, np.zeros(3), units[0], np.eye(3) / gyro_size, np.zeros(3), units[1],
-        covariance, np.zeros(3), np.zeros(3),
+        FittedSensor(np.eye(3) / accel_size, np.zeros(3), units[0]),
+        FittedSensor(np.eye(3) / gyro_size, np.zeros(3), units[1]), covariance,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from trihedron.comparison.noise import compare_noise, sampled
 from trihedron.comparison.slow import correlation_times
-from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.records.channel_facts import LowPass
@@ -24,8 +24,8 @@ SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
 def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
     sigma = np.r_[np.full(9, 1e-5), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
     return FittedModel(
-        np.eye(3), -np.array(accel_bias), "m/s^2", np.eye(3), -np.array(gyro_bias), "rad/s", np.diag(sigma**2),
-        np.zeros(3), np.zeros(3),
+        FittedSensor(np.eye(3), -np.array(accel_bias), "m/s^2"), FittedSensor(np.eye(3), -np.array(gyro_bias), "rad/s"),
+        np.diag(sigma**2),
     )  # fmt: skip
 
 
@@ -158,8 +158,8 @@ def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_f
         readings = step * np.round(60.0 * rng.standard_normal((EVERY * N_POSES, 3)) / step) + offset
         time = np.arange(len(readings)) / RATE_HZ
         fit = FittedModel(
-            1e-3 * np.eye(3), np.zeros(3), "counts", 1e-5 * np.eye(3), np.zeros(3), "counts", np.eye(24),
-            np.zeros(3), np.zeros(3),
+            FittedSensor(1e-3 * np.eye(3), np.zeros(3), "counts"),
+            FittedSensor(1e-5 * np.eye(3), np.zeros(3), "counts"), np.eye(24),
         )  # fmt: skip
         made = Recording.from_arrays(time, readings, readings, accelerometer_unit="counts", gyroscope_unit="counts")
         return sampled(made, POSES, fit)

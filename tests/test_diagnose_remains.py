@@ -10,8 +10,8 @@ import trihedron
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
-from trihedron.diagnose.session.state import STATIC_ACCEL, STATIC_GYRO
 from trihedron.records import Pose
+from trihedron.session.model import STATIC_ACCEL, STATIC_GYRO
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0

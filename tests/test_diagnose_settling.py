@@ -12,7 +12,6 @@ from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import _turned_at_ends, observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.records import Recording
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
@@ -48,7 +47,7 @@ def session(lean_rad, scatter_rad_s, seed=1):
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
-    return Context(obs, tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None))
+    return Context(obs, tune_noise(obs, start_state(obs, calibration), None))
 
 
 def test_supports_that_give_are_told_from_zeros_that_scatter():
@@ -69,7 +68,7 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree():
         {one.domain: one for one in judge_rows(fitted, 0.01)}
         for fitted in (
             context.fitted,
-            tune_noise(with_settling(context, found), context.fitted.state, NO_DISTORTION, None),
+            tune_noise(with_settling(context, found), context.fitted.state, None),
         )
     )
     assert before["moves"].disagrees

@@ -15,8 +15,8 @@ from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.diagnose.session.state import contiguous, core_model, core_state
 from trihedron.segment import resegment, segment_recording
+from trihedron.session.model import contiguous, core_state
 from trihedron.session.noise import ANYTHING, coloured_variance
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
@@ -37,7 +37,7 @@ def fitted(effect_id="", seed=3, n_poses=14, **size):
 def refitted(model, strengths):
     """The model's session without effects at given strengths."""
     state = model.fitted.state
-    session = core_model(model.obs, state.gravity, None, is_scatter_free=True)
+    session = model.obs.model(state.gravity, None, is_scatter_free=True)
     return session.fit(state=core_state(state), strengths=strengths, force_effect=None, rate_effect=None)
 
 

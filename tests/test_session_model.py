@@ -9,12 +9,12 @@ from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
 from trihedron.segment import segment_recording
+from trihedron.session.model import DYNAMICS, MOVES, core_state
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
@@ -32,7 +32,7 @@ def fitted_to(recording, gravity):
     )
     calibration = calibrate_joint(recording, segments, accelerometer, gravity, "test")
     obs = observe(recording, segments)
-    return tune_noise(obs, start_state(obs, calibration), NO_DISTORTION, None), calibration
+    return tune_noise(obs, start_state(obs, calibration), None), calibration
 
 
 def scattered(readings, segments, sigma_raw, rng):
@@ -128,7 +128,7 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     core = fitted.core
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
-    session = core_model(fitted.obs, fitted.state.gravity, fitted.prior)
+    session = fitted.obs.model(fitted.state.gravity, fitted.prior)
     given = {"state": core_state(fitted.state), "force_effect": None, "rate_effect": None}
     gain = [session.fit(strengths=(*core.strengths[:3], (w, w)), **given).log_marginal for w in (1.0, 3.0)]
     n, chi2 = int(moves.sum()), float((fitted.system.residual[moves] ** 2).sum())

@@ -13,5 +13,7 @@ CORE_MEMORY = type(_core.new_array(1, 1).base)
 """Type of the object that owns the memory of an array made by the core; it gives no write access to the values."""
 AXES = ("x", "y", "z")
 """The axes of a triad: columns of every (n, 3) array."""
+TINY = 1e-300
+"""Least divisor, variance and probability: nothing measured is as small, and its inverse is finite."""
 XYZ = ("X", "Y", "Z")
 """The axes as printed in reports and on a silkscreen."""

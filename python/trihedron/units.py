@@ -63,6 +63,11 @@ def rate_to_si(unit: RateUnit) -> float | None:
     return _RATE_TO_SI.get(unit)
 
 
+def si_of(unit: str) -> float | None:
+    """Nominal SI per unit of an accelerometer or a gyro, by its name; ``None`` for counts."""
+    return {one.value: size for table in (_ACCELERATION_TO_SI, _RATE_TO_SI) for one, size in table.items()}.get(unit)
+
+
 def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | RateUnit) -> float | None:
     """Size of the unit ``one`` in ``other``; ``None`` between quantities, and between counts and another unit."""
     if one is other:

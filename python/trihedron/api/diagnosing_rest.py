@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
 from trihedron.diagnose.rest.answer import diagnose_rest
-from trihedron.diagnose.session.starting_point import (
-    TYPICAL_ANGLE,
-    TYPICAL_BIAS_M_S2,
-    TYPICAL_SCALE,
-    is_open,
-)
+from trihedron.diagnose.session.starting_point import is_open, nominal
 from trihedron.errors import REFUSALS
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
 from trihedron.units import acceleration_to_si, rate_to_si
@@ -44,7 +37,7 @@ def at_rest(
     """The model that converts a log of one or two orientations to SI; ``None`` where the log is a session."""
     if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
         return None
-    return _nominal(recording, segments, gravity) if known is None else known
+    return nominal(recording, segments, gravity) if known is None else known
 
 
 def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
@@ -86,34 +79,6 @@ def _turns(recording: Recording, segments: Segments) -> int:
         for m in segments.moves
     ]
     return sum(angle > TURNED_RAD for angle in turned)
-
-
-def _nominal(recording: Recording, segments: Segments, gravity: tuple[float, str]) -> Calibration:
-    """An orthogonal triad of nominal scale (counts scaled by |g|), with the typical spread of parts as uncertainty."""
-    assert recording.accelerometer is not None
-    scale = acceleration_to_si(recording.accelerometer_unit)
-    if scale is None:
-        still = segments.accelerometer_mean
-        typical = recording.accelerometer if still is None or not len(still) else still
-        scale = gravity[0] / float(np.nanmedian(np.linalg.norm(typical, axis=1)))
-    off = np.where(np.eye(3, dtype=bool), TYPICAL_SCALE, TYPICAL_ANGLE)
-
-    def sensor(scale: float, b: FloatArray, sigma_S: FloatArray, sigma_b: FloatArray, raw: str, si: str) -> Any:
-        covariance = np.diag(np.square([*sigma_S.ravel(), *sigma_b]))
-        return SensorCalibration(scale * np.eye(3), b, covariance, raw, si, "diagnosis")
-
-    accel_unit, spread = recording.accelerometer_unit.value, np.full(3, TYPICAL_BIAS_M_S2)
-    accelerometer = sensor(scale, np.zeros(3), scale * np.tril(off), spread, accel_unit, "m/s^2")
-    gyroscope = None
-    if recording.gyroscope is not None:
-        rate = rate_to_si(recording.gyroscope_unit) or 1.0
-        bias = -rate * np.nanmedian(recording.gyroscope, axis=0)
-        gyroscope = sensor(rate, bias, rate * off, np.abs(bias), recording.gyroscope_unit.value, "rad/s")
-    covariance = np.zeros((12 if gyroscope is None else 24,) * 2)
-    covariance[:12, :12] = accelerometer.covariance
-    if gyroscope is not None:
-        covariance[12:, 12:] = gyroscope.covariance
-    return Calibration(accelerometer, gyroscope, covariance, "lower", *gravity)
 
 
 def diagnosed_at_rest(

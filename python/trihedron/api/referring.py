@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
-from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_calibration
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.errors import RefusedError
 from trihedron.estimate.reference import fit_reference, turns_of_frame
@@ -198,11 +198,12 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
     covariance = np.zeros((24, 24))
     covariance[12:, 12:] = fit.covariance
     covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
-    S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
     # The day-to-day change of the biases is unknown here: only the uncertainty of the fit is used.
-    seen = FittedModel(
-        S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
-    )
+    accelerometer = model.accelerometer
+    if force is not None:
+        accelerometer = replace(accelerometer, S=force.S, b=force.b)
+    unit = "counts" if model.gyroscope is None else model.gyroscope.unit
+    seen = FittedModel(accelerometer, FittedSensor(fit.S, fit.b, unit), covariance)
     numbers = compare_numbers(model, seen, alpha=alpha).parameters
     return tuple(p for p in numbers if force is not None or p.sensor == "gyroscope")
 

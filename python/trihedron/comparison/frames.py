@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import fdtrc, stdtrit
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
@@ -195,21 +196,18 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
     if still is None or len(segments.moves) < FEWEST_MOVES or len(segments.moves) != segments.n_poses - 1:
         return None
     up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    attitude = Rotation.identity()
-    carried, misses = [np.array([0.0, 0.0, 1.0])], []
+    to_body = np.eye(3)
+    carried, misses = [to_body[:, 2]], []
     for move in segments.moves:
         bias = 0.5 * (still[move.pose_before] + still[move.pose_after])
         part = slice(move.start, move.stop)
-        step = np.gradient(recording.time_s[part])[:, None] if move.stop - move.start > 1 else 0.0
-        turns = (recording.gyroscope[part] - bias) * scale * step
-        if not np.isfinite(turns).all():
+        rate = (recording.gyroscope[part] - bias) * scale
+        if not np.isfinite(rate).all():
             return None
-        body = world = Rotation.identity()
-        for one in Rotation.from_rotvec(np.atleast_2d(turns)):
-            body, world = body * one, one * world
-        miss = float(np.arccos(np.clip(up[move.pose_after] @ body.inv().apply(up[move.pose_before]), -1.0, 1.0)))
-        misses.append(miss)
-        attitude = world * attitude
-        carried.append(attitude.inv().apply([0.0, 0.0, 1.0]))
+        # Turns in the order of the world's axes are the inverse of opposite turns in that of the body's.
+        body, world_back = (integrate_rate(recording.time_s[part], w, last_only=True) for w in (rate, -rate))
+        misses.append(np.arccos(np.clip(up[move.pose_after] @ body.T @ up[move.pose_before], -1.0, 1.0)))
+        to_body = to_body @ world_back
+        carried.append(to_body[:, 2])
     _, missed = Rotation.align_vectors(up, np.array(carried))
     return CarriedGravity(float(np.sqrt(np.mean(np.square(misses)))), float(missed) / float(np.sqrt(len(up))))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.comparison.noise import SENSORS, Sampled, sampled
 from trihedron.diagnose.against.fitted import FittedModel, as_read, model_of_calibration, model_of_diagnosis
 from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
@@ -190,7 +190,7 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     n = len(members)
     significant = [p for p in parameters if p.significant]
     channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
-    chi2 = f_upper(n, SPREAD_DOF, max(worst.p_value, 1e-300))
+    chi2 = f_upper(n, SPREAD_DOF, max(worst.p_value, TINY))
     return DomainTest("parameters", chi2, float(n), worst.p_value, bool(significant), Where(channels))
 
 

@@ -86,11 +86,11 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
     likeness: dict[Sensor, float] = {}
-    both = ((recording.accelerometer, model.accel_S), (recording.gyroscope, model.gyro_S))
-    for sensor, (readings, S) in zip(SENSORS, both, strict=True):
-        if readings is None or S is None:
+    for sensor in SENSORS:
+        readings, fitted = getattr(recording, sensor), getattr(model, sensor)
+        if readings is None or fitted is None:
             continue
-        si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
+        si = readings / np.linalg.norm(np.linalg.inv(fitted.S), axis=1)
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except REFUSALS:
@@ -146,14 +146,22 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
     return tuple(out)
 
 
-def _measured(
-    sensor: Sensor, axis: str, term: NoiseTerm, pair: tuple[Measured, Measured], unit: str, least: float, alpha: float
+def measured_row(
+    sensor: Sensor,
+    axis: str,
+    term: NoiseTerm,
+    pair: tuple[Measured, Measured],
+    unit: str,
+    least: float,
+    alpha: float,
+    remark: str = "",
 ) -> NoiseDifference:
+    """A figure that both sides have; it differs beyond chance and the ratio ``least``, and then has the ``remark``."""
     ratio = ratio_of(*pair)
-    is_far = max(ratio.value, 1.0 / ratio.value) > least
+    differs = bool(ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > least)
     return NoiseDifference(
         sensor, axis, term, pair[0].value, pair[1].value, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value,
-        bool(ratio.p_value < alpha and is_far),
+        differs, remark.format(ratio=ratio.value) if differs else "",
     )  # fmt: skip
 
 
@@ -165,7 +173,7 @@ def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) 
     unit = f"{UNIT[sensor]}/sqrt(Hz)"
     if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
         return None if (m.white is None) == (r.white is None) else _hidden(sensor, axis, m, r, unit)
-    return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
+    return measured_row(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
 
 
 def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) -> NoiseDifference:
@@ -269,7 +277,7 @@ def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
 
 def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
     if m.corner_hz is not None and r.corner_hz is not None:
-        yield _measured(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
+        yield measured_row(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
         return
     seen, other = (m, r) if m.corner_hz is not None else (r, m)
     if seen.corner_hz is None:

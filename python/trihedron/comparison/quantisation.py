@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import AXES
-from trihedron.channel_facts.pooled import ratio_of
+from trihedron.arrays import AXES, TINY
 from trihedron.comparison.draws import NAMES
-from trihedron.comparison.noise import SENSORS, Sampled, Sensor
+from trihedron.comparison.noise import SENSORS, Sampled, Sensor, measured_row
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
@@ -64,7 +63,7 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     model = density
     solution, sigma = np.zeros(2), math.inf
     for _ in range(_ROUNDS):
-        weight = 1.0 / np.maximum(model * relative, 1e-300)
+        weight = 1.0 / np.maximum(model * relative, TINY)
         scaled = design * weight[:, None]
         norms = np.linalg.norm(scaled, axis=0)
         solution = np.linalg.lstsq(scaled / norms, density * weight, rcond=None)[0] / norms
@@ -98,15 +97,9 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
     if made is None or seen is None or not (made.is_shown or seen.is_shown):
         return
     unit = "m/s" if sensor == "accelerometer" else "rad"
-    values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
     if made.is_shown and seen.is_shown:
-        ratio = ratio_of(made.measured(), seen.measured())
-        is_off = ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > LEAST_RATIO
-        remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {ratio.value:.2g} times the recording's."
-        yield NoiseDifference(
-            sensor, axis, "Q", *values, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value, is_off,
-            remark if is_off else "",
-        )  # fmt: skip
+        remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {{ratio:.2g}} times the recording's."
+        yield measured_row(sensor, axis, "Q", (made.measured(), seen.measured()), unit, LEAST_RATIO, alpha, remark)
         return
     difference = abs(made.quantisation - seen.quantisation)
     p_value = math.erfc(difference / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
@@ -114,4 +107,5 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
     is_off = p_value < alpha and more.quantisation > LEAST_RATIO**2 * (less.quantisation + 2.0 * less.sigma)
     side = "model" if made.is_shown else "recording"
     remark = f"Only the {side} has quantisation noise on the {NAMES[sensor]} {axis}: noise that rises with frequency."
+    values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
     yield NoiseDifference(sensor, axis, "Q", *values, None, None, unit, p_value, is_off, remark if is_off else "")

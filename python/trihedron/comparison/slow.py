@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.draws import NAMES
-from trihedron.comparison.noise import SENSORS, UNIT, Sampled, Sensor
+from trihedron.comparison.noise import SENSORS, UNIT, Sampled, Sensor, measured_row
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow
@@ -39,19 +39,14 @@ def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tu
     }
     both = {sensor: (m, r) for sensor, (m, r) in times.items() if m is not None and r is not None}
     shared = _one_for_both(both, alpha)
-    out = []
-    for sensor, (m, r) in both.items():
-        ratio = ratio_of(m, r)
-        differs = ratio.p_value < alpha / TESTS and max(ratio.value, 1.0 / ratio.value) > LEAST_TIME_RATIO
-        name = NAMES[sensor]
-        remark = shared or f"The noise of the {name} forgets in {m.value:.2g} s, the recording's in {r.value:.2g} s."
-        out.append(
-            NoiseDifference(
-                sensor, "", "correlation-time", m.value, r.value, ratio.value, (ratio.lower, ratio.upper), "s",
-                ratio.p_value, differs, remark if differs else "",
-            )
-        )  # fmt: skip
-    return tuple(out)
+    remark = "The noise of the {} forgets in {:.2g} s, the recording's in {:.2g} s."
+    return tuple(
+        measured_row(
+            sensor, "", "correlation-time", (m, r), "s", LEAST_TIME_RATIO, alpha / TESTS,
+            shared or remark.format(NAMES[sensor], m.value, r.value),
+        )
+        for sensor, (m, r) in both.items()
+    )  # fmt: skip
 
 
 def _one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float) -> str:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
+from trihedron.arrays import TINY
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
-from trihedron.diagnose.candidates import Tried
+from trihedron.diagnose.candidates import Tried, wald_p
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
@@ -23,28 +23,36 @@ from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
-from trihedron.records.domains import DomainResiduals, HeldOut
+from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
+from trihedron.session.model import misfits
 
 HEADLINE = 0.5
 """Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
 after the effects that explain poses and moves."""
-LEAST_P = 1e-300
-"""Smallest p-value that a double holds with full precision."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Everything accepted: effects with columns, bias processes, effects found by tests on the samples.
 
+    ``predicted`` and ``bare`` are the session without effects, in the part's noise and in noise of free strength.
     ``numbers`` is the hypothesis that parameters and uncertainties come from; its shape parameters are unknowns too.
+    ``asked`` are all bias processes tested, ``tested`` the results of the samples' own tests; ``domains`` are those of
+    the session without effects, ``remaining`` with them.
     """
 
+    predicted: Fit
+    bare: Hypothesis
     found: Found
     numbers: Hypothesis
     biases: Sequence[BiasStrength]
     seen: Sequence[Seen]
     judged: Fit
     """Fit with all accepted effects, noise strengths bounded to the part's noise; remaining misfit is judged on it."""
+    asked: Mapping[str, BiasStrength]
+    tested: Mapping[str, Candidate]
+    domains: tuple[DomainTest, ...]
+    remaining: tuple[DomainTest, ...] = ()
 
     @property
     def ids(self) -> set[str]:
@@ -65,7 +73,7 @@ class Answer:
     def shares(self) -> list[float]:
         """Share of the misfit explained by each: its gain over the sum of all gains and the remaining ``excess``."""
         gains = self.gains
-        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), 1e-9)
+        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), TINY)
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
@@ -86,11 +94,8 @@ class Answer:
 
 def excess(fitted: Fit) -> float:
     """Chi-square beyond the degrees of freedom, summed over the domains where it is positive."""
-    used, out = fitted.leverage, 0.0
-    for domain in ROW_DOMAINS:
-        rows = fitted.system.domain == domain
-        out += max(float((fitted.system.residual[rows] ** 2).sum() - (1.0 - used[rows]).sum()), 0.0)
-    return out
+    chi2, dof = misfits(fitted.core)
+    return float(np.maximum(chi2 - dof, 0.0).sum())
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:
@@ -115,13 +120,12 @@ def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acce
         parameters = effect.parameters(variant, value, covariance)
         columns = variant.distortion.force, variant.distortion.rate
         curves = () if effect.is_local else effect_curves(found.model.context, columns, value, covariance, residuals)
-        record = _record(
-            effect, parameters, effect.statement(parameters), _p_of(value, covariance), found.scores[k],
-            found.rivals[k], held_out_records(found.without[k], found.model),
+        out.append(_record(
+            effect, parameters, effect.statement(parameters), wald_p(value, covariance), found.scores[k],
+            held_out_records(found.without[k], found.model), found.rivals[k], curves,
             variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
             values=[float(v) for v in value],
-        )  # fmt: skip
-        out.append(replace(record, curves=curves))
+        ))  # fmt: skip
     return out
 
 
@@ -139,25 +143,19 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         held = held_out_records(one.without, model)
         rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
-        record = _record(one.effect, one.parameters, one.statement, one.p_value, one.score, rivals, held, **extra)
-        out.append(replace(record, curves=curves))
-    return out
-
-
-def _of_samples(answer: Answer) -> list[AcceptedEffect]:
-    context = Context(answer.numbers.obs, answer.numbers.fitted)
-    out = []
-    for one in answer.seen:
-        evidence = one.evidence
-        parameters = evidence.parameters if evidence.restate is None else evidence.restate(context)
         out.append(
-            _record(one.effect, parameters, evidence.statement, evidence.p_value, one.gain, (), evidence.held_out)
+            _record(one.effect, one.parameters, one.statement, one.p_value, one.score, held, rivals, curves, **extra)
         )
     return out
 
 
-def _p_of(value: np.ndarray, covariance: np.ndarray) -> float:
-    return float(chdtrc(len(value), float(value @ np.linalg.solve(covariance, value))))
+def _of_samples(answer: Answer) -> list[AcceptedEffect]:
+    context, out = Context(answer.numbers.obs, answer.numbers.fitted), []
+    for one in answer.seen:
+        said = one.evidence
+        parameters = said.parameters if said.restate is None else said.restate(context)
+        out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
+    return out
 
 
 def _record(
@@ -166,25 +164,25 @@ def _record(
     statement: str,
     p_value: float,
     score: float,
-    rivals: tuple[str, ...],
     held_out: tuple[HeldOut, ...],
+    rivals: tuple[str, ...] = (),
+    curves: tuple[EffectCurve, ...] = (),
     **model: Any,
 ) -> AcceptedEffect:
-    by_id = {one.id: one for one in catalogue()}
-    either = (effect, by_id[rivals[0]]) if rivals else ()
+    either = (effect, by_id()[rivals[0]]) if rivals else ()
     said = {"variant": "", "shape": {}, "values": [], **model, "applies_to_other_recordings": effect.applies_elsewhere}
     return AcceptedEffect(
         id=effect.id, statement=statement, parameters=parameters,
-        p_adjusted=min(1.0, max(p_value, LEAST_P) * len(catalogue())), delta_bic=float(score), held_out=held_out,
+        p_adjusted=min(1.0, max(p_value, TINY) * len(catalogue())), delta_bic=float(score), held_out=held_out,
         confounded_with=rivals,
         separating_experiment=" / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
-        model=MappingProxyType(said),
+        model=MappingProxyType(said), curves=curves,
     )  # fmt: skip
 
 
-def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
+def held_out_stages(answer: Answer) -> tuple[Stage, ...]:
     """The recording predicted by the linear parameters and, where effects were accepted, by parameters and effects."""
-    stages = (Stage("parameters", _stage(bare)),)
+    stages = (Stage("parameters", _stage(answer.bare)),)
     return (*stages, Stage("effects", _stage(answer.found.model))) if answer.ids else stages
 
 
@@ -198,22 +196,20 @@ def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
     )
 
 
-def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, BiasStrength]) -> tuple[Candidate, ...]:
+def candidates(answer: Answer) -> tuple[Candidate, ...]:
     """Every effect tried, accepted or not: score, size, upper limit, and the effect that took its place."""
-    found, out = answer.found, dict(known)
-    out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in known}
+    found, out = answer.found, dict(answer.tested)
+    out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in out}
     for key, one in found.tried.items():
         out[key] = _candidate(one, found.against.get(key))
-    for key, bias in asked.items():
+    for key, bias in answer.asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
             out[key] = Candidate(key, bias.p_value, True, "", bias.score, bias.parameters, float(np.max(limit)))
     for k, term in enumerate(found.model.terms):
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)
-        out[term.effect.id] = Candidate(
-            term.effect.id, max(_p_of(value, covariance), LEAST_P), True, "", found.scores[k], size
-        )
+        out[term.effect.id] = Candidate(term.effect.id, wald_p(value, covariance), True, "", found.scores[k], size)
     return tuple(out[key] for key in sorted(out))
 
 

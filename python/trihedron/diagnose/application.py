@@ -16,8 +16,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects import by_id
+from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.errors import RefusedError
@@ -84,10 +84,7 @@ def compensate(
     ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
     ``gyroscope`` the extended model's ``(S, b)``. Effects that cannot be compensated are listed in ``left_out``.
 
-    Raises
-    ------
-    ValueError
-        When an effect is not written as a diagnosis writes it.
+    Refused when an effect is not written as a diagnosis writes it.
     """
     S_f, b_f = accelerometer
     S_w, b_w = gyroscope if gyroscope is not None else (np.eye(3), np.zeros(3))
@@ -99,7 +96,6 @@ def compensate(
     obs = SimpleNamespace(recording=recording, time_s=t, pose_time_s=t[:0], raw_rate=raw_w, raw_force=raw_f, n_poses=0)
     state = SimpleNamespace(accel_S=S_f, gyro_S=S_w)
     left_out: dict[str, str] = {}
-    known = {effect.id: effect for effect in catalogue()}
     force, rate = read_f, read_w
     for _ in range(N_ITERATIONS):
         path = SimpleNamespace(force=force, rate=rate, move_slices=(slice(0, len(every)),), point_samples=every)
@@ -107,7 +103,7 @@ def compensate(
         context = SampleContext(cast(Observations, obs), cast(Fit, fitted), reference=references)
         force, rate = read_f, read_w
         for entry in effects:
-            variant = _variant(entry, known, context, left_out)
+            variant = _variant(entry, context, left_out)
             if variant is None:
                 continue
             values = np.asarray(entry["model"]["values"], dtype=np.float64)
@@ -124,14 +120,12 @@ def compensate(
     )
 
 
-def _variant(
-    entry: Mapping[str, Any], known: Mapping[str, Effect], context: SampleContext, left_out: dict[str, str]
-) -> Variant | None:
+def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[str, str]) -> Variant | None:
     effect_id = str(entry.get("id", ""))
     model = entry.get("model")
     if not isinstance(model, Mapping) or "values" not in model or "variant" not in model:
         raise RefusedError(f"effect {effect_id!r} has no model with its variant and values")
-    effect = known.get(effect_id)
+    effect = by_id().get(effect_id)
     if effect is None:
         left_out[effect_id] = words("effect-unknown")
     elif not effect.applies_elsewhere:

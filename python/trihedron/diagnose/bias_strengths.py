@@ -18,7 +18,7 @@ from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds, scatter_unit
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
 LEAST_TIMES = 1.5
@@ -112,9 +112,8 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
 def _flicker(model: Hypothesis) -> FloatArray:
     """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
     obs = model.obs
-    unit = _units(model)
     expected = np.array([obs.force_scatter, obs.rate_scatter])
-    return np.asarray(FLICKER_WITHIN * expected / unit[:, 0])
+    return np.asarray(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0])
 
 
 def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
@@ -122,7 +121,7 @@ def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
     sensor = effect.sensor
     if not effect.walks:
         return float(max(_scatter(model, sensor)))
-    unit = _units(model)[sensor] * model.context.si_per_raw(sensor)
+    unit = model.obs.scatter_unit()[sensor] * model.context.si_per_raw(sensor)
     return (
         float(np.sqrt(np.mean(model.fitted.bias(sensor).var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
     )
@@ -134,17 +133,12 @@ def _scatter(model: Hypothesis, sensor: int) -> tuple[float, ...]:
     return scatter[1:] if sensor else scatter[:1]
 
 
-def _units(model: Hypothesis) -> FloatArray:
-    obs = model.obs
-    return scatter_unit(obs.pose_force_sigma, obs.pose_rate_sigma, obs.force_up)
-
-
 def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
     """(3,) SI by axis, and its standard uncertainty: one sigma of a scatter, the peak-to-peak range of a drift."""
     sensor, obs = effect.sensor, model.obs
     si_per_raw = model.context.si_per_raw(sensor)
     if not effect.walks:
-        size = np.array(_scatter(model, sensor)) * _units(model)[sensor] * si_per_raw
+        size = np.array(_scatter(model, sensor)) * model.obs.scatter_unit()[sensor] * si_per_raw
         return size, size / np.sqrt(2.0 * max(obs.n_poses - 1, 1))
     sigma = (obs.pose_force_sigma, obs.pose_rate_sigma)[sensor]
     assert sigma is not None

@@ -7,13 +7,13 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
 from trihedron.diagnose.session.state import Distortion
+from trihedron.probability import chdtrc
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
@@ -42,20 +42,19 @@ class Tried:
     @property
     def p_value(self) -> float:
         """Wald test of its parameters, with the noise strengths refitted beside it."""
-        value, covariance = self.asked.value, self.asked.covariance
-        wald = float(value @ np.linalg.solve(covariance, value))
-        return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
+        return wald_p(self.asked.value, self.asked.covariance)
+
+
+def wald_p(value: FloatArray, covariance: FloatArray) -> float:
+    """p-value of parameters (k,) against zero, by their covariance (k, k)."""
+    wald = float(value @ np.linalg.solve(covariance, value))
+    return max(chdtrc(len(value), max(wald, 0.0)), TINY)
 
 
 def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
     terms, missing = terms_beside(model, ())
-    looks = model.gains(terms, PRIOR_SCALES) if terms else []
-    asked = [
-        AddedTerms(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
-        for look in looks
-    ]
-    return _best_of_each(terms, asked, model.log_evidence), missing
+    return _best_of_each(terms, model.at_its_strengths(terms, PRIOR_SCALES), model.log_evidence), missing
 
 
 def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
@@ -149,7 +148,7 @@ def _is_possible(term: Term, asked: AddedTerms) -> bool:
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.
 
-SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
 """Iterations of size and shape: the second changes them by a tenth of what the first does."""

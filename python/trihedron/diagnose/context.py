@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.state import smoothed_slope
@@ -20,6 +20,8 @@ TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
+QUIET = 0.1
+"""Quantile over the poses that is taken for the power of a pose without vibration."""
 LEAST_SWING_K = 0.2
 """A logged temperature that changes by less is ignored: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
 LEAST_SWING_V = 1e-4
@@ -62,7 +64,7 @@ class Context:
     @cached_property
     def elapsed(self) -> FloatArray:
         """(points,) time from 0 at the first to 1 at the last sample of the recording."""
-        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9))
+        return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], TINY))
 
     # -- motion ---------------------------------------------------------------------------------------------------
     @property
@@ -153,7 +155,7 @@ class Context:
         force = obs.raw_force @ state.accel_S.T + state.accel_b
         for i, pose in enumerate(obs.segments.poses):
             force[pose.start : pose.stop] = state.gravity * state.up[i]
-        return np.asarray(_finite(force) @ np.linalg.inv(self.accel_axes).T)
+        return np.asarray(np.where(np.isfinite(force), force, 0.0) @ np.linalg.inv(self.accel_axes).T)
 
     def _logged(self, name: str) -> FloatArray | None:
         """A logged channel (n,) of the recording, if it has any value."""
@@ -164,7 +166,7 @@ class Context:
     def temperature(self) -> FloatArray | None:
         """(points,) logged temperature minus its mean, °C."""
         logged = self._logged("temperature_degc")
-        return None if logged is None else _finite(self.at_points(logged) - self.references["temperature_degc"])
+        return None if logged is None else np.nan_to_num(self.at_points(logged) - self.references["temperature_degc"])
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
@@ -179,7 +181,7 @@ class Context:
     def supply(self) -> FloatArray | None:
         """(points,) relative deviation of the logged supply voltage from its mean."""
         logged = self._logged("supply_v")
-        return None if logged is None else _finite(self.at_points(logged) / self.references["supply_v"] - 1.0)
+        return None if logged is None else np.nan_to_num(self.at_points(logged) / self.references["supply_v"] - 1.0)
 
     @property
     def references(self) -> Mapping[str, float]:
@@ -211,7 +213,7 @@ class Context:
         """
         obs = self.obs
         poses = self.pose_power
-        floor = np.quantile(poses, 0.1, axis=0)
+        floor = np.quantile(poses, QUIET, axis=0)
         out = np.zeros((self.n_points, 3))
         out[: obs.n_poses] = np.maximum(poses - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
@@ -229,8 +231,8 @@ class Context:
             [rough(obs.raw_force[pose.start : pose.stop] @ self.fitted.state.accel_S.T).mean(axis=0)
              for pose in obs.segments.poses]
         )  # fmt: skip
-        quiet = np.quantile(inside, 0.1, axis=0)
-        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), 1e-300)
+        quiet = np.quantile(inside, QUIET, axis=0)
+        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), TINY)
         for where in self.moves:
             out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
         return out
@@ -242,7 +244,7 @@ class Context:
         for where, (before, after) in zip(self.moves, self.obs.move_poses, strict=True):
             size = np.linalg.norm(self.rate[where], axis=1)
             turned = np.concatenate([[0.0], np.cumsum(0.5 * (size[1:] + size[:-1]) * np.diff(self.time_s[where]))])
-            blend = (turned / max(turned[-1], 1e-12)).reshape(-1, *([1] * (per_pose.ndim - 1)))
+            blend = (turned / max(turned[-1], TINY)).reshape(-1, *([1] * (per_pose.ndim - 1)))
             out[where] = per_pose[before] * (1 - blend) + per_pose[after] * blend
         return out
 
@@ -283,10 +285,6 @@ class Context:
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
     return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
-
-
-def _finite(values: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import ndtr
 
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
-from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths, noise_bounds
+from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
@@ -27,20 +27,18 @@ from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
-from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_state
-from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
+from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import RefusedError
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Candidate, Diagnosis, Verdict
+from trihedron.records.diagnosis import Diagnosis, Verdict
 from trihedron.records.domains import DomainTest, Where
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
-from trihedron.session.noise import Strengths
+from trihedron.session.model import Prior, SessionState
+from trihedron.session.noise import strengths_of_all
 
 FEWEST_RECORDINGS = 2
-LARGEST_ALPHA = 0.5
-"""A test with a false-alarm rate of one half or more carries no information."""
 
 
 def diagnose_recording(
@@ -54,45 +52,20 @@ def diagnose_recording(
 ) -> Diagnosis:
     """Fit the sensor model to a recording and report the physical effects that it lacks (docs/diagnosis.md).
 
-    Parameters
-    ----------
-    recording, segments : Recording, Segments
-        Raw readings with their poses and moves.
-    calibration : Calibration
-            Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that
-            the recording is compared with that calibration and not with one fitted to it.
-    alpha : float
-        Chance that a healthy recording is called anything but consistent.
-    progress : callable (fraction, text), optional
-        Called as the work goes on.
+    ``calibration`` is the start of the fit; with ``calibration_is_given`` also its prior, so that the recording is
+    compared with that calibration and not with one fitted to it. ``alpha`` is the chance that a healthy recording is
+    called anything but consistent; ``progress`` is called with the fraction done and what is done.
 
-    Raises
-    ------
-    ValueError
-            When there is nothing to compare a model with: no accelerometer, fewer than two poses.
+    Refused when there is nothing to compare a model with: no accelerometer, fewer than two poses.
     """
     return _diagnosed(recording, segments, calibration, calibration_is_given, alpha, progress or _silently)[0]
 
 
 def diagnose_recordings(
-    given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float = 0.01, progress: Progress | None = None
+    given: Sequence[tuple[Recording, Segments, Calibration]], *, alpha: float, progress: Progress | None = None
 ) -> SharedDiagnosis:
-    """Diagnose every recording of one unit, and find the effects with one size common to all of them (eq. 11.21).
-
-    Parameters
-    ----------
-    given : sequence of (Recording, Segments, Calibration)
-        Two or more, each as for :func:`diagnose_recording`.
-    alpha : float
-        Chance that a healthy recording is called anything but consistent.
-    progress : callable (fraction, text), optional
-        Called as the work goes on.
-
-    Raises
-    ------
-    ValueError
-            When there are fewer than two, or nothing to compare a model with.
-    """
+    """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
+    all of them (eq. 11.21). Refused with fewer than two."""
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
     tell = progress or _silently
@@ -119,29 +92,30 @@ def _diagnosed(
     tell: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
-    if not 0.0 < alpha < LARGEST_ALPHA:
+    # A test with a false-alarm rate of one half or more carries no information.
+    if not 0.0 < alpha < 0.5:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
-    start = start_state(obs, calibration)
+    begin = calibration
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
-        start, prior = nominal_start(obs, calibration)
-    run = _run(obs, start, prior, alpha, tell)
-    answer = run.answer
+        begin = nominal(recording, segments, (calibration.gravity_m_s2, calibration.gravity_source))
+        prior = prior_of(obs, begin, is_weak=True)
+    answer = _run(obs, start_state(obs, begin), prior, alpha, tell)
     model = answer.found.model
     relations = records(answer.found.related)
-    verdict = verdict_of(answer, run.domains, run.remaining, has_relations=bool(relations))
+    verdict = verdict_of(answer, has_relations=bool(relations))
     # Without missing effects S and b are those of a calibration of this recording.
-    base = run.bare.fitted
+    base = answer.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
-    residuals = residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
+    residuals = residuals_before_after(answer.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
-        verdict=verdict, domains=run.domains, effects=accepted_effects(answer, residuals), remaining=run.remaining,
-        candidates=candidates(answer, run.candidates, run.asked), baseline=with_covariance(linear_model(base), base),
+        verdict=verdict, domains=answer.domains, effects=accepted_effects(answer, residuals),
+        remaining=answer.remaining, candidates=candidates(answer), baseline=with_covariance(linear_model(base), base),
         extended=with_covariance(linear_model(final), final), noise=_noise(model),
         gravity_m_s2=calibration.gravity_m_s2, alpha=alpha, recording_source=recording.source,
         recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
-        residuals=residuals, relations=relations, stages=held_out_stages(run.bare, answer),
+        residuals=residuals, relations=relations, stages=held_out_stages(answer),
     )  # fmt: skip
     tell(1.0, "done")
     return result, model
@@ -166,22 +140,9 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """Fits of the session in the part's noise and, without effects, in noise of free strength; and the answer."""
-
-    predicted: Fit
-    bare: Hypothesis
-    answer: Answer
-    domains: tuple[DomainTest, ...]
-    remaining: tuple[DomainTest, ...]
-    candidates: dict[str, Candidate]
-    asked: dict[str, BiasStrength]
-
-
-def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
+def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> Answer:
     tell(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, NO_DISTORTION, prior), start, prior, alpha)
+    predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
     context = Context(predicted.obs, predicted)
     tell(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
@@ -199,20 +160,22 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     biases, asked = bias_strengths(found.related.model, alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
-    answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)
+    answer = Answer(
+        predicted, bare, found, with_shapes(found.model), biases, observed.seen, judged.fitted, asked, known, domains
+    )
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
     remaining = accounted_for(answer, remaining)
     if not answer.ids and not any(one.disagrees for one in remaining):
         domains = remaining  # 1/f noise inside the poses explains the disagreement
-    return _Run(predicted, bare, answer, domains, remaining, known, asked)
+    return replace(answer, domains=domains, remaining=remaining)
 
 
-LOUD: Strengths = ((2.0, 2.0), (5.0,) * 4, (1.0, 1.0), (5.0, 5.0))
+LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
 
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    first = hypothesis(observed.obs, replace(observed.fitted.state, effect=np.zeros(0)), prior)
+    first = hypothesis(observed.obs, observed.fitted.state, prior)
     # Two starts, low and high noise strengths: the evidence may have an optimum at each.
     loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
@@ -225,7 +188,7 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
     found = settling(context)
     if found.score < threshold(alpha):
         return predicted
-    return tune_noise(with_settling(context, found), start, NO_DISTORTION, prior)
+    return tune_noise(with_settling(context, found), start, prior)
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
@@ -271,24 +234,18 @@ def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[Do
     )
 
 
-def verdict_of(
-    answer: Answer,
-    domains: tuple[DomainTest, ...],
-    remaining: tuple[DomainTest, ...] = (),
-    *,
-    has_relations: bool = False,
-) -> Verdict:
+def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
     """One word; ``not-testable`` where no pose domain could be tested and the samples show nothing either.
 
     Minor effects (a disturbed pose, a faint line) leave it at ``unexplained`` while something else disagrees.
     """
     if answer.ids:
-        is_left = has_relations or any(d.disagrees for d in remaining)
+        is_left = has_relations or any(d.disagrees for d in answer.remaining)
         says_why = not answer.are_footnotes and not answer.are_spread
         return "missing-physics" if says_why or not is_left else "unexplained"
-    if has_relations or any(d.disagrees for d in domains):
+    if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.
-    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):
+    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in answer.domains):
         return "not-testable"
     return "consistent"

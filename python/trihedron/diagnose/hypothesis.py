@@ -8,31 +8,23 @@ from functools import cached_property
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
-from trihedron.diagnose.session.state import (
-    Distortion,
-    Prior,
-    SessionState,
-    contiguous,
-    core_model,
-    core_state,
-    stacked,
-    state_of,
-)
+from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
+from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
-from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.model import Prior, SessionState, contiguous
+from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
 from trihedron.threads import side_by_side
 
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
-ELSEWHERE: tuple[Strengths, ...] = (
-    ((640.0, 640.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0)),
-    ((300.0, 300.0), (3.0,) * 4, (0.5, 0.5), (2.0, 2.0)),
-    ((2.0, 2.0), (NO_SCATTER,) * 4, (1.0, 1.0), (5.0, 5.0)),
+ELSEWHERE = (
+    strengths_of_all(640.0),
+    strengths_of_all(300.0, scatter=3.0, between=0.5, moves=2.0),
+    strengths_of_all(2.0, moves=5.0),
 )
 """Low noise, biases that scatter, biases that walk: large noise strengths can absorb an effect that these show."""
 
@@ -123,6 +115,13 @@ class Hypothesis:
         found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
         return [AtStrengths(*one) for one in found]
 
+    def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
+        """As :meth:`with_added` at the noise strengths found, prior sizes times the best of ``scales``."""
+        return [
+            AddedTerms(self.log_evidence + float(look.gain[:, 0].max()), self.strengths, look.value, look.covariance)
+            for look in (self.gains(terms, scales) if terms else [])
+        ]
+
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""
         ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
@@ -158,11 +157,7 @@ def hypothesis(
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
-    core = core_model(obs, start.gravity, prior, is_scatter_free=True).fit(
-        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
-    )  # fmt: skip
-    fitted = Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths=True)
+    fitted = solved(obs, start, prior, distortion, strengths, within, sizes, has_free_strengths=True)
     return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 
@@ -188,9 +183,9 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], 1e-300)))
+        gain = float(np.log(rms_before[d] / max(rms_after[d], TINY)))
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
-        before_over_it = left * (rms_before[d] / max(rms_after[d], 1e-300)) ** 2
+        before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2
         out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
     return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

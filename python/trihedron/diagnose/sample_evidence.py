@@ -10,11 +10,10 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect, Evidence
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, NO_DISTORTION, Prior, SessionState
 from trihedron.records.diagnosis import Candidate
+from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState, misfits
 
 VISIBLE = 0.98
 """A correction of the readings must lower the held-out misfit of some domain by at least this factor."""
@@ -88,31 +87,20 @@ def _with_one(
         found = [*(one.evidence for one in observed.seen), evidence]
         obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
-        fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
+        fitted = tune_noise(obs, begin, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})
         gain = _explained(observed.fitted, fitted)
-        if evidence.restate is not None:
-            evidence = replace(evidence, parameters=evidence.restate(Context(obs, fitted)))
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
 
 
 def _explained(before: Fit, after: Fit) -> float:
     """Gain of a correction in twice the log-likelihood, the noise strength of every domain being free."""
-    gain = 0.0
-    for domain in ROW_DOMAINS:
-        (was, n), (now, left) = (_per_row(fitted, domain) for fitted in (before, after))
-        # Excluded rows alone count where a correction removes rows.
-        of = n - left if n - left >= 1.0 else n
-        gain += of * float(np.log(max(was, 1.0) / max(now, 1.0)))
-    return max(gain, 0.0)
-
-
-def _per_row(fitted: Fit, domain: int) -> tuple[float, float]:
-    """Chi-square per degree of freedom of one domain, and its degrees of freedom."""
-    rows = fitted.system.domain == domain
-    dof = float((1.0 - fitted.leverage[rows]).sum())
-    return float((fitted.system.residual[rows] ** 2).sum()) / max(dof, 1.0), dof
+    (chi2, n), (chi2_after, left) = misfits(before.core), misfits(after.core)
+    was, now = chi2 / np.maximum(n, 1.0), chi2_after / np.maximum(left, 1.0)
+    # Excluded rows alone count where a correction removes rows.
+    of = np.where(n - left >= 1.0, n - left, n)
+    return max(float((of * np.log(np.maximum(was, 1.0) / np.maximum(now, 1.0))).sum()), 0.0)
 
 
 def _changed(bare: Observations, found: list[Evidence]) -> Observations:

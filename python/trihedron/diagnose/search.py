@@ -18,7 +18,8 @@ from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
+from trihedron.diagnose.session.state import Distortion
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5

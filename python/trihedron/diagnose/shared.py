@@ -10,21 +10,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import PRIOR_SCALES, terms_beside
+from trihedron.arrays import TINY, FloatArray
+from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, terms_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import MOST_EFFECTS, threshold
+from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
 
-N_LEADERS = 4
-"""Candidates, best at fixed noise strengths, that are evaluated with the strengths refitted."""
 KNOWN = 1e-6
 """Relative precision, to that of the best direction, below which a recording does not determine a direction."""
 
@@ -55,7 +53,7 @@ class Information:
     def known(self) -> tuple[FloatArray, FloatArray]:
         """Eigenvalues and eigenvectors of the precision for the directions that this recording determines."""
         values, vectors = np.linalg.eigh(self.precision)
-        keeps = values > KNOWN * max(float(values[-1]), 1e-300)
+        keeps = values > KNOWN * max(float(values[-1]), TINY)
         return values[keeps], vectors[:, keeps]
 
     @property
@@ -79,7 +77,7 @@ def agreement(parts: Sequence[Information]) -> float:
     """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
     whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
     dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
-    return float(chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0))) if dof > 0 else 1.0
+    return chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0)) if dof > 0 else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +127,11 @@ class _Held:
 
     models: tuple[Hypothesis, ...]
     n_added: int
-    cost: tuple[float, ...]
 
     def without(self, k: int) -> _Held:
         """Without the shared effect ``k``."""
         fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
-        return _Held(fewer, self.n_added - 1, tuple(p for j, p in enumerate(self.cost) if j != k))
+        return _Held(fewer, self.n_added - 1)
 
     def _at(self, model: Hypothesis, k: int) -> int:
         return len(model.terms) - self.n_added + k
@@ -145,7 +142,7 @@ class _Held:
 
 
 def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]:
-    held = _Held(tuple(models), 0, ())
+    held = _Held(tuple(models), 0)
     names: set[str] = set()
     while True:
         tried = _tried(held.models, names)
@@ -157,7 +154,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
             again(m, [*m.terms, replace(t, sizes=t.sizes * best.scale)])
             for m, t in zip(held.models, best.terms, strict=True)
         )
-        held = _Held(larger, held.n_added + 1, (*held.cost, best.terms[0].cost))
+        held = _Held(larger, held.n_added + 1)
 
 
 def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
@@ -186,14 +183,9 @@ def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Join
     if not common:
         return []
     terms = {key: tuple(one[key] for one in found) for key in common}
-    looks = [m.gains([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
-    glanced = []
-    for j, key in enumerate(common):
-        asked = [
-            AddedTerms(m.log_evidence + float(look[j].gain[0, 0]), m.strengths, look[j].value, look[j].covariance)
-            for m, look in zip(models, looks, strict=True)
-        ]
-        glanced.append(_joint(terms[key], asked, [m.log_evidence for m in models]))
+    looks = [m.at_its_strengths([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
+    plain = [m.log_evidence for m in models]
+    glanced = [_joint(terms[key], asked, plain) for key, *asked in zip(common, *looks, strict=True)]
     first = _best_of_each(glanced)
     full = [_full(models, one.terms) for one in first[:N_LEADERS]]
     return sorted([*full, *first[N_LEADERS:]], key=lambda one: -one.score)

@@ -20,17 +20,19 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.quantiles import medians
+from trihedron.session.rounding import UNIFORM
 
-_AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
-"""Unit gain at half the sampling frequency, fourth-order zero at zero frequency, which removes smooth motion."""
-_AT_QUARTER = [-0.25, 0.0, 0.5, 0.0, -0.25]
+_AT_HALF, _AT_QUARTER = (
+    (taps / np.abs(taps).sum()).tolist() for taps in (np.poly([1, 1, 1, 1]), np.poly([1, 1, -1, -1]))
+)
+"""Unit gain at half and at a quarter of the sampling frequency. Their zeros at zero frequency, of fourth and second
+order, remove smooth motion."""
 OF_A_STEP = 1.0 / 3.0
 """Power folded onto zero over that at half the sampling frequency for a rate with steps: 1/(2^p - 1) with p = 2."""
 OF_ITS_BAND = 0.4
 """Part of the power around a quarter of the sampling frequency that is not slower motion, for a body that knocks and
 rocks at a tenth of the sampling frequency."""
-LENGTH = 5
-"""Taps of both filters."""
+LENGTH = len(_AT_HALF)
 GAP = 1.5
 """A step longer than this many usual ones has lost samples, as in the session model (its ``gaps``)."""
 MARGIN = 3.0
@@ -53,7 +55,7 @@ def unresolved_variance(
     ``time_s`` (n,), across which smooth motion would look fast.
     """
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
-    poses = np.array([(a, b) for a, b in pose_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
+    poses = np.array([(a, b) for a, b in pose_ranges if b - a >= LENGTH], dtype=np.int64).reshape(-1, 2)
     n_whole = np.maximum(moves[:, 1] - moves[:, 0] - (LENGTH - 1), 0)[:, None]
     n_poses = (poses[:, 1] - poses[:, 0] - (LENGTH - 1))[:, None]
     pieces, of_move = _between_gaps(moves, time_s, step_s)
@@ -62,9 +64,9 @@ def unresolved_variance(
     def excess(taps: list[float]) -> FloatArray:
         power = _core.band_power(readings, taps, np.concatenate([poses, pieces]))
         level = medians(power[: len(poses)] / n_poses) if len(poses) else np.zeros(3)
-        level = np.maximum(level, quantum**2 / 12.0)
+        level = np.maximum(level, UNIFORM * quantum**2)
         # Neighbouring outputs of five taps share samples: about a third as many squares are independent.
-        usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
+        usual = level * (1.0 + MARGIN * np.sqrt(2.0 * 3.0 / np.maximum(n_moves, 1)))
         of_moves = np.stack([np.bincount(of_move, p, len(moves)) for p in power[len(poses) :].T], axis=1)
         # Samples across gaps are assumed to have the mean power of the move.
         out: FloatArray = np.maximum(of_moves - usual * n_moves, 0.0) * (n_whole / np.maximum(n_moves, 1))

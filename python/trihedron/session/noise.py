@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import RefusedError
+from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -26,46 +27,69 @@ Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
 in units of the scatter, factors on the noise of moves. Pairs: accelerometer and gyro; of moves gravity and velocity."""
 NO_SCATTER = 1e-3
 """Scatter that counts as zero."""
-START_STRENGTHS: Strengths = ((160.0, 160.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
-"""Start of the search for strengths."""
 Bounds = tuple[Pair, Pair, Pair]
 """Shortest corner times [s], largest scatter, largest factors on the noise of moves: each for the pairs above."""
 ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
 NOISE_CORNER_S = 20.0
 """Shortest corner time that the part's noise explains, where white noise and bias walk have equal Allan deviation: in
 consumer parts it is this or later. Every hypothesis allows a walk of any strength; a stronger one is called drift."""
+
+
+def strengths_of_all(
+    corner_s: float, scatter: float = NO_SCATTER, between: float = 1.0, moves: float = 1.0
+) -> Strengths:
+    """The same strengths of both sensors, all axes, gravity and velocity."""
+    return (corner_s, corner_s), (scatter,) * 4, (between, between), (moves, moves)
+
+
+START_STRENGTHS = strengths_of_all(8.0 * NOISE_CORNER_S)
+"""Start of the search for strengths."""
+NOISE_DOF = 100.0
+"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
 """Bounds of a part whose noise is that of its samples."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SessionNoise:
     """Noise of one session in raw units.
 
-    Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
-    of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
-    than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
-    those of the axes apply; ``None`` where no vertical is known. ``force_scatter`` and ``rate_scatter`` [raw]: scatter
-    of the bias from pose to pose that 1/f noise explains, 0 where poses show none.
+    Standard errors of pose means ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3), white noise ``force_density``,
+    ``rate_density`` (3,) per √Hz. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along
+    them, NaN where those of the axes apply; ``None`` where no vertical is known. ``force_scatter``, ``rate_scatter``:
+    scatter of the bias from pose to pose that 1/f noise explains, 0 where poses show none.
     """
 
-    force_sigma: FloatArray
+    pose_force_sigma: FloatArray
     force_density: FloatArray
-    rate_sigma: FloatArray | None
+    pose_rate_sigma: FloatArray | None
     rate_density: FloatArray | None
-    unresolved: FloatArray
     force_up: Along | None = None
     force_scatter: float = 0.0
     rate_scatter: float = 0.0
 
+    def scatter_unit(self) -> FloatArray:
+        """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
 
-def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
-    """Noise of poses and of the moves in half-open sample ``ranges``.
+        One size for three axes: an axis with more noise need not scatter more. The accelerometer's is that along the
+        vertical where it is known, because static poses show no other scatter.
+        """
+        out = np.ones((2, 3))
+        out[0] = np.sqrt(np.mean(medians(self.pose_force_sigma) ** 2))
+        if self.force_up is not None and np.isfinite(self.force_up[1]).any():
+            out[0] = np.nanmedian(self.force_up[1])
+        if self.pose_rate_sigma is not None:
+            out[1] = np.sqrt(np.mean(medians(self.pose_rate_sigma) ** 2))
+        return np.maximum(out, TINY)
 
-    Raises
-    ------
-    ValueError
-            When the segments state no uncertainty of their means.
+
+def measure_noise(
+    recording: Recording, segments: Segments, ranges: list[tuple[int, int]]
+) -> tuple[SessionNoise, FloatArray]:
+    """Noise of poses, and variance (m, 2, 3) of the integrals of every move, force and rate, (raw unit · s)², by motion
+    faster than the samples and by noise slower than a move, in the half-open sample ``ranges`` of the moves.
+
+    Refused when the segments state no uncertainty of their means.
     """
     if (
         recording.accelerometer is None
@@ -75,13 +99,13 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     ):
         raise RefusedError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
-    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
+    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
     sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]
     densities = [np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)]
     spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
     of_rate = 0.0
     if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
-        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), 1e-300))
+        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY))
         densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
         of_rate = expected_scatter_of_axes(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
@@ -95,13 +119,17 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if k < len(sigmas):
-            halves, lasts = _second_halves_minus_first(readings, spans), np.diff(spans, axis=1)[:, 0] * step_s
+            halves, lasts = _steps(readings, spans, np.eye(3)[None], 2)[:, 0], np.diff(spans, axis=1)[:, 0] * step_s
             variances[:, k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
     scatter = 0.0 if along is None else expected_scatter(recording.accelerometer, spans, along[0])
     rate_sigma, rate_density = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
-    return SessionNoise(sigmas[0], densities[0], rate_sigma, rate_density, variances, along, scatter, of_rate)
+    noise = SessionNoise(
+        pose_force_sigma=sigmas[0], force_density=densities[0], pose_rate_sigma=rate_sigma, rate_density=rate_density,
+        force_up=along, force_scatter=scatter, rate_scatter=of_rate,
+    )  # fmt: skip
+    return noise, variances
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
@@ -120,34 +148,11 @@ def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray)
     return np.asarray(np.sqrt(np.where(known, (across**2 * sigma**2).sum(axis=1) + own, plain)))
 
 
-def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatArray:
-    """(n, 3) differences of the means of the two halves of every span (n, 2)."""
-    middle = spans[:, 0] + (spans[:, 1] - spans[:, 0] + 1) // 2
-    halves = np.column_stack([spans[:, 0], middle, middle, spans[:, 1]]).reshape(-1, 2)
-    means, _ = _core.means_by_owner(readings, halves, np.arange(len(halves)), len(halves))
-    return means[1::2] - means[::2]
-
-
-def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
-    """(2, 3) scatter of strength one, raw: the usual standard error of a pose, accelerometer and gyro.
-
-    One size for three axes: an axis with more noise need not scatter more. The accelerometer's is that along the
-    vertical where it is known, because static poses show no other scatter.
-    """
-    out = np.ones((2, 3))
-    out[0] = np.sqrt(np.mean(medians(force_sigma) ** 2))
-    if along is not None and np.isfinite(along[1]).any():
-        out[0] = np.nanmedian(along[1])
-    if rate_sigma is not None:
-        out[1] = np.sqrt(np.mean(medians(rate_sigma) ** 2))
-    return np.maximum(out, 1e-300)
-
-
 # Slow noise of the sensors inside moves, estimated from the poses (eq. 8.2b).
 
-QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
-"""Quantile over the poses of the change between halves, and that quantile of |x| for a normal x: slow noise is in all
-poses alike, a bias that jumps only in some."""
+QUIET = 0.3
+"""Quantile over the poses of the change between halves: slow noise is in all poses alike, a bias that jumps only in
+some."""
 MAY_EXCEED = 2.5
 """Largest ratio of the colour of all poses to that of the quiet ones, whose quantile is good to a factor of two."""
 
@@ -169,7 +174,7 @@ def coloured_variance(
     (poses, 3) the mean of every pose's second half minus that of its first, ``density`` (3,) white noise per √Hz; raw.
     """
     white = density / np.sqrt(pose_duration_s)[:, None]
-    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
+    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * ndtri(0.5 + 0.5 * QUIET))) ** 2
     pooled = medians((pose_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     return np.outer(move_duration_s, (colour - 1.0) * density**2)
@@ -181,8 +186,6 @@ PARTS = 8
 """Parts of a pose: neighbouring ones differ by white noise, its halves by white noise and flicker."""
 FEWEST_POSES = 6
 FEWEST_READINGS = 4 * PARTS
-MEDIAN_OF_SQUARE = 0.4549
-"""Median of a standard normal's square."""
 FAR = 9.0
 """Squares beyond so many variances are disturbances by hand, not noise."""
 SEEN = 1.0
@@ -202,9 +205,7 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
     if np.count_nonzero(usable) < FEWEST_POSES:
         return 0.0
     spans, size, up = spans[usable], size[usable], up[usable]
-    halves = _steps(readings, spans, up[:, None, :], 2)
-    parts = _steps(readings, spans, up[:, None, :], PARTS)
-    return float(_between_poses(halves, parts, spans)[0])
+    return float(_between_poses(*(_steps(readings, spans, up[:, None, :], n) for n in (2, PARTS)), spans)[0])
 
 
 def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
@@ -212,8 +213,7 @@ def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
     spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
     if len(spans) < FEWEST_POSES:
         return 0.0
-    axes = np.broadcast_to(np.eye(3), (len(spans), 3, 3))
-    found = _between_poses(_steps(readings, spans, axes, 2), _steps(readings, spans, axes, PARTS), spans)
+    found = _between_poses(*(_steps(readings, spans, np.eye(3)[None], n) for n in (2, PARTS)), spans)
     return float(np.sqrt(np.mean(found**2)))
 
 
@@ -234,14 +234,15 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> Fl
 
 
 def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> FloatArray:
-    """(h, n - 1, k) differences of the means of ``n`` neighbouring parts of every pose along directions (h, k, 3)."""
+    """(h, n - 1, k) differences of the means of ``n`` neighbouring parts of every pose along directions (h, k, 3), or
+    along those of one (1, k, 3) for all."""
     edges = spans[:, :1] + (spans[:, 1:] - spans[:, :1]) * np.arange(n + 1) // n
     ranges = np.stack([edges[:, :-1], edges[:, 1:]], axis=2).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, ranges, np.arange(len(ranges)), len(ranges))
-    return np.diff(np.einsum("hnc,hkc->hnk", means.reshape(len(spans), n, 3), along), axis=1)
+    return np.diff(means.reshape(len(spans), n, 3) @ np.swapaxes(along, 1, 2), axis=1)
 
 
 def _mean_square(x: FloatArray) -> float:
     squares = x**2
-    near = squares <= FAR * np.median(squares) / MEDIAN_OF_SQUARE
+    near = squares <= FAR * np.median(squares) / MEDIAN_CHI2[1]
     return float(np.mean(squares[near]))

@@ -11,6 +11,11 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import ranges_of
 
+UNIFORM = 1.0 / 12.0
+"""Variance of an error that is uniform over one step, in squares of the step."""
+IN_STEP = 0.75
+"""Distance from the bias, in LSB, within which a reading is in its step: it may toggle between its two nearest
+codes."""
 UNDITHERED = 0.5
 """Noise, in LSB, below which it does not dither the ADC: the mean of rounded readings is wrong by up to half an LSB,
 however long it is taken."""
@@ -56,7 +61,7 @@ def rounding_variance(
         out[:, axis] = _of_runs(codes, steady, float(quantum[axis]), float(rest[axis]))
     for still, begin, end in _standing(readings, quantum, rest, axes):
         # The part of the others' rotation along a resting axis stays inside its step all the time.
-        out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * quantum[still] ** 2 / 12.0)
+        out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * UNIFORM * quantum[still] ** 2)
     return out
 
 
@@ -99,7 +104,7 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
         if right:
             part[-right:] = np.maximum(part[-right:], right)
         out[begin:end] = part
-    return out * quantum**2 / 12.0
+    return out * UNIFORM * quantum**2
 
 
 def _turns_at_once(count: IntArray) -> BoolArray:
@@ -123,7 +128,7 @@ def _standing(
 ) -> Iterator[tuple[int, int, int]]:
     """(axis, begin, end) where an axis stays in the LSB of its bias while others rotate, for longer than it takes to
     leave it: where all axes rotate, each passes that step or leaves it with the others."""
-    turns = np.abs(readings - rest) > 1.75 * quantum
+    turns = np.abs(readings - rest) > (1.0 + IN_STEP) * quantum
     for axis in np.flatnonzero(axes).tolist():
         others = np.any(turns[:, np.arange(3) != axis], axis=1)
         steady = _steady(readings[:, axis])[1]
@@ -138,9 +143,8 @@ def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[in
     """Ranges (begin, end) in which an axis stays in the LSB of its bias, and the samples at either end in which it may
     rotate undetected."""
     away = np.abs(steady - rest)
-    # A bias may toggle between its two nearest codes.
-    is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
-    at_rest, beyond = ranges_of(is_rest), ranges_of(away < 2.75 * quantum)
+    is_rest, is_next, is_beyond = (away < (steps + IN_STEP) * quantum for steps in range(3))
+    at_rest, beyond = ranges_of(is_rest), ranges_of(is_beyond)
     for first, last in ranges_of(is_next):
         inside = [(b - a, a, b) for a, b in at_rest if first <= a and b <= last]
         if not inside:
@@ -168,20 +172,20 @@ def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, a
     away = (readings - rest) / np.where(quantum > 0.0, quantum, np.inf)
     size = np.abs(away)
     lead = np.argmax(size, axis=1)
-    turns = np.max(size, axis=1) > 1.75
+    turns = np.max(size, axis=1) > 1.0 + IN_STEP
     for axis in np.flatnonzero(axes).tolist():
-        is_inside = turns & (size[:, axis] < 0.75) & (lead != axis)
+        is_inside = turns & (size[:, axis] < IN_STEP) & (lead != axis)
         for other in range(3):
             way = np.where(is_inside & (lead == other), np.sign(away[:, other]), 0.0)
             if np.any(way):
                 out = np.zeros(readings.shape)
-                out[:, axis] = way * quantum[axis] / math.sqrt(12.0)
+                out[:, axis] = way * quantum[axis] * math.sqrt(UNIFORM)
                 yield out
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
     """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
-    rounding = quantum**2 / 12.0 * step_s
+    rounding = UNIFORM * quantum**2 * step_s
     rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
     return np.where(axes, np.sqrt(rest), density)
 

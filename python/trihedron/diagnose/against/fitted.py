@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.errors import RefusedError
-from trihedron.invariants import invariants
+from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain, DomainTest
-from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import si_of
 
 
 def as_read(given: Calibration, recording: FittedModel) -> Calibration:
@@ -22,68 +23,68 @@ def as_read(given: Calibration, recording: FittedModel) -> Calibration:
     Between SI units the factor is known. Between counts and SI it is not: the mean scale of the three axes is then
     taken from the recording, as in the comparison of parameters, and only differences between axes remain.
     """
-    a, g = given.accelerometer, given.gyroscope
-    units = acceleration_to_si(AccelerationUnit(a.raw_unit)), acceleration_to_si(AccelerationUnit(recording.accel_unit))
-    accelerometer = _scaled(a, recording.accel_S, recording.accel_unit, units)
-    if g is None or recording.gyro_S is None:
-        return replace(given, accelerometer=accelerometer)
-    units = rate_to_si(RateUnit(g.raw_unit)), rate_to_si(RateUnit(recording.gyro_unit))
-    return replace(
-        given, accelerometer=accelerometer, gyroscope=_scaled(g, recording.gyro_S, recording.gyro_unit, units)
-    )
+    gyroscope = given.gyroscope
+    if gyroscope is not None and recording.gyroscope is not None:
+        gyroscope = _scaled(gyroscope, recording.gyroscope)
+    return replace(given, accelerometer=_scaled(given.accelerometer, recording.accelerometer), gyroscope=gyroscope)
 
 
-def _scaled(
-    given: SensorCalibration, own_S: FloatArray, unit: str, units: tuple[float | None, float | None]
-) -> SensorCalibration:
-    if given.raw_unit == unit:
+def _scaled(given: SensorCalibration, own: FittedSensor) -> SensorCalibration:
+    before, after = si_of(given.raw_unit), own.si
+    if given.raw_unit == own.unit:
         return given
-    before, after = units
     if before is not None and after is not None:
         factor = after / before
     else:
-        mean = [float(invariants(S, given.b).log_scale.mean()) for S in (given.S, own_S)]
+        mean = [float(invariants(S, given.b).log_scale.mean()) for S in (given.S, own.S)]
         factor = math.exp(mean[0] - mean[1])
     return replace(given, S=factor * given.S)
 
 
-PUBLISHED_DIGITS = 1e-6
-"""Relative standard uncertainty of a calibration without a covariance: its last printed digits."""
 LONGEST_CORNER = 0.25
 """Share of the recording above which a corner time is not distinguished from none: the bias may walk by as much. In 14
 simulated pairs of one unit accelerometer differences are 0.9 to 1.1 of their uncertainty."""
 
 
 @dataclass(frozen=True, eq=False)
+class FittedSensor:
+    """S and b of one sensor, direct form, raw → SI; ``drift`` (3,) is the variance [SI²] of the bias change from one
+    session to the next in the body frame, which the covariance does not contain."""
+
+    S: FloatArray
+    b: FloatArray
+    unit: str
+    drift: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def si(self) -> float | None:
+        """SI per reading, where its unit states it."""
+        return si_of(self.unit)
+
+    def spread(self, covariance: FloatArray) -> FloatArray:
+        """(9, 9) covariance of the invariants, from that (12, 12) of S and b."""
+        J = jacobian(self.S, self.b)
+        return np.asarray(J @ covariance @ J.T)
+
+
+@dataclass(frozen=True, eq=False)
 class FittedModel:
-    """S and b of both sensors, direct form, raw → SI.
+    """Both sensors; ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file."""
 
-    ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``accel_bias_drift``,
-    ``gyro_bias_drift`` (3,) variances [SI²] of the bias change from one session to the next in the body frame, which
-    the covariance does not contain.
-    """
-
-    accel_S: FloatArray
-    accel_b: FloatArray
-    accel_unit: str
-    gyro_S: FloatArray | None
-    gyro_b: FloatArray | None
-    gyro_unit: str
+    accelerometer: FittedSensor
+    gyroscope: FittedSensor | None
     covariance: FloatArray
-    accel_bias_drift: FloatArray
-    gyro_bias_drift: FloatArray
 
 
 def model_of_calibration(calibration: Calibration) -> FittedModel:
     """A calibration as given. It contains no bias change between sessions: the comparison uses the recording's."""
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
-    S_w, b_w, unit_w = (None, None, "") if gyro is None else (gyro.S, gyro.b, gyro.raw_unit)
+    both = [one for one in (calibration.accelerometer, calibration.gyroscope) if one is not None]
     covariance = np.array(calibration.covariance, dtype=np.float64)
     if not np.any(covariance):
-        numbers = [accel.S.ravel(), accel.b] + ([] if gyro is None else [gyro.S.ravel(), gyro.b])
-        covariance = np.diag((PUBLISHED_DIGITS * np.concatenate(numbers)) ** 2)
-    nothing = np.zeros(3)
-    return FittedModel(accel.S, accel.b, accel.raw_unit, S_w, b_w, unit_w, covariance, nothing, nothing)
+        numbers = np.concatenate([part.ravel() for one in both for part in (one.S, one.b)])
+        covariance = np.diag((PUBLISHED_DIGITS * numbers) ** 2)
+    accelerometer, *gyroscope = (FittedSensor(one.S, one.b, one.raw_unit) for one in both)
+    return FittedModel(accelerometer, gyroscope[0] if gyroscope else None, covariance)
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
@@ -96,20 +97,18 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
         raise RefusedError("a diagnosis is compared by its covariance, and this one carries none")
-    (S_f, b_f, unit_f), (S_w, b_w, unit_w) = (
-        (None, None, "") if side is None else (np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]))
-        for side in (fit.accelerometer, fit.gyroscope)
-    )
-    assert S_f is not None
-    assert b_f is not None
     covariance = np.array(fit.covariance)
     widened = np.ones(len(covariance))
     widened[:12] = np.sqrt(_excess(tests, "static-accel"))
     widened[12:21] = np.sqrt(max(_excess(tests, "moves"), _excess(tests, "dynamics")))
     covariance *= np.outer(widened, widened)
     of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
-    of_accel = _floor(diagnosis, "accelerometer")
-    return FittedModel(S_f, b_f, unit_f, S_w, b_w, unit_w, covariance, of_accel, of_gyro)
+    accelerometer, gyroscope = (
+        None if side is None else FittedSensor(np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]), drift)
+        for side, drift in ((fit.accelerometer, _floor(diagnosis, "accelerometer")), (fit.gyroscope, of_gyro))
+    )
+    assert accelerometer is not None
+    return FittedModel(accelerometer, gyroscope, covariance)
 
 
 def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import norm
 
 from trihedron.diagnose.accepted import HEADLINE
-from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.probability import f_upper
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
@@ -51,10 +51,9 @@ def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None)
     (the cosines of a curve can add up at its start); infinite where it is not known. An effect that both sides have
     counts once, with its larger size.
     """
-    named = {effect.id: effect.confounded_with for effect in catalogue()}
     by_effect: dict[tuple[str, str], float] = {}
     for effect in effects:
-        for number in named.get(effect.id, ()):
+        for number in by_id()[effect.id].confounded_with if effect.id in by_id() else ():
             unit = {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(number, "1")
             by_axis: dict[str, float] = {}
             for parameter in effect.parameters:
@@ -119,8 +118,7 @@ def compare_effects(
     ``tried_on_model``: candidates of the simulation's own diagnosis. An effect of the recording is not missing if the
     simulation's own test calls it likely and no other effect there could be mistaken for it.
     """
-    by_id = {effect.id: effect for effect in catalogue()}
-    of_session = {effect.id for effect in by_id.values() if effect.is_of_session or effect.is_of_motion}
+    of_session = {effect.id for effect in catalogue() if effect.is_of_session or effect.is_of_motion}
     # An effect that the recording's own test calls likely, corrected for multiple testing, is not called surplus,
     # even where it was not accepted.
     tried = [c for c in candidates if c.applicable]
@@ -130,7 +128,7 @@ def compare_effects(
         effect.id
         for effect in model
         if any(c.id == effect.id and not c.applicable for c in candidates)
-        and by_id[effect.id].drifts_as in excluded - drifting
+        and by_id()[effect.id].drifts_as in excluded - drifting
         and _would_show(effect, misses)
     }
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
@@ -150,7 +148,7 @@ def compare_effects(
         if effect.id not in of_session
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
-        and (not by_id[effect.id].is_spread or _would_show(effect, _beyond_chance(misses, freedom, alpha)))
+        and (not by_id()[effect.id].is_spread or _would_show(effect, _beyond_chance(misses, freedom, alpha)))
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
@@ -166,10 +164,9 @@ def _is_likely(
     applicable = [c for c in tried if c.applicable]
     own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
     domains = {seen.domain for seen in effect.held_out[:1]}
-    spreads = {one.id for one in catalogue() if one.is_spread}
     # Any effect of the poses looks like a scatter until it is identified.
     is_shown_otherwise = any(
-        domains & {seen.domain for seen in one.held_out[:1]} for one in others if one.id not in spreads
+        domains & {seen.domain for seen in one.held_out[:1]} for one in others if not by_id()[one.id].is_spread
     )
     return bool(own) and len(applicable) * own[0] < alpha and not is_shown_otherwise
 
@@ -180,16 +177,15 @@ def is_footnote(effect: AcceptedEffect) -> bool:
     These are a disturbed pose, which belongs to the session and not to the instrument; an arm of the motion that
     explains no misfit; and a line that adds less to the scatter inside poses than noise varies between parts.
     """
-    of = {one.id: one for one in catalogue()}[effect.id]
+    of = by_id()[effect.id]
     share = effect.share or 0.0
     return of.is_local or (of.is_of_motion and not share) or (of.is_of_samples and share < FAINT)
 
 
 def _is_beside(effect: AcceptedEffect) -> bool:
     """Whether it is listed after mechanisms: a scatter, or an effect with a small share of its own (a faint line)."""
-    is_spread = {one.id: one.is_spread for one in catalogue()}[effect.id]
     is_stated = effect.side == "recording" and not effect.model.get("variant")
-    return is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
+    return by_id()[effect.id].is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
 
 
 def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:

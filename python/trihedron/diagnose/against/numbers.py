@@ -13,20 +13,12 @@ import numpy.typing as npt
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
-from trihedron.arrays import AXES, FloatArray
-from trihedron.diagnose.against.fitted import FittedModel
-from trihedron.invariants import (
-    PAIRS,
-    Invariants,
-    invariants,
-    jacobian,
-    rotation_vector,
-    triad_jacobian,
-    triad_rotation,
-)
+from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
+from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import ParameterDifference
 from trihedron.records.words import words
-from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
 
@@ -81,9 +73,9 @@ class _Group:
     def p_value(self) -> float:
         """d'C⁻¹d/n ~ F(n, dof)."""
         n = len(self.difference)
-        ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, 1e-300)
+        ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, TINY)
         distance = float(self.difference @ np.linalg.solve(self.covariance + ridge * np.eye(n), self.difference))
-        return max(float(f_distribution.sf(distance / n, n, self.dof)), 1e-300)
+        return max(float(f_distribution.sf(distance / n, n, self.dof)), TINY)
 
 
 @dataclass(frozen=True)
@@ -122,19 +114,12 @@ def compare_numbers(
     linear: FittedModel | None = None,
     left_open: Mapping[str, float] = NOTHING_OPEN,
 ) -> ComparedNumbers:
-    """Compare the parameters of ``model`` with those of ``recording``.
+    """Compare the parameters of the given ``model`` with those of the fit of the ``recording`` with its effects.
 
-    Parameters
-    ----------
-    model, recording : FittedModel
-            The given model, and the fit of the recording with the effects found in it.
-    alpha : float
-            Chance that any group of one unit on one day is called different; half of it is used here (Holm).
-    linear : FittedModel, optional
-            The recording's fit without effects. A linear calibration absorbs part of an effect that it does not
-            contain: a group counts only where it differs from this fit too.
-    left_open : mapping from id to size, optional
-            Groups whose reference an accepted effect leaves undefined by so much: no smaller difference is significant.
+    ``alpha`` is the chance that any group of one unit on one day is called different; half of it is used here (Holm).
+    ``linear`` is the recording's fit without effects: a linear calibration absorbs part of an effect that it does not
+    contain, and a group counts only where it differs from this fit too. ``left_open`` are groups whose reference an
+    accepted effect leaves undefined by so much: no smaller difference is significant.
     """
     groups, factors = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
@@ -167,76 +152,62 @@ def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One sensor of one fitted model: S, b, their covariance (12, 12), SI per reading where its unit states it, and
-    the variance (3,) of the bias between sessions."""
-
-    S: FloatArray
-    b: FloatArray
-    raw_unit: str
-    covariance: FloatArray
-    si: float | None
-    drift: FloatArray
-
-    @property
-    def spread(self) -> FloatArray:
-        """(9, 9) covariance of the invariants."""
-        J = jacobian(self.S, self.b)
-        return np.asarray(J @ self.covariance @ J.T)
-
-
-def _sides(model: FittedModel) -> tuple[_Side, _Side | None]:
-    """The accelerometer, and the gyro where there is one."""
-    C, unit = model.covariance, model.accel_unit
-    known = acceleration_to_si(AccelerationUnit(unit))
-    accel = _Side(model.accel_S, model.accel_b, unit, C[:12, :12], known, model.accel_bias_drift)
-    if model.gyro_S is None or model.gyro_b is None:
-        return accel, None
-    unit = model.gyro_unit
-    known = rate_to_si(RateUnit(unit))
-    return accel, _Side(model.gyro_S, model.gyro_b, unit, C[12:, 12:], known, model.gyro_bias_drift)
-
-
 def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[CommonFactor, ...]]:
-    groups: list[_Group] = []
-    factors: list[CommonFactor] = []
-    prefixes: tuple[Literal["accel", "gyro"], ...] = ("accel", "gyro")
-    for prefix, given, seen in zip(prefixes, _sides(model), _sides(recording), strict=True):
-        if given is not None and seen is not None:
-            more, factor = _sensor(prefix, given, seen)
-            groups += more
-            factors += [factor] if factor else []
-            groups += [_triads(model, recording)] if prefix == "gyro" else []
-    return groups, tuple(factors)
+    C_m, C_r = model.covariance, recording.covariance
+    groups, factor = _sensor("accel", (model.accelerometer, C_m[:12, :12]), (recording.accelerometer, C_r[:12, :12]))
+    factors = [factor]
+    if model.gyroscope is not None and recording.gyroscope is not None:
+        more, factor = _sensor("gyro", (model.gyroscope, C_m[12:, 12:]), (recording.gyroscope, C_r[12:, 12:]))
+        groups += [
+            *more,
+            _triads((model.accelerometer, model.gyroscope, C_m), (recording.accelerometer, recording.gyroscope, C_r)),
+        ]
+        factors.append(factor)
+    return groups, tuple(one for one in factors if one is not None)
 
 
-def _sensor(prefix: Literal["accel", "gyro"], given: _Side, seen: _Side) -> tuple[list[_Group], CommonFactor | None]:
-    """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised."""
-    a, r, units = invariants(given.S, given.b), invariants(seen.S, seen.b), (given.si, seen.si)
-    covariance = given.spread + seen.spread
+def _sensor(
+    prefix: Literal["accel", "gyro"], model: tuple[FittedSensor, FloatArray], recording: tuple[FittedSensor, FloatArray]
+) -> tuple[list[_Group], CommonFactor | None]:
+    """Bias, scale and misalignment of one sensor, and the common factor of its scales where it is recognised; both
+    sides with the covariance (12, 12) of S and b."""
+    (given, C_given), (seen, C_seen) = model, recording
+    a, r = invariants(given.S, given.b), invariants(seen.S, seen.b)
+    spread = given.spread(C_given)
+    covariance = spread + seen.spread(C_seen)
     # A calibration file has no bias change between sessions: that of the recording is used.
     before = given.drift if np.any(given.drift) else seen.drift
     covariance[:3, :3] += np.diag(before + seen.drift)
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
-    log_m, log_r, is_relative = _log_scales(a, r, units, given.raw_unit == seen.raw_unit)
-    common = _common_factor(sensor, log_r - log_m, _sizes_in_si(a, r, units))
+    log_m, log_r = a.log_scale, r.log_scale
+    sizes: tuple[float, float] | None = None
+    is_same_unit = given.unit == seen.unit
+    if given.si is not None and seen.si is not None:
+        in_si = log_m + math.log(given.si), log_r + math.log(seen.si)
+        # ln of reading over truth: zero for a healthy sensor.
+        sizes = float(np.median(in_si[0])), float(np.median(in_si[1]))
+        log_m, log_r = (log_m, log_r) if is_same_unit else in_si
+    # Counts against SI: only differences between axes can be compared.
+    is_relative = not is_same_unit and sizes is None
+    if is_relative:
+        log_m, log_r = log_m - log_m.mean(), log_r - log_r.mean()
+    common = _common_factor(sensor, log_r - log_m, sizes)
     if common is not None:
         log_m = log_m + math.log(common.factor)
     of_scale = covariance[3:6, 3:6]
     if is_relative:
-        # Counts against SI: only differences between axes can be compared.
         centre = np.eye(3) - np.ones((3, 3)) / 3.0
         of_scale = centre @ of_scale @ centre.T + np.ones((3, 3)) * np.trace(of_scale) / 3.0
     pairs = tuple(AXES[i] + AXES[j] for i, j in PAIRS)
     # S is SI per raw unit: a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
         _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
-               _never_added(prefix, a.bias, r.bias, given.spread, given.drift)),
+               _never_added(prefix, a.bias, r.bias, spread, given.drift)),
         _Group(
             f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), log_r - log_m, of_scale, "1",
-            remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
+            remark=_relative_to(prefix, a, r, is_recording=seen.si is None) if is_relative else "",
+            is_relative=is_relative,
         ),
         _Group(f"{prefix}-misalignment", sensor, pairs, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"),
     ]  # fmt: skip
@@ -247,7 +218,7 @@ def _never_added(
     prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, drift: FloatArray
 ) -> str:
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, 1e-300))
+    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
     is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_BIAS, 3))
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
     if not (is_none and would_show):
@@ -256,20 +227,13 @@ def _never_added(
     return words("biases-never-added", sensor=name)
 
 
-def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:
+def _relative_to(prefix: str, a: Invariants, r: Invariants, *, is_recording: bool) -> str:
     """Remark that scales of counts and of SI have no common factor to compare, and the size of a count."""
-    counts, side = (r, "recording") if units[1] is None else (a, "model")
+    counts, side = (r, "recording") if is_recording else (a, "model")
     per_si = math.exp(float(counts.log_scale.mean()))
     if prefix == "gyro":
         return words("gyro-scales-relative", side=side, per_deg_s=per_si * math.radians(1.0))
     return words("accelerometer-scales-relative", side=side, per_g=per_si * STANDARD_GRAVITY_M_S2)
-
-
-def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:
-    """ln of reading over truth of both sides, where both state their unit: zero for a healthy sensor."""
-    if units[0] is None or units[1] is None:
-        return None
-    return float(np.median(a.log_scale)) + math.log(units[0]), float(np.median(r.log_scale)) + math.log(units[1])
 
 
 def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float] | None) -> CommonFactor | None:
@@ -287,26 +251,14 @@ def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float
     return CommonFactor(sensor, 2.0**nearest) if nearest and is_near(2.0**nearest) else None
 
 
-def _log_scales(
-    a: Invariants, r: Invariants, units: tuple[float | None, float | None], is_same_unit: bool
-) -> tuple[FloatArray, FloatArray, bool]:
-    """ln of sensitivities of both sides in one unit; True where these are known only up to a common factor."""
-    if is_same_unit:
-        return a.log_scale, r.log_scale, False
-    if units[0] is not None and units[1] is not None:
-        return a.log_scale + math.log(units[0]), r.log_scale + math.log(units[1]), False
-    return a.log_scale - a.log_scale.mean(), r.log_scale - r.log_scale.mean(), True
-
-
-def _triads(model: FittedModel, recording: FittedModel) -> _Group:
-    """The rotation of the gyro triad against the accelerometer triad: ``log(R_r R_mᵀ)``."""
-    assert model.gyro_S is not None
-    assert recording.gyro_S is not None
+def _triads(*sides: tuple[FittedSensor, FittedSensor, FloatArray]) -> _Group:
+    """The rotation of the gyro triad against the accelerometer triad: ``log(R_r R_mᵀ)``; ``sides`` model, recording."""
     zero = np.zeros(3)
-    pairs = ((model.accel_S, model.gyro_S), (recording.accel_S, recording.gyro_S))
-    turned = [triad_rotation(invariants(accel, zero), invariants(gyro, zero)) for accel, gyro in pairs]
-    J_m, J_r = (triad_jacobian(*pair) for pair in pairs)
-    covariance = J_m @ model.covariance @ J_m.T + J_r @ recording.covariance @ J_r.T
+    turned = [triad_rotation(invariants(accel.S, zero), invariants(gyro.S, zero)) for accel, gyro, _ in sides]
+    covariance = np.zeros((3, 3))
+    for accel, gyro, of_both in sides:
+        J = triad_jacobian(accel.S, gyro.S)
+        covariance += J @ of_both @ J.T
     difference = rotation_vector(turned[1] @ turned[0].T)
     before, after = rotation_vector(turned[0]), rotation_vector(turned[1])
     return _Group("triad-alignment", "both", AXES, before, after, difference, covariance, "rad")

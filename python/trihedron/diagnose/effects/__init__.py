@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.folders import modules_of
 
-__all__ = ["Effect", "catalogue"]
+__all__ = ["Effect", "by_id", "catalogue"]
 
 
 @cache
@@ -17,6 +19,12 @@ def catalogue() -> tuple[Effect, ...]:
     # Importing the modules registers their effects as subclasses.
     modules_of(__name__, __path__)
     return tuple(sorted((kind() for kind in _concrete(Effect)), key=lambda effect: effect.id))
+
+
+@cache
+def by_id() -> Mapping[str, Effect]:
+    """The effects of the catalogue by their ids."""
+    return MappingProxyType({effect.id: effect for effect in catalogue()})
 
 
 def _concrete(kind: Any) -> list[Any]:

@@ -14,10 +14,10 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_r
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
-from trihedron.diagnose.session.state import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
+from trihedron.session.model import STATIC_ACCEL
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
@@ -79,15 +79,9 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     if len(state.effect):
         return ()
     whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
-    force = whole.pose_force @ state.accel_S.T + state.accel_b
-    n = whole.n_poses
-    start = replace(
-        state,
-        up=force / np.linalg.norm(force, axis=1, keepdims=True),
-        gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ state.gyro_S.T,
-        accel_bias=np.zeros((n, 3)),
-    )
-    fits = (fit(whole, start, NO_DISTORTION, context.fitted.prior), context.fitted)
+    start = whole.at_means(state.gravity, state.accel_S, state.accel_b, state.gyro_S)
+    start = replace(start, strengths=state.strengths)
+    fits = (fit(whole, start, context.fitted.prior), context.fitted)
     before, after = (predict_held_out(one, folds_of(one)) for one in fits)
     gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
     if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:

@@ -15,10 +15,10 @@ from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.effects.lost_samples import Loss, bridge, find_losses, hidden_losses, most_lost, residual_after
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.session.model import Prior, SessionState
 
 CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from zero."""
@@ -121,7 +121,7 @@ class _Move:
 def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
     """The session without moves that contradict it: an undetected loss must not bias the reference of the others."""
     for _ in range(obs.n_moves):
-        state = fit(obs, state, NO_DISTORTION, prior).state
+        state = fit(obs, state, prior).state
         misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
         bad = {int(m) for m in np.flatnonzero(misfit > CONTRADICTS * np.median(misfit))}
         if not bad or obs.n_moves - len(bad) < FEWEST_MOVES:

@@ -14,10 +14,10 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
-from trihedron.diagnose.session.state import DYNAMICS, MOVES
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.session.model import DYNAMICS, MOVES
 
 NEAR_LIMIT = 0.97
 """Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""

@@ -11,10 +11,10 @@ from scipy.special import fdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.state import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.probability import f_upper
 from trihedron.records.domains import Domain, DomainTest, Where
-from trihedron.session.noise import NOISE_CORNER_S
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
+from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF
 
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel", STATIC_GYRO: "static-gyro", MOVES: "moves", DYNAMICS: "dynamics"
@@ -26,8 +26,6 @@ LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used up a domain."""
 HEAVY, CARRIES = 9.0, 0.2
 """A segment beyond three sigma, and a channel with a fifth of the misfit, are named as its location."""
-NOISE_DOF = 100.0
-"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 
 _CHANNELS = {domain: CHANNELS[3:] if domain in (STATIC_GYRO, MOVES) else CHANNELS[:3] for domain in ROW_DOMAINS}
 

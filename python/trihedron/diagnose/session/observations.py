@@ -15,7 +15,8 @@ from trihedron.errors import RefusedError
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.lines_at_rest import means_beside_lines
-from trihedron.session.noise import Along, along_gradient, measure_noise
+from trihedron.session.model import Prior, SessionReadings
+from trihedron.session.noise import along_gradient, measure_noise
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
@@ -24,25 +25,21 @@ LONGEST_MOVE_S = 180.0
 """Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
 
-@dataclass(frozen=True, eq=False)
-class Observations:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Observations(SessionReadings):
     """Raw readings of one recording, centred, with the layout of its poses and moves.
 
     ``segments`` has its poses cut at disturbances, ``whole`` as they were found.
-    ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
-    the poses): counts around 32768 would cost the normal equations ten digits. ``pose_force``, ``pose_rate`` (h, 3) are
-    the centred pose means, ``pose_force_sigma``, ``pose_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
-    half-open sample ranges that include the last sample of the pose before and the first of the pose after, so that
-    static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``force_density`` and ``rate_density``
-    (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sampling instants about their timestamps,
-    once a diagnosis has found it; ``disturbed_s`` are disturbed intervals of poses, s.
+    ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin``, the means over
+    the poses. ``move_ranges`` are half-open sample ranges that include the last sample of the pose before and the first
+    of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
+    is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
+    disturbed intervals of poses, s.
     ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
     ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
     ``pose_rate_sigma``.
-    ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    and ``rate_scatter`` are the bias scatter that 1/f noise explains, raw; ``averaging`` is the share of the sample
-    interval that the sensors average over (0 to 1).
+    ``averaging`` is the share of the sample interval that the sensors average over (0 to 1).
     """
 
     recording: Recording
@@ -51,30 +48,13 @@ class Observations:
     time_s: FloatArray
     raw_force: FloatArray
     raw_rate: FloatArray | None
-    force_origin: FloatArray
-    rate_origin: FloatArray
-    pose_force: FloatArray
-    pose_rate: FloatArray | None
-    pose_force_sigma: FloatArray
-    pose_rate_sigma: FloatArray | None
-    pose_time_s: FloatArray
     move_ranges: tuple[tuple[int, int], ...]
     move_poses: npt.NDArray[np.intp]
-    force_density: FloatArray
-    rate_density: FloatArray | None
     jitter_s: float = 0.0
     disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     pose_settling: FloatArray | None = None
-    force_up: Along | None = None
-    force_scatter: float = 0.0
-    rate_scatter: float = 0.0
     averaging: float = 0.0
-
-    @property
-    def n_poses(self) -> int:
-        """Number of poses."""
-        return len(self.pose_force)
 
     @property
     def n_moves(self) -> int:
@@ -157,6 +137,11 @@ class Observations:
             out[i] = away.T @ away / len(away)
         return out
 
+    def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
+        """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""
+        timing_s = float(self.jitter_s), 1.0 / self.recording.rate_hz
+        return self.core_model(gravity_m_s2, self.core_moves, timing_s, prior, is_scatter_free=is_scatter_free)
+
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
@@ -181,10 +166,7 @@ class Observations:
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
     """Observations of a segmented recording.
 
-    Raises
-    ------
-    ValueError
-        When the recording has no accelerometer or fewer than two poses: there is no session state to compare with.
+    Refused without an accelerometer or with fewer than two poses: there is no session state to compare with.
     """
     recording = recording.with_distinct_timestamps()
     segments, swing = means_beside_lines(recording, segments)
@@ -214,21 +196,22 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
             poses.append((move.pose_before, move.pose_after))
-    noise = measure_noise(recording, segments, ranges)
-    if noise.rate_sigma is not None:
+    noise, of_moves = measure_noise(recording, segments, ranges)
+    if noise.pose_rate_sigma is not None:
         lasts = np.array([t[pose.stop - 1] - t[pose.start] for pose in segments.poses])
-        swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
-    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, poses, strict=True)]
+        swing = swing + np.stack(
+            [np.zeros((segments.n_poses, 3)), _turned_at_ends(noise.pose_rate_sigma, lasts)], axis=1
+        )
+    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(of_moves, poses, strict=True)]
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
-        pose_force_sigma=noise.force_sigma, pose_rate_sigma=noise.rate_sigma,
+        **vars(noise),
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
-        force_density=noise.force_density, rate_density=noise.rate_density, disturbed_s=bumped,
-        force_up=noise.force_up, force_scatter=noise.force_scatter, rate_scatter=noise.rate_scatter,
+        disturbed_s=bumped,
         unresolved=dict(zip(poses, unresolved, strict=True)), averaging=averaging,
     )  # fmt: skip
 

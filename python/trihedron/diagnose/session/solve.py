@@ -12,23 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import (
+from trihedron.diagnose.session.state import NO_DISTORTION, Distortion
+from trihedron.session.model import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,
     STATIC_GYRO,
-    Distortion,
     Prior,
     SessionState,
     contiguous,
-    core_model,
-    core_poses,
     core_state,
     state_of,
 )
-from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
+from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds, Strengths
 
 FOLDS = 8
 """Blocks of poses, and of moves, that are held out in turn."""
@@ -104,7 +102,7 @@ class Fit:
     @property
     def accel_white(self) -> FloatArray:
         """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
-        return core_poses(self.obs).force_white() @ np.linalg.inv(self.state.accel_S)
+        return self.obs.core_poses().force_white() @ np.linalg.inv(self.state.accel_S)
 
     @property
     def gyro_white(self) -> FloatArray | None:
@@ -126,46 +124,56 @@ class Fit:
 
         It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
-        core = self.core
+        free = self
         if not self.has_free_strengths:
-            core = core_model(self.obs, self.state.gravity, self.prior, is_scatter_free=True).fit(
-                state=core_state(self.state), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
-                force_effect=contiguous(self.distortion.force), rate_effect=contiguous(self.distortion.rate),
-            )  # fmt: skip
+            strengths = self.core.strengths[0], *START_STRENGTHS[1:]
+            free = solved(self.obs, self.state, self.prior, self.distortion, strengths, has_free_strengths=True)
         origins = (np.ascontiguousarray(one) for one in (self.obs.force_origin, self.obs.rate_origin))
-        return core.linear_covariance(*origins)
+        return free.core.linear_covariance(*origins)
 
 
-def fit(
+def solved(
     obs: Observations,
     start: SessionState,
+    prior: Prior | None,
     distortion: Distortion,
-    prior: Prior | None = None,
+    strengths: Strengths,
     within: Bounds | None = None,
+    sizes: FloatArray | None = None,
+    *,
+    has_free_strengths: bool,
 ) -> Fit:
-    """Gauss-Newton on every row to convergence, noise corners as in ``start`` (eq. 11.9), or free ``within`` bounds."""
-    if len(start.effect) != distortion.n_parameters:
-        start = replace(start, effect=np.zeros(distortion.n_parameters))
-    core = core_model(obs, start.gravity, prior).fit(
-        state=core_state(start), strengths=(start.strengths[0], *START_STRENGTHS[1:]),
-        force_effect=contiguous(distortion.force), rate_effect=contiguous(distortion.rate), within=within,
+    """Gauss-Newton on every row to convergence (eq. 11.9); noise strengths as given or likeliest ``within`` bounds.
+
+    ``sizes`` are the prior σ of the effects' parameters.
+    """
+    core = obs.model(start.gravity, prior, is_scatter_free=has_free_strengths).fit(
+        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),
     )  # fmt: skip
-    return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
+    return Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths)
 
 
-def tune_noise(obs: Observations, start: SessionState, distortion: Distortion, prior: Prior | None) -> Fit:
+def fit(obs: Observations, start: SessionState, prior: Prior | None, within: Bounds | None = None) -> Fit:
+    """The session without effects, noise corners as in ``start``, or free ``within`` bounds."""
+    start = replace(start, effect=np.zeros(0))
+    strengths = start.strengths[0], *START_STRENGTHS[1:]
+    return solved(obs, start, prior, NO_DISTORTION, strengths, within, has_free_strengths=False)
+
+
+def tune_noise(obs: Observations, start: SessionState, prior: Prior | None) -> Fit:
     """As :func:`fit`, with bias walks of maximum likelihood, bounded by the noise of parts (eq. 11.18)."""
-    return fit(obs, start, distortion, prior, PART_NOISE)
+    return fit(obs, start, prior, PART_NOISE)
 
 
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
     """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
-    return np.asarray(core_model(obs, state.gravity, None).move_residuals(core_state(state)))
+    return np.asarray(obs.model(state.gravity, None).move_residuals(core_state(state)))
 
 
 def wrt_lost_time(obs: Observations, state: SessionState, m: int) -> FloatArray:
     """(samples, 5) derivatives of the residuals after move m by time [s] lost at each of its samples."""
-    return core_model(obs, state.gravity, None).wrt_lost_time(core_state(state), m)
+    return obs.model(state.gravity, None).wrt_lost_time(core_state(state), m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +199,7 @@ class Prediction:
     @property
     def per_row(self) -> FloatArray:
         """(domains,) innovation chi-square per row."""
-        return self.chi2 / np.maximum(self.n_rows, 1e-9)
+        return self.chi2 / np.maximum(self.n_rows, TINY)
 
 
 def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:

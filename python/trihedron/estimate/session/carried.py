@@ -6,7 +6,7 @@ static poses with one bias for the session, the tilt error after each rotation w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,12 +14,13 @@ from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import Calibration, FitQuality
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import norms
 from trihedron.session.averaging import sharpened
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
 
 N_GYROSCOPE = 9
@@ -71,7 +72,7 @@ def held_out(
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
-    is_pose = is_reading & (labels[:, 0] == STATIC_FORCE)
+    is_pose = is_reading & (labels[:, 0] == STATIC_ACCEL)
     is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
     is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
     rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
@@ -84,12 +85,10 @@ def held_out(
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
     which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
     models = [
-        Linear(np.flatnonzero(np.arange(m) % n_folds == fold), S, b - S @ observed.force_origin, S_w)
+        Linear(which[fold::n_folds], S, b - S @ observed.force_origin, S_w)
         for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
     ]
-    part = replace(measured, links=measured.links[which], edges=measured.edges[which])
-    seen = carried_each(part, anchors_s[which], models)
-    return HeldOut(norm, norm_sigma, seen.spread(which, measured.n_moves))
+    return HeldOut(norm, norm_sigma, carried_each(measured, anchors_s, models))
 
 
 def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -152,16 +151,6 @@ class Carried:
         """(m, 3) standard errors of the residual, m/s²."""
         return np.asarray(np.sqrt(np.einsum("mii->mi", self.covariance)))
 
-    def spread(self, which: IntArray, n_moves: int) -> Carried:
-        """These moves as the moves ``which`` (m,) of ``n_moves``; the others are NaN."""
-
-        def filled(values: FloatArray) -> FloatArray:
-            out = np.full((n_moves, *values.shape[1:]), np.nan)
-            out[which] = values
-            return out
-
-        return Carried(*(filled(getattr(self, one.name)) for one in fields(self)))
-
     def by_scale2(self, covariance: FloatArray) -> FloatArray:
         """(m,) variance across the vertical by a covariance (9, 9) of the gyro's S, (m/s²)²."""
         return _across2(self.up, self.wrt_scale @ _root(covariance))
@@ -202,12 +191,12 @@ class Linear:
 
 
 def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list[Linear]) -> Carried:
-    """:func:`carried` of every move with the model that contains it."""
+    """:func:`carried` of every move with the model that contains it; NaN where none does."""
     before, after = measured.links[:, 0], measured.links[:, 1]
     m = len(before)
     rotation, wrt_before, wrt_after, cov_rate = np.zeros((4, m, 3, 3))
     wrt_scale = np.zeros((m, 3, 9))
-    S_a, S_w, b_a = np.zeros((m, 3, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3))
+    S_a, S_w, b_a = np.full((m, 3, 3), np.nan), np.zeros((m, 3, 3)), np.zeros((m, 3))
     noise = _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s)
     for one in models:
         at, bias = one.moves, -measured.bias @ one.S_w.T
@@ -223,10 +212,7 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
     unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
     unit_end = end / np.linalg.norm(end, axis=1, keepdims=True)
     angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
-    skew = np.zeros((len(start), 3, 3))
-    skew[:, [0, 1, 2], [1, 2, 0]] = -start[:, [2, 0, 1]]
-    skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
-    turn = rotation @ skew
+    turn = rotation @ np.cross(np.eye(3), start[:, None, :])
 
     sigma_force, sigma_bias = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_bias))
     # Roots of covariances side by side: sums of squares stay positive under rounding, unlike the differences of large
@@ -235,12 +221,8 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
              turn @ wrt_before @ (S_w * sigma_bias[before]), turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
     root = np.concatenate(roots, axis=2)
     # Raw biases z are subtracted: S enters through the rate and through -S z.
-    wrt_S = wrt_scale.copy()
-    for i in range(3):
-        wrt_S[:, :, 3 * i : 3 * i + 3] -= (
-            wrt_before[:, :, i : i + 1] * measured.bias[before][:, None, :]
-            + wrt_after[:, :, i : i + 1] * measured.bias[after][:, None, :]
-        )
+    ends = (wrt_before, measured.bias[before]), (wrt_after, measured.bias[after])
+    wrt_S = wrt_scale - sum((wrt[:, :, :, None] * bias[:, None, None, :]).reshape(m, 3, 9) for wrt, bias in ends)
     covariance = root @ np.swapaxes(root, 1, 2)
     return Carried(residual, covariance, angle, _across2(unit_end, root), unit_end, turn @ wrt_S)
 

@@ -14,12 +14,11 @@ from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.model import DYNAMICS, MOVES, SessionState, core_state, misfits, state_of
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 
 FALSE_ALARM = 1e-3
 """Probability that moves of a sound session are found to exceed the noise of their samples."""
-NOISE_DOF = 100.0
-"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
 LOOSE = 100.0
@@ -27,8 +26,6 @@ LOOSE = 100.0
 scale then changes, and the poses do not."""
 LEAST_SHRINK = 0.1
 """Lower limit of degrees of freedom per component: with fewer the ratio of residuals to noise is not meaningful."""
-STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
-"""Labels of rows: accelerometer in poses, tilt error after a rotation, velocity error over a rotation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +86,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
     weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
-    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(weighted))
+    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     return _solution(observed, weighted if is_expected else core)
 
@@ -106,21 +103,12 @@ def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
 
 def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
     """The fit of a session started from another fit, at given noise strengths."""
-    state = _core.SessionState(
-        force_scale=core.force_scale,
-        force_bias=core.force_bias,
-        rate_scale=core.rate_scale,
-        up=core.up,
-        pose_rate_bias=core.pose_rate_bias,
-        pose_force_bias=core.pose_force_bias,
-        effect=np.asarray(core.effect),
-    )
-    return _fit(observed, state, (np.asarray(core.force_scale), np.asarray(core.rate_scale)), strengths, None)
+    return _fit(observed, state_of(core, observed.gravity_m_s2), strengths, None)
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     inflation = core.strengths[3]
-    chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
+    chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     away = core.pose_force_bias @ S_a.T
@@ -169,44 +157,18 @@ def _fitted(
 ) -> _core.SessionFit:
     """One fit from initial values on raw readings; its noise strengths are optimised ``within`` bounds if given."""
     S_a, b_a, S_w = near
-    b_a = b_a + S_a @ observed.force_origin
-    force = observed.pose_force @ S_a.T + b_a
-    state = _core.SessionState(
-        force_scale=np.ascontiguousarray(S_a),
-        force_bias=np.ascontiguousarray(b_a),
-        rate_scale=np.ascontiguousarray(S_w),
-        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
-        pose_rate_bias=np.ascontiguousarray(observed.pose_rate),
-        pose_force_bias=np.zeros((len(force), 3)),
-        effect=np.zeros(len(observed.effect_sigma)),
-    )
-    return _fit(observed, state, (S_a, S_w), strengths, within)
+    n_effects = len(observed.effect_sigma)
+    state = observed.at_means(observed.gravity_m_s2, S_a, b_a + S_a @ observed.force_origin, S_w, n_effects)
+    return _fit(observed, state, strengths, within)
 
 
-def _fit(
-    observed: Observed,
-    state: _core.SessionState,
-    scales: tuple[FloatArray, FloatArray],
-    strengths: Strengths,
-    within: Bounds | None,
-) -> _core.SessionFit:
-    """One fit; effects on the readings are converted to SI with the ``scales`` (3, 3) of the sensors."""
+def _fit(observed: Observed, state: SessionState, strengths: Strengths, within: Bounds | None) -> _core.SessionFit:
+    """One fit; effects on the readings are converted to SI with the scales of the sensors."""
     force, rate = (
         np.ascontiguousarray(np.einsum("ij,njk->nik", S, effect))
-        for S, effect in zip(scales, (observed.force_effect, observed.rate_effect), strict=True)
+        for S, effect in ((state.accel_S, observed.force_effect), (state.gyro_S, observed.rate_effect))
     )
     return observed.model().fit(
-        state=state,
-        strengths=strengths,
-        force_effect=force,
-        rate_effect=rate,
-        within=within,
+        state=core_state(state), strengths=strengths, force_effect=force, rate_effect=rate, within=within,
         sizes=observed.effect_sigma.tolist(),
-    )
-
-
-def _misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
-    """χ² (4,) and degrees of freedom (4,) by domain (label of the rows)."""
-    domain = core.labels[:, 0]
-    chi2, dof = (np.bincount(domain, of_rows, DYNAMICS + 1) for of_rows in (core.residual**2, 1.0 - core.leverage()))
-    return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)
+    )  # fmt: skip

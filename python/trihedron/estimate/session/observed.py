@@ -12,38 +12,28 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.averaging import EITHER, sharpened
-from trihedron.session.noise import Along, measure_noise, scatter_unit
+from trihedron.session.model import LOWER, Prior, SessionReadings
+from trihedron.session.noise import measure_noise
+from trihedron.session.rounding import UNIFORM
 
-LOWER = np.tril_indices(3)
-"""Indices of a lower-triangular scale, row by row."""
 DELAY_S = 0.005
 """Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
 HELD = 1e-10
 """Relative prior σ of a given accelerometer: far below any noise, and above rounding errors in the rows."""
 
 
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """One session for the core; readings are relative to ``force_origin``, ``rate_origin`` (3,).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Observed(SessionReadings):
+    """One session for the core: the samples of the ``moves`` with the poses ``before`` (m,) in which they begin.
 
-    Pose means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the poses
-    ``before`` (m,) in which they begin; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`. ``force_effect``,
-    ``rate_effect`` (poses, then samples of moves, 3, k), raw, are the derivatives of the readings by k unknowns with
-    prior σ ``effect_sigma`` (k,): position of the bias inside its LSB, for the ``n_hidden`` axes whose noise does not
-    dither it; averaging of readings over their interval, relative to ``EITHER``; errors that all moves share; delay of
-    the accelerometer. ``prior``: mean (18,) and covariance (18, 18) of both linear models on centred readings.
+    ``force_effect``, ``rate_effect`` (poses, then samples of moves, 3, k), raw, are the derivatives of the readings by
+    k unknowns with prior σ ``effect_sigma`` (k,): position of the bias inside its LSB, for the ``n_hidden`` axes whose
+    noise does not dither it; averaging of readings over their interval, relative to ``EITHER``; errors that all moves
+    share; delay of the accelerometer. ``prior`` is that of both linear models on centred readings.
     """
 
     gravity_m_s2: float
-    force_origin: FloatArray
-    rate_origin: FloatArray
-    pose_time_s: FloatArray
-    pose_force: FloatArray
-    pose_force_sigma: FloatArray
-    force_density: FloatArray
     pose_rate: FloatArray
-    pose_rate_sigma: FloatArray
-    rate_density: FloatArray
     moves: _core.SessionMoves
     before: IntArray
     sigma_time_s: float
@@ -52,31 +42,12 @@ class Observed:
     rate_effect: FloatArray
     effect_sigma: FloatArray
     n_hidden: int
-    force_up: Along | None = None
-    force_scatter: float = 0.0
-    prior: tuple[FloatArray, FloatArray] | None = None
+    prior: Prior | None = None
 
     def model(self) -> _core.SessionModel:
         """The Rust model; bias repeatability from pose to pose is not bounded, but determined by the evidence."""
-        poses = _core.SessionPoses(
-            time_s=self.pose_time_s,
-            force=self.pose_force,
-            force_sigma=self.pose_force_sigma,
-            force_density=self.force_density,
-            rate=self.pose_rate,
-            rate_sigma=self.pose_rate_sigma,
-            rate_density=self.rate_density,
-            force_along=self.force_up,
-        )
-        unit = scatter_unit(self.pose_force_sigma, self.pose_rate_sigma, self.force_up)
-        return _core.SessionModel(
-            gravity_m_s2=self.gravity_m_s2,
-            poses=poses,
-            moves=self.moves,
-            noise=(self.sigma_time_s, self.nominal_step_s),
-            prior=None if self.prior is None else (*self.prior, True),
-            scatter=(unit, self.force_scatter / float(unit[0, 0])),
-        )
+        timing_s = self.sigma_time_s, self.nominal_step_s
+        return self.core_model(self.gravity_m_s2, self.moves, timing_s, self.prior)
 
 
 def arranged(
@@ -98,11 +69,10 @@ def arranged(
             continue
         ranges.append((a, b))
         before.append(pose)
-    noise = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
+    noise, unresolved = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
     force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
-    assert noise.rate_sigma is not None
+    assert noise.pose_rate_sigma is not None
     assert noise.rate_density is not None
-    unresolved = noise.unresolved
     if measured.reading_variance is not None:
         # Variance of rounding and of bridged clipping, in addition to that of any session.
         for k, (a, b) in enumerate(ranges):
@@ -112,40 +82,35 @@ def arranged(
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
     lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
     of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
-    effects = _effects(recording, measured, readings, ranges)
-    return Observed(
-        gravity_m_s2=gravity_m_s2,
-        force_origin=force_origin,
-        rate_origin=rate_origin,
+    # Without dither the rounding error does not average out: the larger of both standard errors is used.
+    own = {
+        "pose_force_sigma": np.maximum(noise.pose_force_sigma, np.sqrt(measured.var_reading_noise)),
+        "pose_rate_sigma": np.where(
+            is_coarse, of_coarse, np.maximum(noise.pose_rate_sigma, np.sqrt(measured.var_bias_read))
+        ),
+        "rate_density": np.where(is_coarse, measured.noise_density, noise.rate_density),
+    }
+    effects, moves_before = _effects(recording, measured, readings, ranges), np.array(before, dtype=np.int64)
+    moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
-        pose_force=measured.reading - force_origin,
-        # Without dither the rounding error does not average out: the larger of both standard errors is used.
-        pose_force_sigma=np.maximum(noise.force_sigma, np.sqrt(measured.var_reading_noise)),
-        force_density=noise.force_density,
-        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin,
-        pose_rate_sigma=np.where(is_coarse, of_coarse, np.maximum(noise.rate_sigma, np.sqrt(measured.var_bias_read))),
-        rate_density=np.where(is_coarse, measured.noise_density, noise.rate_density),
-        moves=_core.SessionMoves(
-            pose_time_s=pose_time_s,
-            time_s=_samples_of(ranges, measured.time_s),
-            force=_samples_of(ranges, force) - force_origin,
-            rate=_samples_of(ranges, rate) - rate_origin,
-            ranges=_in_turn(ranges),
-            before=np.array(before, dtype=np.int64),
-            unresolved=unresolved,
-        ),
-        before=np.array(before, dtype=np.int64),
-        sigma_time_s=measured.sigma_time_s,
-        nominal_step_s=measured.nominal_step_s,
-        force_effect=effects[0],
-        rate_effect=effects[1],
-        effect_sigma=np.array(
-            [*measured.quantum[coarse] / np.sqrt(12.0), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S]
-        ),
-        n_hidden=len(coarse),
-        force_up=noise.force_up,
-        force_scatter=noise.force_scatter,
+        time_s=_samples_of(ranges, measured.time_s),
+        force=_samples_of(ranges, force) - force_origin,
+        rate=_samples_of(ranges, rate) - rate_origin,
+        ranges=_in_turn(ranges),
+        before=moves_before,
+        unresolved=unresolved,
     )
+    return Observed(
+        **(vars(noise) | own), gravity_m_s2=gravity_m_s2, force_origin=force_origin, rate_origin=rate_origin,
+        pose_time_s=pose_time_s, pose_force=measured.reading - force_origin,
+        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin, moves=moves,
+        before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
+        force_effect=effects[0], rate_effect=effects[1],
+        effect_sigma=np.array([
+            *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
+        ]),
+        n_hidden=len(coarse),
+    )  # fmt: skip
 
 
 def _effects(
@@ -176,7 +141,7 @@ def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatA
     mean = np.concatenate([S_a[LOWER], b_a + S_a @ observed.force_origin, S_w.ravel()])
     sizes = float(np.linalg.norm(S_a, 2)), observed.gravity_m_s2, float(np.linalg.norm(S_w, 2))
     sigma = np.repeat(sizes, (6, 3, 9)) * np.repeat((HELD if is_given else 1.0, 1.0), (9, 9))
-    return replace(observed, prior=(mean, np.diag(sigma**2)))
+    return replace(observed, prior=Prior(mean, np.diag(sigma**2), is_weak=True))
 
 
 def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArray:

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.carried import Carried, HeldOut, carried, held_out, move_quality
+from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, with_prior
 from trihedron.estimate.session.start import Log, MoveOptions, Near, begun, is_enough, lower, near_one_another
@@ -131,7 +131,7 @@ def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _
     observed = log.observed(measured, used, near)
     solution = solve_session(observed, *near)
     shown = solution.as_read(measured)
-    seen = carried(shown, log.anchors_s(measured), solution.S_a, solution.b_a, solution.S_w)
+    seen = log.carried(shown, (solution.S_a, solution.b_a, solution.S_w))
     return _Fit(measured, used, observed, solution, seen)
 
 
@@ -187,7 +187,7 @@ def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> Senso
 
 def _standard_errors(covariance: FloatArray) -> FloatArray:
     """Principal errors: rows (k, 12) whose outer products sum to the covariance (12, 12)."""
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(covariance), TINY))
     # Scaled to a correlation matrix: in counts and m/s² the variances span many decades.
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     keep = values > 1e-10 * float(values.max())

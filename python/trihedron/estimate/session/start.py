@@ -10,9 +10,8 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import REFUSALS, RefusedError
-from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import N_GYROSCOPE, carried
+from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
@@ -61,6 +60,14 @@ class Log:
         """(m, 2) times of the middles of the poses before and after each move [s]."""
         return self.segments.time_mid_s[measured.links]
 
+    def carried(self, measured: MoveMeasurements, near: Near) -> Carried:
+        """Tilt errors of the moves by S and b of the accelerometer and S of the gyro."""
+        return carried(measured, self.anchors_s(measured), *near)
+
+    def usual_deg(self, measured: MoveMeasurements, near: Near) -> float:
+        """Median of these tilt errors as of :func:`usual_deg`."""
+        return usual_deg(self.carried(measured, near).angle_deg, measured, *near[:2])
+
 
 def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]:
     """Moves of a session and initial values of its fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
@@ -74,7 +81,7 @@ def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]
     if np.any(bridged.clipped_s > 0.0) and not is_word:
         plain = log.measured(is_bridged=False)
         near = _near(log, plain, nominal)
-        if denies_cut(near[2], _missed_deg(log, plain, near), bridged, plain):
+        if denies_cut(near[2], log.carried(plain, near).angle_deg, bridged, plain):
             return plain, near
     return bridged, _near(log, bridged, nominal)
 
@@ -91,7 +98,7 @@ def near_one_another(log: Log, measured: MoveMeasurements, near: Near) -> BoolAr
     With too few moves none is excluded.
     """
     used = ~measured.is_lost
-    residual, covariance, slope = carried(measured, log.anchors_s(measured), *near).in_plane()
+    residual, covariance, slope = log.carried(measured, near).in_plane()
     used &= np.isfinite(residual).all(axis=1)
     white = np.linalg.inv(np.linalg.cholesky(covariance[used]))
     residual, slope = (white @ residual[used][:, :, None])[:, :, 0], white @ slope[used]
@@ -120,12 +127,12 @@ def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     found = _nearest(log, measured, first)
     if nominal is not None or rate_to_si(log.recording.gyroscope_unit) is not None:
         return found
-    missed = _usually_missed_deg(log, measured, found)
-    again = turned_starts(measured, log.accelerometer, first[0]) if missed > ASTRAY_DEG else None
+    missed = log.usual_deg(measured, found)
+    again = turned_starts(log, measured, first[0]) if missed > ASTRAY_DEG else None
     if again is None:
         return found
     other = _nearest(log, measured, again)
-    return other if _usually_missed_deg(log, measured, other) < missed else found
+    return other if log.usual_deg(measured, other) < missed else found
 
 
 def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
@@ -143,14 +150,6 @@ def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
     if not found:
         raise RefusedError("the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)")
     return S_a, b_a, min(found, key=lambda one: one[0])[1]
-
-
-def _missed_deg(log: Log, measured: MoveMeasurements, near: Near) -> FloatArray:
-    return carried(measured, log.anchors_s(measured), *near).angle_deg
-
-
-def _usually_missed_deg(log: Log, measured: MoveMeasurements, near: Near) -> float:
-    return usual_deg(_missed_deg(log, measured, near), measured, *near[:2])
 
 
 def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
@@ -270,42 +269,24 @@ def starts(
     return np.ascontiguousarray(np.stack(found))
 
 
-def turned_starts(
-    measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
-) -> FloatArray | None:
+def turned_starts(log: Log, measured: MoveMeasurements, linear: FloatArray) -> FloatArray | None:
     """Initial scales (k, 3, 3) with the least tilt errors among scales equal on all axes; ``None`` with too few moves.
 
     In moves of tenths of a second, through hundreds of degrees, accelerations exceed gravity: the ``linear`` start then
     fails. The axes are tried parallel to the accelerometer's, and rotated as those of the ``linear`` start.
     """
-    force = measured.reading @ accelerometer.S.T + accelerometer.b
-    up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    courses = []
-    for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
+    longest = 0.0
+    for (a, b), (before, after) in zip(measured.edges, measured.links, strict=True):
         rate = measured.rate[a:b] - 0.5 * (measured.bias[before] + measured.bias[after])
-        if not lost and b - a > 1 and np.isfinite(rate).all():
-            courses.append((measured.time_s[a:b], rate, up[before], up[after]))
-    if len(courses) < FEWEST_MOVES:
-        return None
-    sizes = [(time, np.linalg.norm(rate, axis=1)) for time, rate, _, _ in courses]
-    most = max(float(0.5 * np.diff(time) @ (size[1:] + size[:-1])) for time, size in sizes)
-    if not most > 0.0:
+        longest = max(longest, float(np.nansum(np.linalg.norm(rate, axis=1))) * measured.nominal_step_s)
+    if np.count_nonzero(~measured.is_lost) < FEWEST_MOVES or longest == 0.0:
         return None
     left, _, right = np.linalg.svd(linear)
-    turns = [np.eye(3), left @ right]
-    tried = [
-        (angle / most) * turn for turn in turns for angle in np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
-    ]
-    missed = [
-        np.median([_missed_rad(time, rate @ S.T, before, after) for time, rate, before, after in courses])
-        for S in tried
-    ]
+    angles = np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
+    tried = [(angle / longest) * turn for turn in (np.eye(3), left @ right) for angle in angles]
+    S_a, b_a = log.accelerometer.S, log.accelerometer.b
+    missed = [log.usual_deg(measured, (S_a, b_a, S)) for S in tried]
     return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
-
-
-def _missed_rad(time: FloatArray, rate: FloatArray, before: FloatArray, after: FloatArray) -> float:
-    turned = integrate_rate(time, rate, last_only=True).T @ before
-    return float(np.arccos(np.clip(turned @ after, -1.0, 1.0)))
 
 
 _ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
