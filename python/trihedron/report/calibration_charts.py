@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.report.axes import calibrated_sensors
-from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale, Span
+from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
 from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -27,7 +27,7 @@ MOST_NUMBERED = 60
 """Most poses on a disc with printed numbers; more would overlap."""
 
 
-def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, spans: tuple[Span, ...] = ()) -> Chart:
+def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, lines: tuple[Level, ...] = ()) -> Chart:
     """Residual of every pose, in sample and cross-validated, with the 3 σ limits of noise alone."""
     pose = np.arange(1, len(quality.residual) + 1, dtype=np.float64)
     residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
@@ -35,7 +35,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, span
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
     reach = np.repeat(limit, 2)
-    marks: list[Mark] = [*spans, Band(edge, -reach, reach, "3 σ of noise alone"), Level(y=0.0)]
+    marks: list[Mark] = [Band(edge, -reach, reach, "3 σ of noise alone"), *lines, Level(y=0.0)]
     top = None
     if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
         held = mm_s2(quality.held_out)

@@ -19,11 +19,11 @@ from trihedron.report.calibration_charts import (
     sphere_chart,
 )
 from trihedron.report.calibration_fit import direction
-from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Span, Sphere
+from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number
-from trihedron.report.segments import pose_spans, signals_picture
+from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 FEWEST_NAMES = 2
@@ -41,12 +41,12 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
-        chart = partial(_lead_chart, calibration, means, pose_spans(segments))
+        chart = partial(_lead_chart, calibration, means, pose_lines(segments))
         caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
     return Picture("residuals", caption, chart)
 
 
-def _lead_chart(calibration: Calibration, means: FloatArray, spans: tuple[Span, ...]) -> Chart:
+def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level, ...]) -> Chart:
     """Residual of every pose, and |gravity error| before and after calibration; ``means`` (n, 3) raw readings."""
     quality = calibration.accelerometer.quality
     assert quality is not None
@@ -54,7 +54,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, spans: tuple[Span, 
     after = mm_s2(_unseen(quality))
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
     noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
-    marks: list[Mark] = [*spans]
+    marks: list[Mark] = [*lines]
     marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     # Colours as in the residuals: one for in-sample, one for cross-validated.
     held = _is_held(quality)
@@ -67,7 +67,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, spans: tuple[Span, 
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
     sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms{'' if held else ' in sample'}")
-    return Chart((*residual_chart(quality, spans=spans).panels, sizes), columns=2)
+    return Chart((*residual_chart(quality, lines=lines).panels, sizes), columns=2)
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:

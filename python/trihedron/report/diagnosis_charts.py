@@ -34,7 +34,7 @@ Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
 
 
-def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
+def before_after_chart(residuals: DomainResiduals, *, has_effects: bool, lines: tuple[Level, ...] = ()) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
     factor, unit = shown(residuals.unit)
     r, first = residuals, "linear model" if has_effects else "fitted model"
@@ -50,7 +50,7 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
     panels = []
     for title, time_s, value, sigma, names in sides:
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
-        panels.append(Panel(x, y, marks, title=title, height_px=200))
+        panels.append(Panel(x, y, (*lines, *marks), title=title, height_px=200))
     return Chart(tuple(panels), columns=len(panels))
 
 

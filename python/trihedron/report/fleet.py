@@ -232,7 +232,7 @@ def _drift(summary: FleetSummary) -> list[Block]:
     for change in moved:
         how, sizes, unit = change_in_words(change)
         k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
-        size = f"{sizes[k]} {unit} in {change.names[k]}"
+        size = f"{sizes[k]} {unit} in {axis_in_print(change.names[k])}"
         rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
     head = ("device", "parameter", "how", "by", "p")
     whole = f"Tested: {tested} A folder is taken for one device unless --serial names it ({BY_FILE})."

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ
+from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Pose, Recording, Segments, Severity, Truth
 from trihedron.report.channels import logged_sensors
-from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
@@ -116,10 +116,16 @@ def state_of(pose: Pose) -> str:
     return SHAKEN if pose.is_unsteady else "disturbed" if pose.disturbed else ""
 
 
-def pose_spans(segments: Segments | None) -> tuple[Span, ...]:
-    """Shades behind the numbers of poses that were not static throughout."""
-    states = [] if segments is None else [(k, state_of(pose)) for k, pose in enumerate(segments.poses, 1)]
-    return tuple(Span(k - 0.5, k + 0.5, state, "soft" if state == SHAKEN else "warn") for k, state in states if state)
+def pose_lines(segments: Segments | None, at: FloatArray | None = None) -> tuple[Level, ...]:
+    """Upright lines ``at`` (n,) the poses that were not static throughout, by default at their numbers."""
+    if segments is None:
+        return ()
+    places = np.arange(1.0, segments.n_poses + 1.0) if at is None else at
+    return tuple(
+        Level(x=float(x), name=state, colour="soft" if state == SHAKEN else "warn", is_dashed=True)
+        for x, pose in zip(places, segments.poses, strict=True)
+        if (state := state_of(pose))
+    )
 
 
 def _span(recording: Recording, first: int, last: int, name: str = "pose", colour: Colour = "shade") -> Span:
