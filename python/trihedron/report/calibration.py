@@ -73,7 +73,8 @@ def calibration_report(
 
 def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
-    held, in_sample = [], []
+    held: list[Headline] = []
+    in_sample: list[Headline] = []
     quality = calibration.accelerometer.quality
     if quality is not None:
         is_held = quality.held_out_rms is not None
