@@ -97,4 +97,4 @@ def test_what_comes_next_is_the_remedy_of_what_is_wrong_and_keeps_the_rate_that_
     assert "Calibrate:" not in capsys.readouterr().out
     main(["check", str(tmp_path / "board.csv"), "--rate", "50", "--columns", "ax,ay,az,-,-,-"])
     said = capsys.readouterr().out
-    assert "NOT FIT" in said or "trihedron calibrate LOG --rate 50 --latitude DEG" in said
+    assert "NOT FIT" in said or "--columns ax,ay,az,-,-,- --rate 50 --latitude DEG -o calibration.json`" in said

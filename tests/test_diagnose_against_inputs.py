@@ -1,10 +1,15 @@
 """What cannot be held against a recording is refused in one sentence: which file, which place, what to do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import trihedron
 from small_session import G, made_once
+from trihedron.api.choices import gravity_of_scenario
 from trihedron.cli import main
+from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 GOOD = 'name = "mine"\nprofile = "mpu"\n[session]\nkind = "hand"\n[gyroscope]\nb = [0.0, 0.0, 0.0]\n'
 
@@ -59,3 +64,14 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
         said = " ".join(capsys.readouterr().out.split())
         assert "the gyro was not compared." in said
         assert lacks in said
+
+
+def test_gravity_is_that_of_the_scenario_unless_given():
+    """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
+    at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=12, pose_s=2.0, move_s=1.0))
+    at_the_pole = replace(at_the_pole, environment=replace(at_the_pole.environment, gravity_m_s2=9.832))
+    found = trihedron.diagnose(simulate(at_the_pole, 5)[0], against=at_the_pole)
+    assert found.calibration.gravity_m_s2 == 9.832
+    assert found.gravity_source == "that of the scenario"
+    assert not [p for p in found.parameters if p.significant and p.id in ("accel-scale", "gravity")]
+    assert gravity_of_scenario(scenario_by_name("hand-session")) is None

@@ -10,7 +10,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
-from trihedron.api.choices import gravity_of, settle_gravity
+from trihedron.api.choices import gravity_of, gravity_of_scenario, settle_gravity
 from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
@@ -98,7 +98,7 @@ def diagnose(
     if not 0.0 < alpha < 0.5:
         raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
-    recording = recording_of(recording)
+    recording, against = recording_of(recording), _opened(against)
     ordinary = partial(
         _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, tell
     )
@@ -122,7 +122,7 @@ def _of_poses(
 ) -> DiagnosisResult:
     """The diagnosis by poses and moves, without a reference."""
     known = None if calibration is None else calibration_of(calibration)
-    gravity, source, said = settle_gravity(*place, gravity_of(known))
+    gravity, source, said = settle_gravity(*place, gravity_of(known) or gravity_of_scenario(against))
     findings = [*said, *recording.findings]
     if known is not None:
         check_units(known, recording)
@@ -245,6 +245,13 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
 
 
+def _opened(against: GivenModel | None) -> GivenModel | None:
+    """The scenario where ``against`` names one, else ``against`` as given."""
+    if isinstance(against, str | os.PathLike) and names_scenario(against):
+        return scenario_of(against)
+    return against
+
+
 def _simulated_log(
     against: GivenModel, recording: Recording, segments: Segments, gravity: float
 ) -> tuple[Recording, Scenario | None]:
@@ -255,9 +262,7 @@ def _simulated_log(
         if not isinstance(against, str | os.PathLike):
             kind = type(against).__name__
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
-        if not names_scenario(against):
-            return read(against), None
-        against = scenario_of(against)
+        return read(against), None
     if recording.gyroscope is None:
         raise RefusedError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
@@ -283,8 +288,10 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     of_world = rates_of_world(recording, segment(recording))
     if of_world is not None:
         recording = replace(recording, gyroscope=None)
+    # A scenario states its own gravity; a simulated log is taken to be of the recording's place.
+    own = gravity if scenario is None else scenario.environment.gravity
     try:
-        result = calibrate(recording, gravity_m_s2=gravity)
+        result = calibrate(recording, gravity_m_s2=own)
     except REFUSALS as error:
         raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)

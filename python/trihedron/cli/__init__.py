@@ -31,6 +31,7 @@ from trihedron.cli.fleet import fleet
 from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
+from trihedron.cli.next_step import begin_next_step
 from trihedron.cli.noise import noise
 from trihedron.cli.output import silence
 from trihedron.cli.plan import plan
@@ -138,6 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = _a_reference_each(words)
     spell_out()
     begin(words)
+    begin_next_step()
     try:
         _make_writable()
         status = typer.main.get_command(build_app()).main(words, prog_name="trihedron", standalone_mode=False)

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from trihedron.cli.options import GravitySource, progress, with_options
-from trihedron.cli.output import NOT_TO_BE_TRUSTED, check_outputs, say, show, write_json
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, check_outputs, say, show, write_json, write_report
 
 OPTIONS = {
     "logs": typer.Argument(metavar="DIR|GLOB...", help="Folder with logs, pattern such as 'logs/*.csv', or logs."),
@@ -66,7 +66,9 @@ def fleet(
     shown = tuple(section for section in document.sections if section.heading != "Every log")
     show(document, json, sections=len(shown))
     write_json(lambda: {"rows": list(result.rows)}, json, force=force, document=document)
-    say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
+    # Again, with how it was made.
+    write_report(document, lambda: {}, out / "fleet.html", force=True)
+    say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
     if not document.is_trustworthy:
         raise typer.Exit(NOT_TO_BE_TRUSTED)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+from trihedron.cli.next_step import note_file, note_log, note_place
 from trihedron.cli.provenance import note_input, note_options
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ class LogSource(ReadingOptions):
                 progress=report,
             )
         note_input(recording)
+        note_log(self)
         return recording
 
 
@@ -204,8 +206,11 @@ def with_options(table: Table | None = None, /, **groups: type) -> Callable[[Cal
         @functools.wraps(command)
         def run(**given: Any) -> None:
             note_options(given)
+            note_file(given.get("output"))
             for name, group in groups.items():
                 given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
+                if group is GravitySource:
+                    note_place(given[name])
             command(**given)
 
         del run.__wrapped__  # typer would read the inner signature

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
+from trihedron.cli.next_step import with_arguments
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import check_free, check_report, write_whole
@@ -54,7 +55,7 @@ def write_report(document: Document, machine: Machine, report: Path | None, *, f
 
 def _with_provenance(document: Document) -> Document:
     """The document with its provenance; a saved one keeps its own."""
-    return document if document.provenance else with_provenance(document)
+    return document if document.provenance else with_provenance(with_arguments(document))
 
 
 def write_json(machine: Machine, target: Path | None, *, force: bool, document: Document | None = None) -> None:
@@ -145,7 +146,7 @@ def show(document: Document, json_target: Path | None, *, sections: int | None) 
     if json_target is None or str(json_target) != "-":
         from trihedron.report import to_text
 
-        put(to_text(document, sections=sections, style=style()))
+        put(to_text(with_arguments(document), sections=sections, style=style()))
 
 
 def style() -> Style:

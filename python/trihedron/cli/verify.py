@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from trihedron.cli.next_step import note_file
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
 from trihedron.cli.output import FullResults, leave
 
@@ -52,11 +53,13 @@ def verify(
 
     paths, log = _parted(source)
     known = _calibrations(paths)
+    note_file(paths[0])
     recording = log.read()
     if len(known) > 1:
         with progress("ranking") as tell:
             ranking = rank(paths, recording, progress=tell, **place.said)
         document = ranking_report(ranking)
+        note_file(next(path for path in paths if path.name == ranking.best.name))
         results.show(document, FIRST_SCREEN)
         results.write(document, lambda: ranking_record(ranking))
         leave(ranking.best.verification.findings)

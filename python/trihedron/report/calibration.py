@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ
-from trihedron.records import Calibration, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of, calibrated_sensors
 from trihedron.report.calibration_charts import correlations, strong_correlations
@@ -36,7 +36,8 @@ from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = "Test it on another recording (trihedron verify), then use it (trihedron apply, trihedron export)."
+NEXT = "Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: `trihedron apply FILE LOG`, "
+NEXT += "`trihedron export FILE --to c`."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -71,26 +72,34 @@ def calibration_report(
 
 
 def _headlines(calibration: Calibration) -> list[Headline]:
-    """Gravity error in static poses and tilt error after rotations."""
-    out = []
+    """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
+    held: list[Headline] = []
+    in_sample: list[Headline] = []
     quality = calibration.accelerometer.quality
     if quality is not None:
-        rms, kind = quality.rms, "in sample"
-        if quality.held_out_rms is not None:
-            rms, kind = quality.held_out_rms, "cross-validated"
-        beside = f"rms, {kind}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
-        out.append(Headline("gravity error in static poses", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
-    gyroscope = calibration.gyroscope
-    if gyroscope is not None and gyroscope.quality is not None:
-        seen = [(label, rms) for label, rms, _ in angles_of(gyroscope.quality)]
-        if seen:
-            beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(move_floor(gyroscope.quality))}°"
-            out.append(Headline("tilt error after a rotation", plain_number(seen[-1][1]), "°", beside))
+        is_held = quality.held_out_rms is not None
+        rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
+        beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
+        what, value = "gravity error in static poses", plain_number(mm_s2_from_m_s2(rms))
+        (held if is_held else in_sample).append(Headline(what, value, "mm/s²", beside))
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    angles = [] if moved is None else angles_of(moved)
+    if moved is not None and angles:
+        is_held = len(angles) > 1
+        kind, floor = _kind(moved, is_held=is_held), plain_number(move_floor(moved))
+        beside = f"rms, {kind}, {AFTER_MOVES}; noise alone {floor}°"
+        value = plain_number(angles[-1][1])
+        (held if is_held else in_sample).append(Headline("tilt error after a rotation", value, "°", beside))
+    uncertain = []
     for name, sensor in calibrated_sensors(calibration):
         with suppress(ValueError):
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
-            out.append(Headline(f"{name} scale uncertainty", worst, "%", "1 σ, worst axis"))
-    return out
+            uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", "1 σ, worst axis"))
+    return [*held, *uncertain, *in_sample]
+
+
+def _kind(quality: FitQuality, *, is_held: bool) -> str:
+    return "cross-validated" if is_held else f"in sample only ({how_many(quality.dof, 'degree')} of freedom)"
 
 
 def verdict(calibration: Calibration) -> str:

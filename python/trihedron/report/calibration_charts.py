@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.report.axes import calibrated_sensors
-from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Panel, Points, Scale
+from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
 from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -20,13 +20,14 @@ STRONG = 0.5
 """Correlation above which a pair of parameters is listed."""
 LIMIT_SIGMAS = 3.0
 """Limit of a residual in standard errors; chance exceeds it once in 370."""
+IN_SAMPLE, HELD = "in sample", "cross-validated (predicted by a fit without it)"
 MARK = 0.12
 """Diameter of a pose\'s mark; the horizon has radius 1."""
 MOST_NUMBERED = 60
 """Most poses on a disc with printed numbers; more would overlap."""
 
 
-def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> Chart:
+def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, lines: tuple[Level, ...] = ()) -> Chart:
     """Residual of every pose, in sample and cross-validated, with the 3 σ limits of noise alone."""
     pose = np.arange(1, len(quality.residual) + 1, dtype=np.float64)
     residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
@@ -34,7 +35,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
     reach = np.repeat(limit, 2)
-    marks: list[Band | Level | Points] = [Band(edge, -reach, reach, "3 σ of noise alone"), Level(y=0.0)]
+    marks: list[Mark] = [Band(edge, -reach, reach, "3 σ of noise alone"), *lines, Level(y=0.0)]
     top = None
     if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
         held = mm_s2(quality.held_out)
@@ -43,11 +44,10 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
             said(f"cross-validated, {name}", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
-        name = "cross-validated (predicted by a fit without it)"
-        marks.append(Points(pose + 0.17, held, tips, held_sigma, name, "accent", True))
+        marks.append(Points(pose + 0.17, held, tips, held_sigma, HELD, "accent", True))
         top = _highest(held, held_sigma, residual, limit)
     tips = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
-    marks.append(Points(pose - 0.17, residual, tips, None, "in sample", "c1"))
+    marks.append(Points(pose - 0.17, residual, tips, None, IN_SAMPLE, "c1"))
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("|f| − |g|  [mm/s²]", "mm/s²", limits=None if top is None else (-top, top))
     return Chart((Panel(x, y, tuple(marks)),))

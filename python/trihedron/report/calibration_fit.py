@@ -13,6 +13,7 @@ from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
 from trihedron.report.document import Block, Table
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.report.segments import state_of
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
@@ -133,6 +134,7 @@ def residual_tables(calibration: Calibration, segments: Segments | None) -> list
 
 def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segments | None) -> Table:
     is_known = segments is not None and segments.n_poses == len(quality.residual)
+    is_disturbed = is_known and segments is not None and any(map(state_of, segments.poses))
     rows = []
     for k, (residual, sigma) in enumerate(zip(quality.residual, quality.sigma, strict=True)):
         row = [str(k + 1)]
@@ -142,9 +144,10 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
             row.append("" if mean is None else direction(sensor.S @ mean[k] + sensor.b))
         row.append(with_sigma(mm_s2_from_m_s2(float(residual)), mm_s2_from_m_s2(float(sigma))))
         row.append(_held_out_cell(quality, k))
+        row += [state_of(segments.poses[k])] if is_disturbed and segments is not None else []
         rows.append(tuple(row))
     known = ("mid [s]", "length [s]", "up (body frame)") if is_known else ()
-    head = ("pose", *known, "residual [mm/s²]", "cross-validated [mm/s²]")
+    head = ("pose", *known, "residual [mm/s²]", "cross-validated [mm/s²]", *(("not static",) if is_disturbed else ()))
     return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
 
 

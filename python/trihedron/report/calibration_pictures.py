@@ -9,6 +9,8 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.report.calibration_charts import (
+    HELD,
+    IN_SAMPLE,
     LIMIT_SIGMAS,
     correlations,
     mm_s2,
@@ -21,7 +23,7 @@ from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matri
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number
-from trihedron.report.segments import signals_picture
+from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 FEWEST_NAMES = 2
@@ -39,12 +41,12 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
-        chart = partial(_lead_chart, calibration, means)
+        chart = partial(_lead_chart, calibration, means, pose_lines(segments))
         caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
     return Picture("residuals", caption, chart)
 
 
-def _lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
+def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level, ...]) -> Chart:
     """Residual of every pose, and |gravity error| before and after calibration; ``means`` (n, 3) raw readings."""
     quality = calibration.accelerometer.quality
     assert quality is not None
@@ -52,10 +54,11 @@ def _lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
     after = mm_s2(_unseen(quality))
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
     noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
-    marks: list[Mark] = [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
+    marks: list[Mark] = [*lines]
+    marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     # Colours as in the residuals: one for in-sample, one for cross-validated.
     held = _is_held(quality)
-    kinds = ((before, "before", "soft"), (after, "after" + held * ", cross-validated", "accent" if held else "c1"))
+    kinds = ((before, "before calibration", "soft"), (after, HELD if held else IN_SAMPLE, "accent" if held else "c1"))
     for values, name, colour in kinds:
         tips = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
@@ -63,8 +66,8 @@ def _lead_chart(calibration: Calibration, means: FloatArray) -> Chart:
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
-    sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms")
-    return Chart((*residual_chart(quality).panels, sizes), columns=2)
+    sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms{'' if held else ' in sample'}")
+    return Chart((*residual_chart(quality, lines=lines).panels, sizes), columns=2)
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments
-from trihedron.records.sampling import TimestampKind
 from trihedron.report.axes import axes_of, calibrated_sensors
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
@@ -27,8 +26,6 @@ def check_report(
         head = ("", "scale", "bias", "angles between axes")
         blocks.append(Table(head, rows, "Expected standard uncertainty (1 σ), worst axis"))
         blocks += _advice(calibration)
-    # A log without timestamps needs its rate again.
-    rate = f" --rate {recording.rate_hz:.6g}" if recording.sampling.kind is TimestampKind.NONE else ""
     return Document(
         title="Check of a log",
         subtitle=recording.source,
@@ -40,7 +37,7 @@ def check_report(
         ),
         headlines=tuple(_headlines(segments, calibration)),
         lead=signals_picture(recording, segments),
-        next_step=f"Calibrate: trihedron calibrate LOG{rate} --latitude DEG -o FILE.",
+        next_step="Calibrate: `trihedron calibrate LOG --latitude DEG -o calibration.json`.",
     )
 
 

@@ -37,6 +37,7 @@ from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import capital, how_many, listed, plain_number
 from trihedron.report.reference import beside_reference
+from trihedron.report.segments import pose_lines
 
 _CAPTIONS = {
     "static-accel": "Gravity error in every static pose.",
@@ -280,7 +281,9 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
-    chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects))
+    segments = getattr(diagnosis, "segments", None) if residuals.kind == "pose" else None
+    lines = () if segments is None else pose_lines(segments, segments.time_mid_s)
+    chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects), lines=lines)
     return Picture(residuals.domain, caption, chart)
 
 

@@ -15,7 +15,7 @@ from trihedron.report.axes import axis_in_print, channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
-from trihedron.report.numbers import SHOWN, plain_number, shown
+from trihedron.report.numbers import plain_number, shown
 
 Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
 WORDS = {
@@ -23,9 +23,8 @@ WORDS = {
     "static-gyro": "gyro rate in static poses",
     "moves": "tilt error after rotations",
     "dynamics": "velocity error over a rotation",
-    "noise": "noise, octave by octave",
 }
-SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent", "soft")
+SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent")
 FEWEST_STAGES = 3
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
@@ -35,7 +34,7 @@ Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
 
 
-def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
+def before_after_chart(residuals: DomainResiduals, *, has_effects: bool, lines: tuple[Level, ...] = ()) -> Chart:
     """Residuals of one domain before and after the effects on one scale; without effects a single panel."""
     factor, unit = shown(residuals.unit)
     r, first = residuals, "linear model" if has_effects else "fitted model"
@@ -51,7 +50,7 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Char
     panels = []
     for title, time_s, value, sigma, names in sides:
         marks = _domain_marks(residuals, (time_s, factor * value, factor * sigma), names, unit)
-        panels.append(Panel(x, y, marks, title=title, height_px=200))
+        panels.append(Panel(x, y, (*lines, *marks), title=title, height_px=200))
     return Chart(tuple(panels), columns=len(panels))
 
 
@@ -91,8 +90,8 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Cross-validated misfit after every stage."""
     if len(diagnosis.stages) < FEWEST_STAGES:
         return ()
-    caption = "Cross-validated residual, stage by stage: as given, with its own parameters, noise, effects; each "
-    caption += "domain against its own first stage."
+    caption = "Cross-validated misfit, stage by stage: as given, with the recording's own parameters, noise, effects; "
+    caption += "1 where noise and uncertainty explain it."
     return (Picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
@@ -110,23 +109,24 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:
-    """One line per domain: rms after every stage over that of the first, since units differ."""
+    """One line per domain: χ² per degree of freedom after every stage, since units differ."""
     names = tuple(stage.stage.replace("-", " ") for stage in diagnosis.stages)
-    marks: list[Mark] = []
-    least = 1.0
+    marks: list[Mark] = [Level(y=1.0, name="noise and uncertainty alone", is_dashed=True)]
     for (domain, words), colour in zip(WORDS.items(), SLOPES, strict=True):
         found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
-        found = [(k, d) for k, d in found if d.unit in SHOWN and d.rms > 0.0]
+        found = [(k, d) for k, d in found if d.chi2_per_dof]
         if len(found) < FEWEST_OCTAVES:
             continue
-        factor, unit = SHOWN[found[0][1].unit]
+        factor, unit = shown(found[0][1].unit)
         x = np.array([k for k, _ in found], dtype=np.float64)
-        y = 100.0 * np.array([d.rms for _, d in found]) / found[0][1].rms
-        tips = [f"{words}, {names[k - 1]}: {plain_number(factor * d.rms)} {unit} rms" for k, d in found]
+        y = np.array([d.chi2_per_dof for _, d in found], dtype=np.float64)
+        tips = [
+            f"{words}, {names[k - 1]}: χ²/dof {plain_number(v)}, {plain_number(factor * d.rms)} {unit} rms"
+            for (k, d), v in zip(found, y, strict=True)
+        ]
         marks += [Line(x, y, "", colour), Points(x, y, tips, None, words, colour)]
-        least = min(least, float(y.min()))
     along = Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names)
-    up = Scale("rms left [% of the first stage]", "%", is_log=True, limits=(0.6 * least, 160.0))
+    up = Scale("χ² per degree of freedom", is_log=True, includes=(1.0,))
     return Chart((Panel(along, up, tuple(marks), height_px=260),))
 
 

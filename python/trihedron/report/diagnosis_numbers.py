@@ -203,7 +203,7 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
     same = [stage.stage for stage in diagnosis.stages if stage.stage not in kept]
-    caption = "Cross-validated rms after each stage"
+    caption = "Cross-validated rms after each stage, with χ²/dof (1 by noise and uncertainty alone) in brackets"
     caption += f"; no change by {' and '.join(same)}" if same else ""
     unchanged = [size.get(d, d) for d in units if d not in changed]
     caption += f"; {' and '.join(unchanged)}: no change in any stage" if unchanged else ""
@@ -211,7 +211,11 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
 
 
 def _stage(stage: Stage, domain: str) -> str:
-    return next((plain_number(shown(d.unit)[0] * d.rms) for d in stage.domains if d.domain == domain), "–")
+    for d in stage.domains:
+        if d.domain == domain:
+            rms = plain_number(shown(d.unit)[0] * d.rms)
+            return rms if d.chi2_per_dof is None else f"{rms} ({plain_number(d.chi2_per_dof)})"
+    return "–"
 
 
 def named(p: ParameterDifference) -> str:
@@ -245,7 +249,7 @@ def _value(p: ParameterDifference, value: float) -> str:
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
     """Factor from SI and customary unit for a parameter of this kind."""
     if p.id not in _WORDS:
-        return 1.0, "" if p.unit == "1" else unit_in_print(p.unit)
+        return (1.0, "") if p.unit == "1" else shown(p.unit)
     return (1.0, "") if p.unit == "1" and not is_difference else shown(p.unit)
 
 

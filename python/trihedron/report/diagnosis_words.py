@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from shlex import quote
+
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
@@ -102,7 +104,7 @@ def _disagree(subjects: list[str]) -> str:
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
     """The next step; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
-        store = "Nothing is missing: store S and b with trihedron calibrate LOG -o FILE, and use them."
+        store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
         return _dependent(diagnosis) or store
     if diagnosis.verdict == "not-testable":
         return ""
@@ -113,7 +115,11 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     steps = []
     if diagnosis.parameters:
         said = "the parameters that differ" if any(p.significant for p in diagnosis.parameters) else "the effects"
-        steps.append(f"Compare again: --against {improved}." if improved else f"Take over {said}: {_taken_by(model)}.")
+        steps.append(
+            f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`."
+            if improved
+            else f"Take over {said}: {_taken_by(model)}."
+        )
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
         others = listed(list(rivals.confounded_with))
@@ -122,16 +128,17 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         )
     if steps:
         return " ".join(steps)
-    return "Store the effects with the calibration, for trihedron apply: trihedron calibrate LOG --extended -o FILE."
+    return "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
 
 
 def _taken_by(model: str) -> str:
     """The option that rewrites the model, or advice for a simulated log, whose source is unknown."""
     if model.endswith(".toml"):
-        return "--improved FILE.toml writes your scenario with them"
+        return "`... --improved improved.toml` writes your scenario with them"
     if model.endswith(".json"):
-        return "--updated FILE writes the calibration of this log"
-    return "set them in your simulation (a scenario, --against SCENARIO.toml, is rewritten by --improved FILE.toml)"
+        return "`... --updated updated.json` writes the calibration of this log"
+    said = "set them in your simulation; a scenario is rewritten by "
+    return said + "`trihedron diagnose LOG --against SCENARIO.toml --improved improved.toml`"
 
 
 def level_of(diagnosis: Diagnosis) -> Level:

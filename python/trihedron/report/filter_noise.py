@@ -23,7 +23,7 @@ OF_SENSOR = {
     "gyroscope": (degrees_from_radians(1.0), "°", "attitude error"),
     "accelerometer": (1.0, "m/s", "velocity error"),
 }
-NEXT = "Put these values into your filter: --to kalibr -o imu.yaml (other targets: --help)."
+NEXT = "Put these values into your filter: `... --to kalibr -o imu.yaml` (other targets: `trihedron noise --help`)."
 CAUSE_WORDS = {
     "rest": ("static noise", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
@@ -34,6 +34,9 @@ CAUSE_WORDS = {
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
 """Words for every cause, and measures that lower its share."""
+
+
+TERMS = {"N": "white noise N", "K": "bias random walk K"}
 
 
 def filter_noise_report(found: FilterNoise) -> Document:
@@ -84,7 +87,7 @@ def _headlines(one: SensorFilterNoise) -> list[Headline]:
     for name, per, value, static in _terms(one):
         beside = "95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"
         beside += "" if static is None else f"; static {_number(static)}"
-        out.append(Headline(f"{one.sensor} {name}", _number(value), f"{unit_in_print(one.unit)}{per}", beside))
+        out.append(Headline(f"{one.sensor}, {TERMS[name]}", _number(value), f"{unit_in_print(one.unit)}{per}", beside))
     return out
 
 

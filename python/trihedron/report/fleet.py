@@ -19,6 +19,7 @@ from trihedron.report.sessions import change_in_words, repeated_cells
 
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
+BY_FILE = "`... --serial '([^/]+)$'`: one unit a file"
 VERDICTS = {
     "consistent": "the linear model explains everything",
     "missing-physics": "physics beyond the linear model",
@@ -76,7 +77,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     if strays:
         verdict += f" {_named(strays)} outside the others."
     if moved:
-        verdict += f" {_named(moved)} changed between sessions."
+        verdict += f" {_named(moved)} changed between sessions, or the logs are of several units."
     return Document(
         title="Fleet",
         subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
@@ -100,13 +101,11 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     usable = [log for log in summary.logs if _is_usable(log)]
     again = [log.name for log in summary.logs if not _is_usable(log)]
     opened = [log.name for log in usable if log.verdict in OPEN]
-    steps = [f"mend or record again {_first(again)} (trihedron check LOG says what was wrong)"] if again else []
-    steps += [f"read what the model leaves out of {_first(opened)} (trihedron diagnose LOG)"] if opened else []
-    steps += ["look at the devices that stand out"] if strays else []
-    doubt = ", or state the devices (--serial) where their logs are of several"
-    steps += [f"calibrate those that changed anew before use{doubt}"] if moved else []
-    if usable:
-        steps.append("use each device's own calibration (a file of calibrations/): trihedron apply FILE LOG")
+    steps = [f"state the units if {_first(moved)} holds several ({BY_FILE})"] if moved else []
+    steps += [f"record again {_first(again)}"] if again else []
+    steps += [f"diagnose {_first(opened)}"] if opened else []
+    steps += [f"look at {_first(strays)}"] if strays else []
+    steps += ["use each device's own calibration (folder calibrations)"] if usable else []
     return capital("; ".join(steps)) + "." if steps else ""
 
 
@@ -233,10 +232,11 @@ def _drift(summary: FleetSummary) -> list[Block]:
     for change in moved:
         how, sizes, unit = change_in_words(change)
         k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
-        size = f"{sizes[k]} {unit} in {change.names[k]}"
+        size = f"{sizes[k]} {unit} in {axis_in_print(change.names[k])}"
         rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
     head = ("device", "parameter", "how", "by", "p")
-    return [Paragraph(f"Tested: {tested}"), Table(head, tuple(rows), "Changes between sessions")]
+    whole = f"Tested: {tested} A folder is taken for one device unless --serial names it ({BY_FILE})."
+    return [Paragraph(whole), Table(head, tuple(rows), "Changes between sessions")]
 
 
 def _logs(summary: FleetSummary) -> Table:

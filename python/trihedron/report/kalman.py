@@ -32,8 +32,8 @@ from trihedron.units import mm_s2_from_m_s2
 
 CLOSE = 0.01
 """Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
-_INNOVATIONS = """Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of \
-such means lie when the noise model is right."""
+_INNOVATIONS = """Normalised innovations squared (NIS), innovation² / predicted variance: every pose that is judged, \
+their running mean, and where 99 % of such means lie when the noise model is right."""
 _CORRECTED = "Corrected minus reference specific force of every pose."
 
 
@@ -62,7 +62,9 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections=tuple(sections),
         headlines=tuple(_headlines(outcome)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
-        next_step="Test the calibration on another recording: trihedron verify." if calibration.is_trustworthy else "",
+        next_step="Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
+        if calibration.is_trustworthy
+        else "",
     )
 
 
@@ -70,12 +72,13 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     """Normalised innovations, and the residual of the poses."""
     seen = _consistencies(outcome)
     name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
-    beside = f"{_meaning(worst)}; 99 % limits {_limits(worst)}, {worst.n} of {n} poses"
+    beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of cases): "
+    beside += _meaning(worst)
     of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
     return [
-        Headline(f"mean NIS{of}", plain_number(worst.nis_mean), "", beside),
+        Headline(f"innovation² / predicted variance (NIS){of}", plain_number(worst.nis_mean), "", beside),
         Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, in sample"),
     ]
 
@@ -93,7 +96,7 @@ def _meaning(seen: Consistency) -> str:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:
         return "the noise given is too small, the uncertainties too narrow"
-    return "as predicted (1)"
+    return "as predicted"
 
 
 def _limits(seen: Consistency) -> str:

@@ -21,9 +21,10 @@ _NO_UNIT = (
     "The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
-NEXT = "Take N, B, K into a filter (trihedron export --noise); average for no longer than the best averaging time."
-SAY_COUNTS = """State the size of a count, for terms in SI: --gyro-lsb "X deg/s" and --accel-lsb "Y mg", X and Y from \
-the data sheet of this part at its range, or --calibration FILE."""
+NEXT = """Take N, B, K into a filter: `trihedron export CALIBRATION --to kalibr --noise NOISE.json -o imu.yaml`, with \
+NOISE.json of `... --json NOISE.json`; average for no longer than the best averaging time."""
+SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb "X deg/s" --accel-lsb "Y mg"`, X and Y \
+from the data sheet of this part at its range, or --calibration FILE."""
 MOST_ROWS = 12
 """Rows of a curve's table, about; averaging times between them are omitted."""
 

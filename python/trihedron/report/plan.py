@@ -42,7 +42,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         is_trustworthy=True,
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
-        next_step="Record them: trihedron capture PORT -o LOG --guide leads through the poses.",
+        next_step="Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses.",
         sections=(
             Section(
                 "Poses",

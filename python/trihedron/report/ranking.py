@@ -55,7 +55,9 @@ def ranking_report(ranking: Ranking) -> Document:
         sections=tuple(sections),
         headlines=headlines_of(best.verification),
         lead=Picture("order", caption, partial(_ranking_chart, ranking)),
-        next_step=AGAIN if best.is_rejected else f"Use {best.name}: trihedron apply, trihedron export.",
+        next_step=AGAIN
+        if best.is_rejected
+        else f"Use {best.name}: `trihedron apply FILE LOG`, `trihedron export FILE --to c`.",
     )
 
 

@@ -74,8 +74,8 @@ def reference_headlines(found: AgainstReference) -> list[Headline]:
     out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
     if found.replay:
         *others, last = found.replay
-        beside = f"by the gyro alone, {last.stage}, cross-validated"
-        beside += "".join(f"; {plain_number(degrees_from_radians(r.error_rad))}° {r.stage}" for r in others)
+        beside = f"gyro alone, calibrated {last.stage}, cross-validated"
+        beside += "".join(f"; {r.stage}: {plain_number(degrees_from_radians(r.error_rad))}°" for r in others)
         angle = plain_number(degrees_from_radians(last.error_rad))
         out.append(Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
     return out

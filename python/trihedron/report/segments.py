@@ -6,14 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ
-from trihedron.records import Recording, Segments, Severity, Truth
+from trihedron.arrays import AXES, XYZ, FloatArray
+from trihedron.records import Pose, Recording, Segments, Severity, Truth
 from trihedron.report.channels import logged_sensors
-from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
+
+SHAKEN = "moved or vibrated"
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
@@ -39,7 +41,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
         lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
         if recording is None
         else signals_picture(recording, segments),
-        next_step="Are poses missing, or moves among them? If not: trihedron calibrate LOG.",
+        next_step="Are poses missing, or moves among them? If not: `trihedron calibrate LOG -o calibration.json`.",
     )
 
 
@@ -91,6 +93,7 @@ def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the poses shaded."""
     caption = "The recording; shaded where the sensor stood still"
+    caption += ", darker where it moved or vibrated throughout a pose" if any(map(_is_shaken, segments.poses)) else ""
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture("signals", caption, partial(signals_chart, recording, segments))
 
@@ -98,9 +101,31 @@ def signals_picture(recording: Recording, segments: Segments) -> Picture:
 def signals_chart(recording: Recording, segments: Segments | None = None) -> Chart:
     """Both sensors over time; with segments, poses are shaded and disturbances marked."""
     poses = () if segments is None else segments.poses
-    spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses]
+    spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses if not pose.is_unsteady]
+    spans += [_span(recording, pose.start, pose.stop - 1, SHAKEN, "soft") for pose in poses if pose.is_unsteady]
     bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
     return _signals(recording, (*spans, *bumps))
+
+
+def _is_shaken(pose: Pose) -> bool:
+    return pose.is_unsteady
+
+
+def state_of(pose: Pose) -> str:
+    """What disturbed a pose, in words; empty for a static one."""
+    return SHAKEN if pose.is_unsteady else "disturbed" if pose.disturbed else ""
+
+
+def pose_lines(segments: Segments | None, at: FloatArray | None = None) -> tuple[Level, ...]:
+    """Upright lines ``at`` (n,) the poses that were not static throughout, by default at their numbers."""
+    if segments is None:
+        return ()
+    places = np.arange(1.0, segments.n_poses + 1.0) if at is None else at
+    return tuple(
+        Level(x=float(x), name=state, colour="soft" if state == SHAKEN else "warn", is_dashed=True)
+        for x, pose in zip(places, segments.poses, strict=True)
+        if (state := state_of(pose))
+    )
 
 
 def _span(recording: Recording, first: int, last: int, name: str = "pose", colour: Colour = "shade") -> Span:

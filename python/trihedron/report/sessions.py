@@ -28,7 +28,7 @@ DRIFTING = {
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 BARS = "bars: 1 σ, the bias drift within a recording included"
-NEXT = "Use the common parameters (-o FILE writes them): their uncertainty is that of the next recording."
+NEXT = "Use the common parameters (`... -o common.json` writes them): their uncertainty is that of the next recording."
 
 
 def sessions_report(model: SessionsModel) -> Document:

@@ -72,7 +72,9 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
 
 def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
     if own:
-        return "Store it with the calibration of one recording: trihedron calibrate LOG --extended -o FILE."
+        return (
+            "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."
+        )
     if any(found.of_single_recordings):
         return "What single recordings name belongs to their sessions: diagnose each by itself."
     return "Nothing is to be added: calibrate the recordings together."

@@ -18,6 +18,7 @@ WIDTH = 100
 NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
+_COMMAND = re.compile(r"`[^`]+`[.,;:)]?")
 _TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
 """Fewest columns for names of rows, and for heads."""
@@ -99,6 +100,9 @@ def _finding_lines(finding: Finding, style: Style) -> list[str]:
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
+    # A command that fits in a line is not broken, so that it can be copied.
+    room = width - max(len(first), len(rest)) - 1
+    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= room else found[0], text)
     lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )

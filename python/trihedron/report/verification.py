@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records import FindingCode, Recording, Segments, Verification
+from trihedron.report.axes import axis_in_print
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -16,13 +17,13 @@ from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
 from trihedron.report.segments import signals_picture
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 _ABOVE_NOISE = {
     FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
     FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
 }
-USE = "Use the calibration: trihedron apply, trihedron export."
+USE = "Use the calibration: `trihedron apply FILE LOG`, `trihedron export FILE --to c`."
 ALLOWED = "3 σ of noise and calibration uncertainty"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
@@ -121,13 +122,13 @@ def parameters_table(v: Verification) -> Table:
     """Every parameter: file minus log, both uncertainties, and whether the log determines it."""
     rows = []
     for one in v.parameters:
-        scale, unit = (mrad_from_radians(1.0), "mrad") if one.unit == "rad" else shown(one.unit)
+        scale, unit = shown(one.unit)
         sigma = plain_number(scale * one.sigma_log, 2) if np.isfinite(one.sigma_log) else "unknown"
         stated = plain_number(scale * one.sigma_file, 2) if one.sigma_file > 0.0 else "not stated"
         differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
         times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
         judged = times if one.is_judged else "not judged by this log"
-        rows.append((f"{one.id} {one.name}", unit, differs, sigma, stated, judged))
+        rows.append((f"{one.id} {axis_in_print(one.name)}", unit, differs, sigma, stated, judged))
     head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
     return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
 

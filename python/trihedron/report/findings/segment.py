@@ -14,13 +14,13 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.POSE_DISTURBED, "", NOTE): Words(
-        "{disturbances:# disturbance} inside {poses:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
-        "first at {first_s:.1f} s, excluded from the means.",
+        "{disturbances:# short disturbance} in {poses:# otherwise static pose} (pose {which:first 8}), "
+        "{left_out_s:.1f} s in all, the first at {first_s:.1f} s, excluded from the means.",
         "The table or the cable was touched, or samples are missing there.",
         "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
     (Code.POSE_UNSTEADY, "", WARNING): Words(
-        "The sensor moved or vibrated in {poses:# pose}: {which:first 8} (first at {first_s:.1f} s).",
+        "The sensor moved or vibrated throughout {poses:# pose}: {which:first 8} (first at {first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
         "Put the case on a firm support for a better result; the means of these poses count less.",
     ),

@@ -1,0 +1,89 @@
+"""Commands of a report's next step with the arguments of this run, so that they can be copied."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from contextvars import ContextVar
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from trihedron.cli.provenance import typed
+
+if TYPE_CHECKING:
+    from trihedron.report import Document
+
+_COMMAND = re.compile(r"`[^`]+`")
+_NOT_AGAIN = ("--json", "--report", "--full", "--force", "-o", "--output")
+_WITHOUT_VALUE = ("--full", "--force")
+_WITH_PLACE = ("calibrate", "diagnose", "noise")
+"""Commands that take the place of the recording; the others take gravity from the calibration."""
+UNSTORED = "calibration.json"
+_log: ContextVar[str] = ContextVar("log", default="LOG")
+_place: ContextVar[str] = ContextVar("place", default="")
+_file: ContextVar[str] = ContextVar("file", default="")
+
+
+def begin_next_step() -> None:
+    """Forget the arguments of an earlier run."""
+    _log.set("LOG")
+    _place.set("")
+    _file.set("")
+
+
+def note_log(source: Any) -> None:
+    """Store the first log that was read, with the options that say how to read it."""
+    if _log.get() == "LOG":
+        _log.set(shlex.join(_words(source)))
+
+
+def note_place(source: Any) -> None:
+    """Store the place of the recording as typed."""
+    _place.set(shlex.join(_words(source)))
+
+
+def note_file(path: Path | None) -> None:
+    """Store the calibration file that the next step uses."""
+    _file.set("" if path is None else shlex.quote(str(path)))
+
+
+def _words(source: Any) -> list[str]:
+    """The fields of a group of options as arguments; the log, which has no flag, first."""
+    given = {f.name: getattr(source, f.name) for f in fields(source)}
+    first = [str(given.pop("log"))] if given.get("log") is not None else []
+    flags = [(f"--{name.replace('_', '-')}", _word(value)) for name, value in given.items() if value is not None]
+    return [*first, *(word for pair in flags for word in pair)]
+
+
+def _word(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def with_arguments(document: Document) -> Document:
+    """The document with LOG, FILE and ``...`` (the same command) in its next step replaced by those of this run."""
+    said = document.next_step
+    commands = " ".join(_COMMAND.findall(said))
+    if re.search(r"\bFILE\b", commands) and not _file.get():
+        said = f"Store it (`... -o {UNSTORED}`). {said}"
+    filled = _COMMAND.sub(lambda found: _filled(found[0]), said)
+    return document if filled == document.next_step else replace(document, next_step=filled)
+
+
+def _filled(command: str) -> str:
+    verb = command.strip("`").split(" ")[1]
+    log = f"{_log.get()} {_place.get()}".rstrip() if verb in _WITH_PLACE else _log.get()
+    words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": again(typed.get())}
+    return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
+
+
+def again(given: Sequence[str]) -> str:
+    """The command as typed, without its outputs."""
+    words, skip = [], False
+    for word in given:
+        name = word.partition("=")[0]
+        if not skip and name not in _NOT_AGAIN:
+            words.append(word)
+        skip = not skip and name in _NOT_AGAIN and name not in _WITHOUT_VALUE and "=" not in word
+    return shlex.join(["trihedron", *words]) if words else ""

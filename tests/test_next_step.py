@@ -1,0 +1,88 @@
+"""The next step of a report is a command that can be copied, and figures in sample do not lead."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from small_session import made_once
+from trihedron.cli.next_step import again, begin_next_step, note_file, note_log, note_place, with_arguments
+from trihedron.cli.options import GravitySource, LogSource
+from trihedron.cli.provenance import begin
+from trihedron.files.calibration import read_calibration
+from trihedron.report import Document, to_text
+from trihedron.report.calibration import calibration_report
+
+
+@pytest.fixture(autouse=True)
+def run():
+    """A run on a log whose name has a space, at a stated rate and latitude."""
+    begin(("calibrate", "my log.csv", "--rate", "50", "--report", "page.html", "--full", "--latitude", "59.9"))
+    begin_next_step()
+    note_log(LogSource(log=Path("my log.csv"), rate=50.0))
+    note_place(GravitySource(latitude=59.9))
+    yield
+    begin(())
+    begin_next_step()
+
+
+def filled(step):
+    return with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
+
+
+def test_a_command_of_the_next_step_names_the_log_its_rate_and_the_calibration():
+    note_file(Path("cal.json"))
+    said = filled("Test it: `trihedron verify FILE OTHER_LOG`; use it: `trihedron apply FILE LOG`.")
+    assert said == (
+        "Test it: `trihedron verify cal.json OTHER_LOG`; use it: `trihedron apply cal.json 'my log.csv' --rate 50`."
+    )
+
+
+def test_the_place_goes_to_commands_that_take_it():
+    said = filled("`trihedron diagnose LOG`, `trihedron segment LOG`")
+    assert (
+        said
+        == "`trihedron diagnose 'my log.csv' --rate 50 --latitude 59.9`, `trihedron segment 'my log.csv' --rate 50`"
+    )
+
+
+def test_a_calibration_that_was_not_written_is_stored_first():
+    said = filled("Use it: `trihedron apply FILE LOG`.")
+    assert said.startswith(
+        "Store it (`trihedron calibrate 'my log.csv' --rate 50 --latitude 59.9 -o calibration.json`)."
+    )
+    assert "`trihedron apply calibration.json 'my log.csv' --rate 50`" in said
+
+
+def test_words_outside_commands_stay_and_a_second_filling_changes_nothing():
+    step = "Record a LOG again ..."
+    assert filled(step) == step
+    once = filled("`... --to kalibr`")
+    assert once == "`trihedron calibrate 'my log.csv' --rate 50 --latitude 59.9 --to kalibr`"
+    assert filled(once) == once
+
+
+def test_outputs_are_not_repeated():
+    assert again(("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")) == (
+        "trihedron noise a.csv --rate=9"
+    )
+
+
+def test_a_command_is_not_broken_where_it_fits_a_line():
+    step = "Words before it that fill most of the first line of this terminal: `trihedron apply cal.json log.csv`."
+    lines = to_text(Document("A title", "", "OK.", True, next_step=step), width=80).splitlines()
+    assert any("`trihedron apply cal.json log.csv`." in line for line in lines)
+
+
+def test_an_error_in_sample_stands_below_what_is_uncertain():
+    calibrated = read_calibration(made_once() / "c.json")
+
+    def order(calibration):
+        return [one.what for one in calibration_report(calibration).headlines]
+
+    accelerometer = calibrated.accelerometer
+    unseen = replace(accelerometer.quality, held_out=None, held_out_sigma=None, held_out_rms=None)
+    assert order(calibrated)[0] == "gravity error in static poses"
+    bare = replace(calibrated, accelerometer=replace(accelerometer, quality=unseen))
+    assert order(bare)[-1] == "gravity error in static poses"
+    assert "in sample only" in calibration_report(bare).headlines[-1].beside
