@@ -5,6 +5,8 @@ The segmentation of the whole log decides later which poses count; this one only
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from trihedron.arrays import FloatArray
@@ -97,7 +99,7 @@ class Orientation:
             return False
         a, b = self._mean[:3], stillness.mean[:3]
         cosine = float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
-        return cosine < np.cos(np.radians(MOVED_DEG))
+        return cosine < math.cos(math.radians(MOVED_DEG))
 
     def add(self, stillness: Stillness) -> None:
         """Add the time that has passed since the last call."""
