@@ -46,7 +46,7 @@ def judged(answer, said, crash, seconds):
     out = {"flaw": flaw, "seed": answer["seed"], "rate": answer["rate_hz"], "poses": answer["n_poses"],
            "nuisances": answer["nuisances"], "seconds": seconds, "crash": crash, "verdict": "", "ids": []}  # fmt: skip
     if said is None:
-        return out | {"score": "refused" if crash.startswith("ValueError") else "crash"}
+        return out | {"score": "rejected" if crash.startswith("ValueError") else "crash"}
     effects = said["effects"]
     ids = [e["id"] for e in effects]
     out |= {"verdict": said["verdict"], "ids": ids, "z": coverage(answer, said["calibration"]["extended"]),

@@ -39,7 +39,7 @@ def logs(folder: Path) -> list[str]:
         path.parent.mkdir()
         write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0], path)
         made.append(str(path))
-    main(["simulate", "rest-hour", "--seed", "2", "-o", str(folder / "rest.npz")])
+    main(["simulate", "static-hour", "--seed", "2", "-o", str(folder / "static.npz")])
     return made
 
 
@@ -79,7 +79,7 @@ def pages(folder: Path) -> dict[str, Path]:
         "calibrate": ["calibrate", first, *GRAVITY],
         "many-recordings": ["calibrate", first, *others, *GRAVITY],
         "plan": ["plan"],
-        "allan": [*ALLAN, str(folder / "rest.npz"), "--json", str(folder / "allan.json")],
+        "allan": [*ALLAN, str(folder / "static.npz"), "--json", str(folder / "allan.json")],
         "kalman": ["kalman", first, *GRAVITY],
     }
     found = {"diagnose": folder / "demo" / "disagreement.html", "verify": folder / "demo" / "verification.html"}

@@ -49,7 +49,7 @@ KINDS = {
 }
 
 
-def one_or_refused(trial):
+def one_or_rejected(trial):
     try:
         return one(trial)
     except RefusedError:
@@ -154,7 +154,7 @@ def main():
         return
     for kind in given.kinds.split(","):
         start = time.process_time()
-        runs = [one_or_refused(KINDS[kind](given.seed + k)) for k in range(given.each)]
+        runs = [one_or_rejected(KINDS[kind](given.seed + k)) for k in range(given.each)]
         summarise(kind, [r for r in runs if r is not None], runs.count(None), time.process_time() - start)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 DOCS = Path(__file__).parents[1] / "docs"
-# What stands behind the language of a fence is shown to the reader as text by the site's Markdown: hence a comment.
+# What follows the language of a fence is shown to the reader as text by the site's Markdown: hence a comment.
 _BLOCK = re.compile(r"^(?:<!-- ([^\n]*) -->\n)?```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

@@ -18,7 +18,7 @@ from trihedron.simulate.scenario import Scenario
 class FollowingHand:
     """Moves the instrument of ``scenario`` (its own motion is not used).
 
-    ``miss_deg`` is how far, rms, a pose lies from the one that was asked for; moves take 1.4 to 3 s with wobble, a new
+    ``miss_deg`` is how far, rms, a pose lies from the one that was requested; moves take 1.4 to 3 s with wobble, a new
     heading and some travel. The noise of what was already recorded stays when the session grows.
     """
 

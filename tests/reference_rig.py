@@ -1,4 +1,4 @@
-"""A rig that moves a unit and knows how: an independent generator for references, in plain finite differences.
+"""A rig that moves a unit and records how: an independent generator for references, in plain finite differences.
 
 Nothing of the package but its records is used: attitudes are products of elementary turns at 1 kHz, rates their finite
 differences, readings an instrument of its own. Angles in rad, times in s.
@@ -36,7 +36,7 @@ def rates_of(C):
 
 
 def hand(rng, seconds, rest_s=2.0):
-    """A hand that turns all ways: sums of slow sines on three Euler angles, beginning and ending at rest."""
+    """A hand that turns all ways: sums of slow sines on three Euler angles, static at beginning and end."""
     t = np.arange(0, seconds, 1 / FINE_HZ)
     gate = np.clip(np.minimum(t - rest_s, seconds - rest_s - t) / 2.0, 0, 1)
     gate = gate**2 * (3 - 2 * gate)
@@ -88,7 +88,7 @@ def read_gyro(rng, u, rate, force, step):
     if u.g_sensitivity is not None:
         out = out + (f @ u.g_sensitivity.T) @ u.M.T
     out = out + u.gyro_noise * np.degrees(1) * 0.5 * rng.normal(size=out.shape)
-    # A zero that wanders a little: a walk of 0.03 °/s in a minute, about its mean over the session.
+    # A bias that drifts a little: a walk of 0.03 °/s in a minute, about its mean over the session.
     walk = (
         np.linalg.norm(u.M, axis=1)
         * np.radians(0.03)
@@ -129,7 +129,7 @@ def jittered(C, rng, sigma_rad):
 
 @dataclass
 class Trial:
-    """A log, its reference, and the truth: unit, lead of the clock at the log's zero [s], its rate [ppm], arm [m], and
+    """A log, its reference, and the truth: unit, lead of the clock at the log's start [s], its rate [ppm], arm [m], and
     the walk (n, 3) of the gyro's bias about its mean [rad/s] where it is known."""
 
     log: Recording

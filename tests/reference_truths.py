@@ -1,4 +1,4 @@
-"""Bodies that walk, fly and are carried by a robot, beside truths that wander: a generator of its own for references.
+"""Bodies that walk, fly and are carried by a robot, beside truths that drift: a generator of its own for references.
 
 Nothing of the package but its records is used. The truth's slow error is white noise behind two equal poles, in the
 world or in the body, as trackers filter it; readings are means over a sample. Angles in rad, times in s.
@@ -12,7 +12,7 @@ from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
 STEP = 10
-"""Samples of the rig in one of the log, unless asked for otherwise, and in one row of the truth: 100 Hz each."""
+"""Samples of the rig in one of the log, unless requested otherwise, and in one row of the truth: 100 Hz each."""
 G_SENSITIVITY = np.radians(0.1) / 9.81
 """The size in data sheets, (rad/s)/(m/s²)."""
 

@@ -42,7 +42,7 @@ matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 
 
 def made_once() -> Path:
-    """Folder with log.csv, log.npy, rest.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
+    """Folder with log.csv, log.npy, static.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
     return once("session", _made)
 
 
@@ -55,11 +55,11 @@ def _made(folder: Path) -> None:
     np.save(folder / "log.npy", rows)
     rng = np.random.default_rng(5)
     rest = np.column_stack([np.arange(3000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (3000, 6))])
-    (folder / "rest.csv").write_text(names + "\n".join(",".join(f"{v:.8g}" for v in row) for row in rest) + "\n")
+    (folder / "static.csv").write_text(names + "\n".join(",".join(f"{v:.8g}" for v in row) for row in rest) + "\n")
     (folder / "s.toml").write_text(SCENARIO)
     log, known = str(folder / "log.csv"), folder / "c.json"
     quietly("calibrate", log, "--gravity", G, "-o", str(known))
-    quietly("allan", str(folder / "rest.csv"), "--json", str(folder / "noise.json"))
+    quietly("allan", str(folder / "static.csv"), "--json", str(folder / "noise.json"))
     quietly("diagnose", log, "--gravity", G, "--json", str(folder / "diagnosis.json"))
     document = json.loads(known.read_text())
     finding = {"code": "not-observable", "severity": "serious", "seen": "Scale 3 is not determined."}
@@ -69,7 +69,7 @@ def _made(folder: Path) -> None:
 
 
 def made_elsewhere() -> Path:
-    """The same, made by a process of its own: this one has then read no table and can be forked."""
+    """The same, made by a process of its own: this one has then read no table and can fork."""
     if not place("session").exists():
         code = "from small_session import made_once; made_once()"
         path = os.pathsep.join([str(Path(__file__).parent), *(p for p in sys.path if p)])

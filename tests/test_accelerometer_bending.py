@@ -1,4 +1,4 @@
-"""Poses that miss |g| beyond their noise: uncertainties hold whether their biases scatter or an axis bends."""
+"""Poses that miss |g| beyond their noise: uncertainties hold whether their biases differ or an axis bends."""
 
 import numpy as np
 import pytest
@@ -31,18 +31,18 @@ def errors(rng, n, name):
 def test_bars_hold_for_scatter_and_for_bending(name, n):
     rng, n_trials = np.random.default_rng([31, n]), 60
     before, after = (np.array(x) for x in zip(*(errors(rng, n, name) for _ in range(n_trials)), strict=True))
-    # Nine numbers of one session go together: a session counts once, by the share of its nine.
+    # Nine parameters of one session go together: a session counts once, by the share of its nine.
     covered = float(np.mean(np.abs(after) < 1.96))
     assert covered > binom.ppf(1e-3, n_trials, 0.95) / n_trials
     if name is not None:
         assert float(np.mean(np.abs(before) < 1.96)) < 0.75
     if n == 36 and name is None:
-        # Many poses tell one from the other: uncertainties under scatter stay within half again of what they were.
+        # Many poses separate one from the other: uncertainties under scatter stay within half again of what they were.
         assert float(np.median(np.abs(after) / np.abs(before))) > 2.0 / 3.0
 
 
 def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
-    # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them. The scale was then known to 78 %.
+    # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them. The scale was then uncertain by 78 %.
     pairs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
     up = np.array([np.insert([a, b], k, 0.0) for k in range(3) for a, b in pairs]) / np.sqrt(2.0)
     residual = np.random.default_rng(3).normal(size=12) * 4e-4

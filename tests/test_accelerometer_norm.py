@@ -1,4 +1,4 @@
-"""Method 2: truth comes back inside its uncertainties, and what the poses do not tell is not claimed."""
+"""Method 2: truth comes back inside its uncertainties, and what the poses do not show is not claimed."""
 
 import doctest
 import importlib
@@ -36,11 +36,11 @@ def codes(findings):
 def test_six_faces_are_refused_and_the_missing_poses_named():
     up = np.vstack([np.eye(3), -np.eye(3)])
     sensor, findings = calibrate_norm(readings(up, 1), SIGMA, G)
-    refusal = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
-    assert refusal.severity is Severity.SERIOUS
-    assert "6 of the 9" in refusal.seen
-    assert refusal.action.count(" up") >= 3
-    assert "--method faces" in refusal.action
+    rejection = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
+    assert rejection.severity is Severity.SERIOUS
+    assert "6 of the 9" in rejection.seen
+    assert rejection.action.count(" up") >= 3
+    assert "--method faces" in rejection.action
     few = calibrate_norm(readings(np.vstack([up, [[0.6, 0.8, 0.0]]]), 1), SIGMA, G)[1]
     assert all("--method faces" not in finding.action for finding in few)
     assert sensor.observability.rank == 6
@@ -56,7 +56,7 @@ def test_the_manuals_left_handed_triad_is_recovered_and_reported():
     means = distort(G * cube_poses(), S, b) + sigma * np.random.default_rng(9).standard_normal((18, 3))
     sensor, findings = calibrate_norm(means, sigma, G, axis_signs=(-1, 1, 1))
     free = np.tri(3, dtype=bool)
-    # Nine numbers within 3.5 standard errors: exceeded once in 250 seeds.
+    # Nine parameters within 3.5 standard errors: exceeded once in 250 seeds.
     assert np.all(np.abs(sensor.S - S)[free] < 3.5 * sensor.sigma_S[free])
     assert np.all(np.abs(sensor.b - b) < 3.5 * sensor.sigma_b)
     assert FindingCode.LEFT_HANDED in codes(findings)
@@ -160,7 +160,7 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
     settings, noise = _core.NormSettings(9.81, loss=loss, loss_scale=1.5), 9e-4 * np.eye(3)[None]
     near = _core.fit_norm(raw, noise, settings)
     careful = _core.fit_norm(raw, noise, settings, (true, np.zeros(3)))
-    # The step that ends the way is 1e-7 long, and what is left behind it a hundredth of it.
+    # The step that ends the way is 1e-7 long, and the remainder behind it a hundredth of it.
     np.testing.assert_allclose(near.S, careful.S, atol=2e-9)
     np.testing.assert_allclose(near.b, careful.b, atol=2e-8)
     np.testing.assert_allclose(near.sigmas, careful.sigmas, rtol=1e-6)

@@ -16,7 +16,7 @@ G = 9.81
 
 
 def linear_fit(up, bent, sigma):
-    """(residual, parameters) of the nine numbers that |f| of a pose is linear in, by plain least squares."""
+    """(residual, parameters) of the nine parameters that |f| of a pose is linear in, by plain least squares."""
     pairs = [(j, k) for j in range(3) for k in range(j + 1)]
     design = G * np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)])
     found, *_ = np.linalg.lstsq(design / sigma[:, None], bent / sigma, rcond=None)

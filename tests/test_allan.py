@@ -1,4 +1,4 @@
-"""Allan curves: published values, slow twins, an independent tool, precision, gaps, streams."""
+"""Allan curves: published values, slow counterparts, an independent tool, precision, gaps, streams."""
 
 import allantools
 import numpy as np
@@ -78,7 +78,7 @@ def test_missing_readings_are_weighted_as_defined():
     x = rng.normal(size=400).cumsum()
     x[rng.random(400) < 0.1] = np.nan
     x[200:260] = np.nan
-    # The kernel weighs; what means of a few readings scatter is taken off afterwards (the next two tests).
+    # The kernel weighs; the scatter of means of a few readings is subtracted afterwards (the next two tests).
     column = x[:, np.newaxis]
     for m in (1, 5, 40, 120):
         weighted = _core.allan_variance(column, [m], _core.AllanKind.Overlapping)[0]

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 import trihedron
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
+from trihedron.report.in_python import in_python
 from trihedron.simulate import hand_session, scenario_by_name
 
 
@@ -178,3 +179,27 @@ def test_a_sensor_shows_its_numbers_and_its_bias_is_what_the_reading_is_too_much
     one = trihedron.SensorCalibration(S, -S @ (bias * sensitivity), np.zeros((12, 12)), "m/s^2", "m/s^2", "test")
     np.testing.assert_allclose(one.bias, bias, atol=1e-14)
     assert "0.99, 1.02, 1.01" in repr(one)
+
+
+def test_the_public_names_are_those_that_are_imported_on_use():
+    """A literal, which editors follow; ``_PUBLIC`` names the modules."""
+    assert trihedron.__all__ == sorted([*trihedron._HOME, "__version__"])
+
+
+@pytest.mark.parametrize(
+    ("said", "in_words_of_python"),
+    [
+        ("`trihedron diagnose LOG --reference MOTION`", "`trihedron.diagnose(recording, reference=motion)`"),
+        (
+            "`trihedron allan LOG --json ALLAN.json`) and --rate HZ",
+            "`trihedron.report(trihedron.allan(recording), path)`) and rate_hz",
+        ),
+        (
+            "trihedron calibrate LOG --extended -o FILE.",
+            "trihedron.write_calibration(trihedron.extend(trihedron.calibrate(recording)), path).",
+        ),
+        ("`trihedron diagnose` -- or not", "`trihedron.diagnose` -- or not"),
+    ],
+)
+def test_commands_in_a_sentence_become_calls(said, in_words_of_python):
+    assert in_python(said) == in_words_of_python

@@ -22,7 +22,7 @@ def dense_covariance(t, length, pose, variance, direction, strengths):
         for j in range(n):
             low = np.minimum.outer(fine[i], fine[j]) - origin
             middle = sorted((t[i] - origin, t[j] - origin))
-            # Of the integrated walk the middle stands for the stretch.
+            # Of the integrated walk the middle represents the interval.
             bent = middle[0] ** 2 * (3 * middle[1] - middle[0]) / 6 * drift + slope * middle[0] * middle[1]
             V[i, j] = (walk * low.mean() + bent) * (direction[i] @ direction[j]) + scatter * (pose[i] == pose[j])
     return V + np.diag(noise * variance)
@@ -74,7 +74,7 @@ def test_the_curve_of_a_hidden_swing_is_drawn_within_its_band():
     _, sigma = process.maximum((0, 1, 2), ALL, restricted=True)
     t = zeros.time_s
     curve = smooth_curve(process, [0], sigma, t)
-    # The truth is not told by the session's numbers but by averages free of noise.
+    # The truth is not that of the session's numbers but that of averages free of noise.
     quiet = draw(Session(swing=0.1, n_poses=30, noise=1e-9), 5)
     truth = quiet.values - quiet.values.mean(axis=1, keepdims=True)
     away = (curve.values - truth) / curve.sigma

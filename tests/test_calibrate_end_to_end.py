@@ -1,4 +1,4 @@
-"""Calibration as people use it from Python, and whether its uncertainties are honest end to end."""
+"""Calibration as people use it from Python, and whether its uncertainties are valid end to end."""
 
 import importlib
 from dataclasses import replace
@@ -122,7 +122,7 @@ def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit
     finding = next(f for f in verified.findings if f.code.value == "residual-above-noise")
     assert finding.numbers["chi2_per_dof"] > 100.0
     assert finding.severity.value == "serious"
-    # 0.9 m/s² more of one zero is missed by 50 mg rms; whoever can live with 200 mg is told, not stopped.
+    # 0.9 m/s² more of one bias is an error of 50 mg rms: above a limit of 200 mg there is a remark only.
     wide = trihedron.verify(result, other, limit_mg=200.0)
     assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
     # A change of a few times the uncertainties is a warning.
@@ -152,7 +152,7 @@ def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit
 
     with pytest.raises(ValueError, match="broadcast"):
         ends(ValueError("operands could not be broadcast together with shapes (3,) (4,)"))
-    for refusal in (RefusedError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
-        result = ends(refusal)
+    for rejection in (RefusedError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
+        result = ends(rejection)
         assert result.calibration.gyroscope is None
-        assert any(str(refusal).rstrip(".") in finding.seen for finding in result.findings)
+        assert any(str(rejection).rstrip(".") in finding.seen for finding in result.findings)

@@ -1,4 +1,4 @@
-"""The calibration file: round trip, refusal, and what it says about itself."""
+"""The calibration file: round trip, rejection, and what it says about itself."""
 
 import json
 from dataclasses import replace

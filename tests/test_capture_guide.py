@@ -4,6 +4,7 @@ import http.client
 import json
 import re
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 from urllib.parse import urlsplit
 
@@ -15,15 +16,16 @@ import trihedron
 from following_hand import FollowingHand
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.planning_poses import move_rows, shortest_path
-from trihedron.api.replaying import readings_of, steps
+from trihedron.api.replaying import readings_of, replay, steps
 from trihedron.api.simulating import simulate
-from trihedron.capture.guide import Guide, Stillness
+from trihedron.capture.guide import Guide
+from trihedron.capture.stillness import Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
 from trihedron.files.log import write_recording
 from trihedron.records.guiding import Accuracy, Examination, Phase
-from trihedron.simulate import scenario_by_name
+from trihedron.simulate import hand_session, scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
@@ -50,7 +52,7 @@ def led():
                 guide.advance(recording.time_s[done + first : done + last], readings[done + first : done + last])
             )
         done = recording.n_samples
-        # A second more than asked for: stillness is known half a second late.
+        # A second more than requested: stillness is known half a second late.
         target = guide.view().target_up
         hand.go(np.array([0.3, 0.5, 0.8]) if target is None else target, guide.view().pose_s + 1.0)
     return guide, views, state["recording"], state["truth"]
@@ -103,12 +105,12 @@ def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
     angles = [one for one in state.uncertain if one.sensor == "accelerometer" and one.name.startswith("angle")]
     assert all(one.now is None or one.now > 5 * one.wanted for one in angles)
     assert (state.poses_needed or 0) > 0
-    # Six faces leave the angles between axes open: an edge is asked for, with both its axes half up.
+    # Six faces leave the angles between axes open: an edge is requested, with both its axes half up.
     assert np.sum(np.abs(state.next_up) > 0.3) >= 2
 
 
 def test_the_next_pose_brings_what_was_promised():
-    """Error bars promised for the next pose against those that are there when it is taken."""
+    """Uncertainties promised for the next pose against those that are there when it is taken."""
     ratios, before = [], None
     hand = FollowingHand(scenario_by_name("hand-session"), 40, miss_deg=3.0)
     while hand.n_poses < 15:
@@ -119,7 +121,7 @@ def test_the_next_pose_brings_what_was_promised():
             ratios += [new.now / old.after_next for old, new in pairs if new.now and old.now]
         before = now
         hand.go(now.next_up, now.pose_s)
-    # The pose is missed by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
+    # The pose is off by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
     assert 0.75 < np.median(ratios) < 1.33
     assert np.quantile(ratios, 0.9) < 2.5
 
@@ -195,6 +197,16 @@ def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, cap
     assert "Accuracy reached. 3 more poses to check it." in said
     assert "Verification" in said
     assert trihedron.read_calibration(calibration).is_trustworthy
+
+
+def test_poses_of_a_log_that_was_not_guided_count_where_the_segmentation_finds_them():
+    # Every pose is shorter than the six seconds that the guide requests for the first.
+    motion = hand_session(n_poses=8, pose_s=3.0, first_pose_s=3.0)
+    recording, truth = trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)
+    done = replay(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2)
+    assert done.view.n_poses == trihedron.segment(recording).n_poses
+    assert done.view.n_poses >= 8
+    assert done.view.target_up is not None
 
 
 def get(page, path, cookie="", host=None):

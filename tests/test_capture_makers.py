@@ -1,4 +1,4 @@
-"""Streams of makers whose protocol is public are read by themselves; others are refused by their name."""
+"""Streams of makers whose protocol is public are read by themselves; others are rejected by their name."""
 
 import re
 import struct

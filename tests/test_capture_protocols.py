@@ -193,9 +193,9 @@ def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian,
 def test_a_wrong_declaration_is_refused_in_one_sentence_with_its_file(change, words, tmp_path):
     path = tmp_path / "x.toml"
     path.write_text(DECLARED.replace(*change))
-    with pytest.raises(ValueError, match=r"x\.toml") as refusal:
+    with pytest.raises(ValueError, match=r"x\.toml") as rejection:
         read_frame_declaration(path)
-    assert words in str(refusal.value)
+    assert words in str(rejection.value)
 
 
 def test_xsens_fixed_point_and_double_formats_are_understood():

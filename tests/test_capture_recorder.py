@@ -1,4 +1,4 @@
-"""Bytes to a log over a real pseudo-terminal, a socket, a file and a pipe; faults, clocks, gaps, refusals."""
+"""Bytes to a log over a real pseudo-terminal, a socket, a file and a pipe; faults, clocks, gaps, errors."""
 
 import os
 import re
@@ -169,7 +169,7 @@ def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_l
 
 
 def test_a_full_disk_says_what_is_saved_and_leaves_a_whole_file(tmp_path):
-    # The limit of the size of a file stands for the disk.
+    # The limit of the size of a file represents the disk.
     raw = tmp_path / "raw.txt"
     raw.write_bytes(b"".join(p for _, p in Device(counts_recording(5000, 100.0), "lines").pieces(Sent())))
     code = (

@@ -1,4 +1,4 @@
-"""Gravity carried through moves: what noise allows it to miss is no negative variance."""
+"""Tilt error after moves: what noise allows it to miss is no negative variance."""
 
 from dataclasses import replace
 

@@ -53,7 +53,7 @@ def test_codes_that_were_not_visited_leave_the_step_as_it_is():
     assert adc_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
     codes = np.round(session(4, sigma=2.0))
     assert adc_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
-    few = np.round(0.2 * rng.normal(size=3000))  # at rest: two or three codes
+    few = np.round(0.2 * rng.normal(size=3000))  # static: two or three codes
     assert adc_step(0.02 * few) == pytest.approx(0.02)
     assert adc_step(np.zeros(1000)) == 0.0
     assert adc_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
@@ -127,7 +127,7 @@ def test_a_log_at_rest_on_its_limit_and_one_that_is_merely_coarse_are_told_apart
 
 @pytest.mark.parametrize("sigma", [0.05, 0.3, 0.7, 3.0])
 def test_swings_of_one_height_end_on_no_limit(sigma):
-    # Never at rest: what looks like noise is motion, and a thousand peaks end on one code.
+    # Never static: what looks like noise is motion, and a thousand peaks end on one code.
     for seed in range(4):
         rng = np.random.default_rng([11, seed])
         t = np.arange(6000) / 100.0
@@ -138,7 +138,7 @@ def test_swings_of_one_height_end_on_no_limit(sigma):
 
 @pytest.mark.parametrize("step", [0.1, 1.499, 4.0])
 def test_a_table_that_turns_at_one_rate_both_ways_ends_on_no_limit(step):
-    # About y at 160 deg/s and about z at -160: two channels end at one code, on which everything stands still.
+    # About Y at 160 deg/s and about Z at -160: two channels end at one code, on which everything stands still.
     rng = np.random.default_rng(16)
     ramp = np.linspace(0.0, 1.0, 50)
     course = np.concatenate([np.zeros(200), ramp, np.ones(400), ramp[::-1]])

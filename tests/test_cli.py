@@ -12,7 +12,7 @@ import pytest
 from trihedron import read, segment
 from trihedron.cli import main
 from trihedron.simulate import Motion, MoveTo, Pose, hand_session, scenario_by_name, table_turns
-from written_session import G, log_text, recording, refused_only, session, simulated
+from written_session import G, log_text, recording, rejected_only, session, simulated
 
 __all__ = ["recording", "session"]
 
@@ -94,7 +94,7 @@ def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monk
     names = {"session.csv", "second-session.csv", "calibration.json", "report.html", "verification.html", "truth.json"}
     names |= {"unit.csv", "simulation.toml", "improved.toml", "disagreement.html", "sealed.json"}
     assert {p.name for p in Path("trihedron-demo").iterdir()} == names
-    assert "left alone" in refused_only(capsys, "demo", "trihedron-demo")
+    assert "left alone" in rejected_only(capsys, "demo", "trihedron-demo")
 
 
 def test_neither_help_nor_calibrating_a_plain_log_loads_what_takes_longer_than_they_do(session):
@@ -162,6 +162,6 @@ def test_six_faces_and_turns_are_calibrated_by_method_one(tmp_path, capsys):
     assert document["frame"] == "case"
     scale = np.diag(np.linalg.inv(np.array(document["gyroscope"]["S"])))
     truth = np.diag(np.linalg.inv(np.array(scenario_by_name("hand-session").gyroscope.S)))
-    # A turn of 90 deg is known to 0.01 deg by noise; the simulated table is level: 0.1 % is far above both.
+    # A turn of 90 deg is uncertain by 0.01 deg by noise; the simulated table is level: 0.1 % is far above both.
     np.testing.assert_allclose(scale, truth, rtol=1e-3)
     assert status in (0, 2)

@@ -9,7 +9,7 @@ import pytest
 from trihedron.cli import main
 from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose
-from written_session import G, log_text, recording, refused, refused_only, session, simulated
+from written_session import G, log_text, recording, rejected, rejected_only, session, simulated
 
 __all__ = ["recording", "session"]
 
@@ -33,7 +33,7 @@ __all__ = ["recording", "session"]
     ],
 )
 def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, said):
-    assert said in refused(capsys, *arguments)
+    assert said in rejected(capsys, *arguments)
 
 
 @pytest.mark.parametrize("content", [b"", b"dear diary\n" * 50, b"\x89PNG\r\n\x1a\n" + b"\x00" * 100])
@@ -41,7 +41,7 @@ def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(tmp_path, 
     log = tmp_path / "bad.csv"
     log.write_bytes(content)
     for command in ("check", "calibrate"):
-        said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
+        said = rejected_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
         assert "bad.csv" in said
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
 
@@ -50,7 +50,7 @@ def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(ses
     kept = tmp_path / "kept.json"
     kept.write_text("precious")
     for option in ("-o", "--json", "--report"):
-        assert "left alone" in refused(capsys, "calibrate", session / "log.csv", option, kept)
+        assert "left alone" in rejected(capsys, "calibrate", session / "log.csv", option, kept)
         assert kept.read_text() == "precious"
     assert main(["calibrate", str(session / "log.csv"), "--gravity", G, "-o", str(kept), "--force"]) == 0
     assert json.loads(kept.read_text())["format_version"] == 1
@@ -61,21 +61,21 @@ def test_units_that_a_calibration_does_not_map_are_refused(session, recording, t
     in_si = replace(recording, accelerometer=recording.accelerometer * 6e-4, gyroscope=recording.gyroscope * 1.3e-4)
     other.write_text(log_text(in_si))
     for command in ("apply", "verify"):
-        assert "maps counts" in refused(capsys, command, session / "c.json", other)
+        assert "maps counts" in rejected(capsys, command, session / "c.json", other)
 
 
 def test_gravity_said_twice_or_by_height_alone_is_refused(session, capsys):
     log = session / "log.csv"
-    assert "given twice" in refused(capsys, "calibrate", log, "--gravity", G, "--latitude", "50")
-    assert "--latitude" in refused(capsys, "calibrate", log, "--height", "100")
-    assert "latitude" in refused(capsys, "calibrate", log, "--latitude", "95")
-    assert "m/s²" in refused(capsys, "calibrate", log, "--gravity", "980")
+    assert "given twice" in rejected(capsys, "calibrate", log, "--gravity", G, "--latitude", "50")
+    assert "--latitude" in rejected(capsys, "calibrate", log, "--height", "100")
+    assert "latitude" in rejected(capsys, "calibrate", log, "--latitude", "95")
+    assert "m/s²" in rejected(capsys, "calibrate", log, "--gravity", "980")
 
 
 def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tmp_path, capsys):
     two = tmp_path / "two.csv"
     two.write_text(log_text(simulated(Motion((Pose(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Pose(5.0))))))
-    said = refused(capsys, "calibrate", two)
+    said = rejected(capsys, "calibrate", two)
     assert "two.csv" in said
     assert "poses" in said
     time_s = np.arange(1500) / 100.0
@@ -83,7 +83,7 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
     moving = Recording(time_s, swing, 2.0 * np.cos(np.outer(time_s, [2.1, 3.3, 4.7])), 100.0)
     shaken = tmp_path / "shaken.csv"
     shaken.write_text(log_text(moving))
-    assert "still" in refused(capsys, "calibrate", shaken)
+    assert "still" in rejected(capsys, "calibrate", shaken)
     assert main(["check", str(shaken)]) == 2
     assert "NOT FIT" in capsys.readouterr().out
 

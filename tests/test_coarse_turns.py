@@ -1,4 +1,4 @@
-"""Method 1 with ADCs whose step noise does not reach: a steady rate inside one step is misread all along."""
+"""Method 1 with ADCs whose noise is below the LSB: a steady rate inside one LSB is misread all along."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Whether poses and moves of a scenario miss as the recording's do: chance is told from difference."""
+"""Whether poses and moves of a scenario miss as the recording's do: chance is distinguished from difference."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ ALPHA = 0.01
 class Drawn:
     """Mean squares of n poses and n moves, χ² over their degrees of freedom, simulations ``ratio`` times as far."""
 
-    def __init__(self, rng, n, ratio=1.0, refused=()):
-        self.rng, self.n, self.ratio, self.refused = rng, n, ratio, refused
+    def __init__(self, rng, n, ratio=1.0, rejected=()):
+        self.rng, self.n, self.ratio, self.rejected = rng, n, ratio, rejected
         self.poses, self.moves = self.of_one(), self.of_one()
         self.drawn = 0
 
@@ -22,7 +22,7 @@ class Drawn:
 
     def missed_by(self, _scenario, _seed):
         self.drawn += 1
-        if self.drawn in self.refused:
+        if self.drawn in self.rejected:
             return None, None
         return self.ratio**2 * self.of_one(), self.of_one()
 

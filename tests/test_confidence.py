@@ -32,7 +32,7 @@ def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned():
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
     z, relative = gyro_z(result, lower(truth))
     assert result.segments.n_poses == len(motion.rests)
-    # Nine numbers, each within four standard errors; the rate noise over a minute is 0.04° in 90°.
+    # Nine parameters, each within four standard errors; the rate noise over a minute is 0.04° in 90°.
     assert np.abs(z).max() < 4.0
     assert relative < 1e-3
 
@@ -86,7 +86,7 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding():
         f, w, rate, truth, _ = hand(seed, gyro_bits=8)
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
         if not result.is_trustworthy:
-            # Marked as not to be trusted, which is the other honest answer.
+            # Marked as not to be trusted, which is the other valid answer.
             continue
         scores, relative = gyro_z(result, lower(truth))
         # A step of 4 °/s at 8 bit: three parts in a thousand are what its moves of 2 s show.
@@ -110,7 +110,7 @@ def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(mak
     lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
     assert lost
     assert not result.is_trustworthy
-    # Of some hundred steps that tell, 3 % were lost: within five of its own standard errors and what hides.
+    # Of some hundred intervals that show it, 3 % were lost: within five of its own standard errors and what hides.
     assert 0.01 < lost[0].numbers["lost_share"] < 0.045
 
 
@@ -145,7 +145,7 @@ def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
         result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=turns)
         a = result.accelerometer
         accelerometer.append(np.append((a.S - truth.S_f) / a.sigma_S, (a.b - truth.b_f) / a.sigma_b))
-    # Twelve scores each; six placements of seed 610080 agree by chance: bars from headings alone missed by 12.7.
+    # Twelve scores each; six placements of seed 610080 agree by chance: from headings alone z was 12.7.
     assert np.abs(accelerometer).max() < 4.0
     assert np.mean(np.square(accelerometer)) > 0.1, "bars that say nothing would pass as well"
 

@@ -51,7 +51,7 @@ WEAKNESSES = {
     "coarse gyro turned slowly": Weakness(
         (0,), (1, 2), {"bits": 12, "move_s": 15.0, "grade": "industrial"}, {"b_w": 4.0}
     ),
-    # The drift hides in the nine numbers of the poses, and S_f was off by up to 4.5, S_w by 7 standard errors.
+    # The drift hides in the nine parameters of the poses, and S_f was off by up to 4.5, S_w by 7 standard errors.
     "accelerometer whose bias drifts by milli g": Weakness(
         (202,), (203, 205, 206), {"drift": "accelerometer"}, {"S_f": 3.5, "S_w": 4.0}
     ),
@@ -79,7 +79,7 @@ WEAKNESSES = {
     "middle of a slow turn about the vertical": Weakness(
         (7002,), (7006,), AXIS_BY_AXIS | {"move_s": 25.0, "bits": 14, "tremor_deg_s": 0.0}, {"b_w": 4.0}, (18, 18)
     ),
-    # Half a step of its ADC stood for the scatter of its mean readings, and pauses that turned lost 1.3 % of S_w.
+    # Half an LSB of its ADC represented the scatter of its mean readings, and pauses that turned lost 1.3 % of S_w.
     "coarse gyro that its noise dithers": Weakness((510002,), (), drawn(510002), {"S_w": 4.0}),
     # Velocities over moves of 0.6 s were believed to 1e-4 of gravity: S_f was off by 5.4 and 4.4 standard errors.
     "rounding at the ends of quick moves": Weakness((900012,), (900002,), drawn(720498), {"S_f": 3.5}, is_trusted=True),
@@ -118,7 +118,7 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
             assert result.calibration.averaging == pytest.approx(float(sampling == "averages"), abs=0.2)
             scores.append(z["S_w"])
     for scores in every.values():
-        # Nine numbers a session: the rms of six is known to 15 %. Taken for points it was 1.7 of averages.
+        # Nine parameters a session: the rms of six is uncertain by 15 %. Taken for points it was 1.7 of averages.
         assert np.sqrt(np.mean(np.square(scores))) < 1.45
         assert np.abs(scores).max() < 4.0
 
@@ -149,7 +149,7 @@ def test_turns_on_three_faces_calibrate_the_gyro_and_the_accelerometer_is_not_to
     faces = np.repeat([3, 1, 2], 7)
     turns = np.tile([90.0, -90.0, 180.0, -180.0, 360.0, -360.0], 3)
     found = calibrate(recording, gravity_m_s2=9.80665, method="faces", faces=faces, turns_deg=turns)
-    # It was refused; by gravity alone it was 27 % off.
+    # It was rejected; by gravity alone it was 27 % off.
     assert np.abs((found.gyroscope.S - truth.gyroscope_S) / found.gyroscope.sigma_S).max() < 4.0
     assert np.linalg.norm(found.gyroscope.S @ np.linalg.inv(truth.gyroscope_S) - np.eye(3)) < 5e-3
     accelerometer = found.accelerometer
@@ -171,7 +171,7 @@ def test_a_delay_between_the_sensors_that_hides_in_the_noise_of_velocities_moves
 
 @pytest.mark.parametrize(("rate_hz", "sessions"), [pytest.param(25.0, 6, marks=pytest.mark.slow), (100.0, 2)])
 def test_what_misalignment_turns_inside_a_step_is_an_error_that_all_moves_share(rate_hz, sessions):
-    # Charged as if it scattered from move to move, S_w was off by up to 7, b_w by up to 10 standard errors.
+    # Added as if it scattered from move to move, S_w was off by up to 7, b_w by up to 10 standard errors.
     found = [calibrated(7000 + k, path="axis by axis", rate_hz=rate_hz, **QUICK)[1] for k in range(sessions)]
     scores = np.array([[*z["S_w"], *z["b_w"]] for z in found])
     # 24 or 72 numbers, of which those of a session share its readings.

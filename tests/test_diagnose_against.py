@@ -1,4 +1,4 @@
-"""A given model held against a recording: numbers are told from physics, in any frame."""
+"""A given model held against a recording: numbers are distinguished from physics, in any frame."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
     for _ in range(20):
         step = np.r_[1e-7 * 2e-3 * RNG.standard_normal(9), 1e-7 * RNG.standard_normal(3)]
         moved = invariants(S + step[:9].reshape(3, 3), b + step[9:])
-        # Second order of a relative step of 1e-7 is 1e-14; the accelerometer's zero is some hundred of its unit.
+        # Second order of a relative step of 1e-7 is 1e-14; the accelerometer's bias is some hundred of its unit.
         assert np.allclose(moved.vector() - invariants(S, b).vector(), J @ step, rtol=1e-5, atol=1e-11)
         zero = np.zeros(3)
         here = triad_rotation(invariants(S, zero), invariants(S_g, zero))

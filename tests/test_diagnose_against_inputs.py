@@ -1,4 +1,4 @@
-"""What cannot be held against a recording is refused in one sentence: which file, which place, what to do."""
+"""What cannot be held against a recording is rejected in one sentence: which file, which place, what to do."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from trihedron.simulate import hand_session, scenario_by_name, simulate
 GOOD = 'name = "mine"\nprofile = "mpu"\n[session]\nkind = "hand"\n[gyroscope]\nb = [0.0, 0.0, 0.0]\n'
 
 
-def refused(given, capsys):
+def rejected(given, capsys):
     """The one sentence on stderr."""
     log = made_once() / "log.csv"
     assert main(["diagnose", str(log), "--gravity", G, "--against", str(given)]) == 1
@@ -34,24 +34,24 @@ def refused(given, capsys):
 def test_a_scenario_with_a_typing_error_is_refused_with_its_place(tmp_path, capsys, wrong, place, remedy):
     given = tmp_path / "mine.toml"
     given.write_text(wrong)
-    said = refused(given, capsys)
+    said = rejected(given, capsys)
     assert place in said
     assert remedy in said
 
 
 def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):
-    assert "no such file" in refused(tmp_path / "absent.csv", capsys)
+    assert "no such file" in rejected(tmp_path / "absent.csv", capsys)
     belongs = "this is a trihedron calibration, no log; name it with --calibration"
-    assert belongs in refused(made_once() / "c.json", capsys)
+    assert belongs in rejected(made_once() / "c.json", capsys)
     empty = tmp_path / "words.csv"
     empty.write_text("nothing,here\n")
-    assert "words.csv" in refused(empty, capsys)
+    assert "words.csv" in rejected(empty, capsys)
     rng = np.random.default_rng(3)
     rows = np.column_stack([np.arange(2000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (2000, 6))])
     still = tmp_path / "still.csv"
     head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
     still.write_text(head + "\n".join(",".join(f"{v:.6g}" for v in row) for row in rows) + "\n")
-    said = refused(still, capsys)
+    said = rejected(still, capsys)
     assert "the simulated recording cannot be calibrated" in said
     assert "pose" in said
 

@@ -145,7 +145,7 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     clean = Scenario(hand_session(6), "clean", Accelerometer(), Gyroscope(), profile_by_name("mpu").clock)
     key, size = TAKEN_OFF[effect_id]
     recording, truth = simulate(with_effect(clean, effect_id, **{key: size}), seed=1)
-    # Places are told from the first of them.
+    # Places are found from the first of them.
     values = np.ravel(size[1:] if key == "places_m" else size)
     effect = {"id": effect_id, "model": {"variant": "linear" if key == "per_k" else "", "values": list(values)}}
     identity = (np.eye(3), np.zeros(3))

@@ -1,4 +1,4 @@
-"""Mistakes that simulators have made: units, axes, slow noise; each told by its numbers."""
+"""Mistakes that simulators have made: units, axes, slow noise; each recognised by its numbers."""
 
 from dataclasses import replace
 from functools import cache

@@ -1,4 +1,4 @@
-"""Mistakes that simulators have made in noise and sampling, each told by its numbers."""
+"""Mistakes that simulators have made in noise and sampling, each recognised by its numbers."""
 
 from dataclasses import replace
 from functools import cache
@@ -33,7 +33,7 @@ def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
 def log(
     seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False, timed=True
 ):
-    """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, one a sensor."""
+    """Static readings; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, one a sensor."""
     rng = np.random.default_rng(seed)
     n = EVERY * N_POSES
     readings = {}

@@ -1,4 +1,4 @@
-"""What must not be swallowed, and what is no answer."""
+"""What must not be absorbed, and what is no answer."""
 
 import itertools
 from dataclasses import replace
@@ -18,7 +18,7 @@ RATE_HZ = 100.0
 WHITE = 0.1 * np.sqrt(RATE_HZ)
 
 JUMPS = 1e-3
-"""p-value from which zeros are said to change inside poses."""
+"""p-value from which biases are said to change inside poses."""
 
 
 class Poses:

@@ -1,4 +1,4 @@
-"""Rates at rest that are motion: supports that give are no biases that scatter."""
+"""Static rates that are motion: supports that give are no biases that differ."""
 
 from functools import cache
 

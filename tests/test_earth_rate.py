@@ -44,7 +44,7 @@ def test_a_vector_that_is_not_the_earths_is_not_called_so():
     assert not effect.is_plausible(at_home, 2.0 * turning(here, 1.0), sigma)
     assert not effect.is_plausible(at_home, 0.5 * turning(here, 1.0), sigma)
     assert not effect.is_plausible(at_home, turning(np.radians(86.0), 1.0), sigma)
-    # Gravity that was only written down tells nothing.
+    # Gravity that was only written down shows nothing.
     assert effect.is_plausible(variant(9.81), turning(np.radians(86.0), 1.0), sigma)
 
 

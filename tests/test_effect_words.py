@@ -17,7 +17,7 @@ from trihedron.report.findings.wording import places
 
 ROOT = Path(__file__).parents[1]
 DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
-AT_REST = {"at-rest", "at-rest-counts"}
+STATIC = {"static", "static-counts"}
 
 
 def ours():
@@ -26,12 +26,12 @@ def ours():
 
 
 def cases_of(effect):
-    """(case or None where only the run tells, names of the values) of every sentence that an effect can ask for."""
+    """(case or None where only the run decides, names of the values) of every sentence that an effect can request."""
     for kind in type(effect).__mro__:
         if kind in (Effect, object) or not kind.__module__.startswith("trihedron.diagnose.effects"):
             continue
         for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(kind)))):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "told":
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "reported":
                 case = node.args[0].value if isinstance(node.args[0], ast.Constant) else None
                 yield case, {keyword.arg for keyword in node.keywords}
 
@@ -47,11 +47,11 @@ def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
     for effect in ours():
         said, seen = dict(CATALOGUE[effect.id].said), set()
         for case, given in cases_of(effect):
-            # A case that the run chooses: each that nothing else asks for takes these values.
-            for one in [case] if case else set(said) - AT_REST:
+            # A case that the run chooses: each that nothing else requests takes these values.
+            for one in [case] if case else set(said) - STATIC:
                 assert places(said[one]) == given, f"{effect.id} '{one}'"
                 seen.add(one)
-        assert seen == set(said) - AT_REST, effect.id
+        assert seen == set(said) - STATIC, effect.id
         asked += len(seen)
     assert asked > 15
 
@@ -84,4 +84,4 @@ def test_an_effect_of_a_users_own_file_brings_its_own_words():
     assert own.statement(strongest) == "the readings follow the moon (strongest term m_y: 2 ± 0.1 m/s^2)."
     assert own.separating_experiment() == "wait a fortnight"
     with pytest.raises(KeyError):
-        own.told("no such case")
+        own.reported("no such case")

@@ -88,7 +88,7 @@ def diagonal_in(R, recording, gyro_scale=(1.0, 1.0, 1.0)):
 
 
 def assert_alike(made, applied, atol=1e-9):
-    """Numbers are written with all digits; what is left is the order of operations on values below 100."""
+    """Numbers are written with all digits; the difference is the order of operations on values below 100."""
     np.testing.assert_allclose(made[0], applied.accelerometer, rtol=0.0, atol=atol)
     np.testing.assert_allclose(made[1], applied.gyroscope, rtol=0.0, atol=1e-9)
 
@@ -133,7 +133,7 @@ def test_px4_parameters_on_the_raw_readings_of_a_flight_are_what_apply_gives(rea
 
 
 def test_an_identity_on_corrected_readings_gives_back_the_parameters_that_the_board_holds(real_data):
-    """The harm that was done: what remains, written as the absolute value, threw 1.278 m/s² of offset away."""
+    """The harm that was done: the rest, written as the absolute value, lost 1.278 m/s² of offset away."""
     pytest.importorskip("pymavlink")
     recording = trihedron.read(real_data / "formats" / "ardupilot_log171.bin", instance=1)
     known = of_board(given(*[(np.eye(3), np.zeros(3))] * 2), recording)

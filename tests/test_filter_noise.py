@@ -125,7 +125,7 @@ def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():
 
 def test_parts_of_an_error_are_the_textbook_ones():
     found = {name: value[0] for name, value in parts_of(STRENGTHS[None], 10.0).items()}
-    assert found["rest"] == pytest.approx(3 * N**2 * 10)
+    assert found["static"] == pytest.approx(3 * N**2 * 10)
     assert found["bias"] == pytest.approx(K**2 * 1000)
     far = parts_of(STRENGTHS[None], 1e6)["reference"][0]
     assert far == pytest.approx(6 * SLOW**2, rel=1e-3)  # two errors that no longer know of each other
@@ -174,7 +174,7 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
     assert found.sensor("accelerometer") is None  # a truth without position says nothing of velocity
     assert gyro.N.value == pytest.approx(N, rel=0.1)
     assert gyro.bias.kind == "walk"
-    rest = next(s.share for s in gyro.shares if s.cause == "rest" and s.horizon_s == 1.0)
+    rest = next(s.share for s in gyro.shares if s.cause == "static" and s.horizon_s == 1.0)
     assert rest.upper > 0.5
     for one in gyro.consistency:
         assert 0.5 < one.nees < 9.0
@@ -239,13 +239,13 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
     assert gyro.N.value / gyro.static.N.value == pytest.approx(1.0, abs=0.04)
     assert gyro.N.lower < N < gyro.N.upper
     assert gyro.K.is_limit
-    assert any(f.code.value == "filter-noise-at-rest" for f in found.findings)
+    assert any(f.code.value == "filter-noise-static" for f in found.findings)
 
 
 def test_without_a_reference_tilt_and_bias_over_moves_are_shown_beside_what_noise_predicts():
     rest = trihedron.allan(resting(2))
     tilt = trihedron.filter_noise(turned_between_intervals(scale=1.02), static=rest).tilt
-    # Two per cent of 90°; noise at rest predicts hundredths of a degree.
+    # Two per cent of 90°; static noise predicts hundredths of a degree.
     assert tilt.actual == pytest.approx(0.02 * np.pi / 2, rel=0.2)
     assert tilt.predicted < 0.1 * tilt.actual
     log = turned_between_intervals(scale=1.0)

@@ -35,7 +35,7 @@ def _calls(attribute):
 
 
 def _choices(node):
-    """What an argument may be: a code, a literal, or one of two; None where only the run tells."""
+    """What an argument may be: a code, a literal, or one of two; None where only the run decides."""
     if isinstance(node, ast.IfExp):
         one, other = _choices(node.body), _choices(node.orelse)
         return None if one is None or other is None else one | other

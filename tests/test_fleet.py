@@ -44,7 +44,7 @@ def test_every_log_has_its_row_and_file_the_bad_one_its_reason_and_the_device_th
     table = polars.read_parquet(out / "fleet.parquet")
     assert table.height == 5
     assert result.n_done == 4
-    bad = table.filter(polars.col("status") == "refused")
+    bad = table.filter(polars.col("status") == "rejected")
     assert bad["path"].item().endswith("notes.txt")
     assert len(bad["reason"].item()) > 20
     assert polars.read_csv(out / "fleet.csv").height == 5
@@ -160,7 +160,7 @@ def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
         rows = trihedron.fleet(source, tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G).rows
         said = {Path(row["path"]).name: (row["status"], row["reason"]) for row in rows}
         assert said["log_3.csv"][0] == "done"
-        assert said["log_2.csv"][0] == "refused"
+        assert said["log_2.csv"][0] == "rejected"
         assert "pipe" in said["log_2.csv"][1]
         assert "a folder without logs" in said["log_1.csv"][1]
 

@@ -38,7 +38,7 @@ def test_a_pause_of_the_hand_inside_a_move_is_no_pose():
     [
         # A third of them are short, and one in twenty of these is lost: more than 8 in 100 poses come once in 300.
         ("short", 73001, 0.08),
-        # One in twenty is lost (where the gyro shakes too, and not long enough to tell the line); without looking for
+        # One in twenty is lost (where the gyro shakes too, and not long enough to show the line); without looking for
         # shaking poses it is one in five.
         ("shaken", 74001, 0.1),
     ],

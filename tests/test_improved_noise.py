@@ -127,7 +127,7 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     again = bias_in_moves(better, own)
     # Alike within a twentieth, or a small step is left.
     assert again is None or again == pytest.approx(found, rel=0.15)
-    # A recording that misses no more than the scenario, but for chance (a sixth), asks for little.
+    # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
     little = bias_in_moves(clean, beside(other))
     assert little is None or max(little) < 0.4 * 2e-3
 
@@ -155,7 +155,7 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
     scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
     own = beside(scattered, 6)
     found = bias_of_poses(clean, own)
-    # 24 poses less nine numbers and the worst: a root known to a fifth; two of those, and the pose that is spared.
+    # 24 poses less nine parameters and the worst: a root known to a fifth; two of those, and the pose that is excluded.
     assert found == pytest.approx((0.02,) * 3, rel=0.5)
     better = replace(accel, electronics=replace(accel.electronics, bias_repeatability=found))
     again = bias_of_poses(replace(clean, accelerometer=better), own)

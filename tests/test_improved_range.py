@@ -93,7 +93,7 @@ def test_a_scenario_without_noise_takes_the_recordings(improved):
 
 
 def triangle(peak, limit):
-    """Readings of a triangle of 41 samples, cut at ``limit``, along x."""
+    """Readings of a triangle of 41 samples, cut at ``limit``, along X."""
     x = np.zeros((81, 3))
     x[20:61, 0] = peak * (1.0 - np.abs(np.arange(-20, 21)) / 20.0)
     cut = np.minimum(x, limit)

@@ -65,7 +65,7 @@ def covariance_by_hand(mix, start, pose):
     flicker, rates = terms.pop("flicker", 0.0), terms.pop("rates", ())
     sigma = flicker * np.sqrt(np.log(10.0) / np.pi)
     ends = {min(rates, default=0.0), max(rates, default=0.0)}
-    # The slowest and fastest process also stand for what lies beyond them.
+    # The slowest and fastest process also represent what lies beyond them.
     alone = (terms.pop("gauss_markov_rate", 0.0), terms.pop("gauss_markov", 0.0))
     processes = [(beta, sigma * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
     return covariance_of_pose_means(start, pose, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
@@ -174,7 +174,7 @@ WALKING = AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
         (ARTICLE_MIX, ARTICLE_MIX, None),
         (ARTICLE_MIX, ARTICLE_MIX.scaled(0.5), FindingCode.INNOVATIONS_TOO_LARGE),
         (ARTICLE_MIX, ARTICLE_MIX.scaled(2.0), FindingCode.INNOVATIONS_TOO_SMALL),
-        (WALKING, AxisNoise(white=1.5 * SIGMA * 5**0.5), FindingCode.INNOVATIONS_COLOURED),
+        (WALKING, AxisNoise(white=1.5 * SIGMA * 5**0.5), FindingCode.INNOVATIONS_CORRELATED),
     ],
     ids=["right", "half", "double", "white only"],
 )

@@ -9,7 +9,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.read import ReadError, read_axis_noise
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG
-from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
+from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_static, simulate
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)
@@ -48,18 +48,30 @@ def test_the_report_shows_every_method_and_the_calibration_file_holds_the_truth(
 
 
 def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
-    path = rest_log(tmp_path / "rest.csv", 1200.0, N=(0.01,) * 3, K=(0.001,) * 3)
+    path = rest_log(tmp_path / "static.csv", 1200.0, N=(0.01,) * 3, K=(0.001,) * 3)
     assert run(session, "--reference", session / "angles.csv", "--noise", path, "--json") == 0
     said = json.loads(capsys.readouterr().out)
     for axis in said["axes"]:
-        # 30 000 samples tell N to 0.4 %; the walk, seen over 20 minutes, to about 15 %.
+        # 30 000 samples show N to 0.4 %; the walk, seen over 20 minutes, to about 15 %.
         assert axis["noise"]["white"] == pytest.approx(0.01, rel=0.03)
         assert axis["noise"]["walk"] == pytest.approx(0.001, rel=0.6)
 
 
+def test_the_noise_may_be_the_json_of_allan(session, tmp_path, capsys):
+    path = rest_log(tmp_path / "static.csv", 1200.0, N=(0.01,) * 3, K=(0.001,) * 3)
+    assert main(["allan", str(path), "--json", str(tmp_path / "allan.json")]) == 0
+    said = []
+    for noise in (path, tmp_path / "allan.json"):
+        capsys.readouterr()
+        assert run(session, "--reference", session / "angles.csv", "--noise", noise, "--json") == 0
+        said.append([axis["noise"] for axis in json.loads(capsys.readouterr().out)["axes"]])
+    # JSON keeps every digit.
+    assert said[1] == said[0]
+
+
 def rest_log(path, seconds, **noise):
     accelerometer = Accelerometer(noise=NoiseTerms(**noise))
-    scenario = Scenario(motion=long_rest(seconds), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
+    scenario = Scenario(motion=long_static(seconds), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
     rest = simulate(scenario, seed=2)[0]
     rows = np.column_stack([rest.time_s, rest.accelerometer])
     np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
@@ -67,8 +79,8 @@ def rest_log(path, seconds, **noise):
 
 
 def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, capsys):
-    # Half the counts at twice the range: half the noise, too little to tell from a quieter place, and half of gravity.
-    rest = rest_log(tmp_path / "rest.csv", 600.0, N=(0.01,) * 3)
+    # Half the counts at twice the range: half the noise, which a quieter place has too, and half of gravity.
+    rest = rest_log(tmp_path / "static.csv", 600.0, N=(0.01,) * 3)
     half = np.loadtxt(rest, delimiter=",", skiprows=1) * [1.0, 0.5, 0.5, 0.5]
     np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
     assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1

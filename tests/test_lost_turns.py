@@ -47,14 +47,14 @@ def lossy(seed, time_of=None):
 
 @pytest.mark.parametrize("seed", [30000, 20018])
 def test_losses_are_possible_wherever_moves_are_missed(seed):
-    """All moves missed more than noise does, or those that missed most were excluded: losses were not asked for."""
+    """All moves missed more than noise does, or those that missed most were excluded: losses were not requested."""
     result, truth = lossy(seed)
     codes = {finding.code for finding in result.findings}
     assert codes & {FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.OUTLIER_MOVE}
     assert FindingCode.LOSSES_POSSIBLE in codes
     assert not result.is_trustworthy
     z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
-    # Nine numbers, each within four standard errors; in the second session one was 22 away.
+    # Nine parameters, each within four standard errors; in the second session one was 22 away.
     assert np.abs(z).max() < 4.0
 
 
@@ -82,7 +82,7 @@ def knocked(w, rests, rate, per_rad_s, rng):
     [(range(640005, 640007), 2, 0), pytest.param(range(640000, 640008), 6, 1, marks=pytest.mark.slow)],
 )
 def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_not(seeds, least, most):
-    """Axis after axis at one speed, 12 bits: what remains of the moves is within the noise whatever the rest lost."""
+    """Axis after axis at one speed, 12 bits: residuals of moves are within the noise whatever the others lost."""
     lossy, false = 0, 0
     for seed in seeds:
         f, w, rate, truth, motion = robot(seed, gyro_bits=12)
@@ -99,5 +99,5 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             false += not is_lossy and is_said
     # 41 of 54 sessions: what three lost samples do to moves that others were left out of may be a hidden turn as well.
     assert lossy >= least
-    # None of 30 sessions: a knock meets the curve of a loss by chance only.
+    # None of 30 sessions: a impact meets the curve of a loss by chance only.
     assert false <= most

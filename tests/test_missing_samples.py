@@ -31,7 +31,7 @@ def test_three_per_cent_of_lost_samples_are_serious_and_about_as_many_as_said(se
     log = session(0.03, seed)
     (found,) = missing_samples(log, segment_recording(log))
     assert found.severity is Severity.SERIOUS
-    # Losses next to each other hide one another: a half to all of them are told.
+    # Losses next to each other hide one another: a half to all of them are shown.
     assert 0.01 < found.numbers["lost_share"] < 0.045
 
 

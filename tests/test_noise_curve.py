@@ -53,6 +53,6 @@ def test_a_filtered_curve_is_quoted_from_above_the_filter():
     x = np.convolve(x, np.full(8, 1 / 8), mode="valid")
     curve = allan_deviation(x, 100.0, 2 ** np.arange(16))
     axis = identify_curve(curve.tau_s, curve.deviation, 100.0, len(x)).axes[0]
-    assert FindingCode.SPECTRUM_COLOURED in {f.code for f in axis.findings}
+    assert FindingCode.SPECTRUM_LOW_PASS in {f.code for f in axis.findings}
     # What the filter still takes where a point is believed to 1 %.
     assert axis.value("N") == pytest.approx(1e-2, rel=0.03)

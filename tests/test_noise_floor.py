@@ -1,4 +1,4 @@
-"""The floor of a log, rolling means, medians and quantiles of the core against their NumPy twins."""
+"""The floor of a log, rolling means, medians and quantiles of the core against their NumPy counterparts."""
 
 import numpy as np
 import pytest

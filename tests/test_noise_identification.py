@@ -88,7 +88,7 @@ def test_a_step_is_found_and_does_not_become_a_random_walk(quiet):
     stepped = quiet.copy()
     stepped[170_000:] += 5e-3
     noise = identify_noise(stepped, RATE)
-    assert FindingCode.LOG_STEP in codes(noise)
+    assert FindingCode.LOG_JUMP in codes(noise)
     assert noise.breaks_s[0] == pytest.approx(1700.0, abs=20.0)
     # A clean log has nothing to report.
     clean = identify_noise(quiet, RATE)
@@ -102,7 +102,7 @@ def test_knocks_and_shaking_are_left_out_and_named(quiet):
     knocked[200_000:200_005] -= 0.2
     shaken = quiet.copy()
     shaken[100_000:103_000] += 0.05 * np.random.default_rng(1).normal(size=3000)
-    for x, code in ((knocked, FindingCode.LOG_KNOCK), (shaken, FindingCode.LOG_MOTION)):
+    for x, code in ((knocked, FindingCode.LOG_IMPACT), (shaken, FindingCode.LOG_MOTION)):
         noise = identify_noise(x, RATE)
         assert codes(noise) >= {code, FindingCode.STRETCHES_EXCLUDED}
         assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
@@ -122,7 +122,7 @@ def test_a_periodic_line_is_found_with_its_amplitude(quiet):
 def test_filtering_is_recognised_before_terms_are_quoted(quiet):
     filtered = np.convolve(quiet, np.full(5, 0.2), mode="valid")
     noise = identify_noise(filtered, RATE)
-    assert FindingCode.SPECTRUM_COLOURED in codes(noise)
+    assert FindingCode.SPECTRUM_LOW_PASS in codes(noise)
     assert noise.axes[0].highest_hz < 10.0
     # What the filter takes below the frequency where it is noticed: 2.5 % of N.
     assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.025)

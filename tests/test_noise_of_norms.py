@@ -11,7 +11,7 @@ N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
 
 
 def session(seed, walk, scatter=0.0, poses=POSES):
-    """Norms of poses whose biases walk, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
+    """Norms of poses whose biases are random walks, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
     rng = np.random.default_rng(seed)
     every, length = int((POSE_S + GAP_S) * RATE_HZ), int(POSE_S * RATE_HZ)
     up = rng.standard_normal((poses, 3))

@@ -14,7 +14,7 @@ from trihedron.estimate.noise.poses import noise_of_poses
 RATE = 100.0
 
 
-def session(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, knocks=0, line=0.0, rate=RATE):
+def session(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, impacts=0, line=0.0, rate=RATE):
     """Readings (n,) of one axis and windows of its poses, a second of handling between them."""
     parts, windows, at = [], [], 0
     for k in range(poses):
@@ -27,7 +27,7 @@ def session(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.
         x = x[200:]
         if line:
             x = x + line * np.sin(2 * np.pi * 17.0 * np.arange(n) / rate + rng.uniform(0, 2 * np.pi))
-        if k < knocks:
+        if k < impacts:
             x[n // 2 : n // 2 + 5] += 40 * N * np.sqrt(rate)
         x = x + rng.uniform(-10, 10)
         if step:
@@ -43,7 +43,7 @@ def of(rng, **options):
     return noise_of_poses(readings, RATE, windows)[0]
 
 
-@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "knocks": 2}], ids=str)
+@pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "impacts": 2}], ids=str)
 def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
     rng = np.random.default_rng(71)
     inside = covered = false = 0
@@ -70,7 +70,7 @@ def test_a_filter_shows_its_corner_and_white_noise_none(axes, least):
         inside += axis.corner_hz is not None and axis.corner_hz.lower <= 15.0 <= axis.corner_hz.upper
         plain = of(rng)
         assert plain.corner_hz is None
-        # Nothing below Nyquist, to what twenty holds tell.
+        # Nothing below Nyquist, as far as twenty poses show.
         assert plain.corner_above_hz > 35.0
     # Of 4 at 95 % three or more with probability 0.986, of 10 eight or more with 0.988.
     assert inside >= least
@@ -96,7 +96,7 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)
         both = zip(plain.octaves, lined.octaves, strict=True)
-        # The same noise: what the line's own two numbers a pose take off, of some 70 in its octave.
+        # The same noise: what the line's own two parameters a pose absorb, of some 70 in its octave.
         assert all(abs(np.log(b.density.value / a.density.value)) < 0.1 for a, b in both)
     # Left in, half its square would be 2 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01

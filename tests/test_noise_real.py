@@ -30,7 +30,7 @@ def test_the_white_noise_of_the_adis16405_is_the_published_one(adis):
 def test_what_else_the_adis16405_log_holds_is_found(adis):
     for axis in adis.axes:
         # Its own filter takes half the power at Nyquist; Q is never quoted through it.
-        assert FindingCode.SPECTRUM_COLOURED in codes(axis)
+        assert FindingCode.SPECTRUM_LOW_PASS in codes(axis)
         assert axis.highest_hz < 25.0
         assert axis.terms[TermName.BIAS_INSTABILITY].is_present
     for axis in adis.axes[3:]:
@@ -43,7 +43,7 @@ def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real
     found = allan(replace(whole, **{s: getattr(whole, s)[:72_000] for s in ("time_s", "accelerometer", "gyroscope")}))
     assert FindingCode.REPEATED_ROWS in {finding.code for finding in found.findings}
     for axis in found.axes:
-        assert FindingCode.SPECTRUM_COLOURED in codes(axis)
+        assert FindingCode.SPECTRUM_LOW_PASS in codes(axis)
         # The spectrum falls to 0.4 % by 5 Hz and is flat below 0.15 Hz.
         assert axis.highest_hz < 0.2
         assert not axis.terms[TermName.QUANTISATION].is_present

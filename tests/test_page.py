@@ -34,7 +34,7 @@ def folder():
 
 def write_reports(made):
     """One report of every kind, on simulated logs."""
-    first, second, rest, cal = (str(made / name) for name in ("log.csv", "other.csv", "rest.npz", "cal.json"))
+    first, second, rest, cal = (str(made / name) for name in ("log.csv", "other.csv", "static.npz", "cal.json"))
     for path, n, seed in ((first, 16, 3), (second, 12, 9)):
         motion = hand_session(n_poses=n, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
         write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0], Path(path))
@@ -74,7 +74,7 @@ def axe():
 
 
 class Visit:
-    """A page opened, with everything that it said and asked for."""
+    """A page opened, with everything that it said and requested."""
 
     def __init__(self, browser, path, width, scheme):
         self.said, self.asked = [], []

@@ -102,7 +102,7 @@ def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, pri
 
 
 def test_a_bias_of_a_static_log_is_drawn_over_temperature_with_its_curve_through_it():
-    """Two orientations at temperatures of their own: the biases of each are told about its own mean."""
+    """Two orientations at temperatures of their own: the biases of each are drawn about its own mean."""
     heat = np.concatenate([np.linspace(10.0, 30.0, 300), np.linspace(30.0, 50.0, 300)])
     pose = np.repeat([0, 1], 300)
     apart = heat - heat.mean()

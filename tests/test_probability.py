@@ -8,7 +8,7 @@ from trihedron import probability
 
 DOF = [0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000]
 TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
-# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is what remains.
+# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
 RTOL = 1e-9
 
 

@@ -89,7 +89,7 @@ def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
     ranking = trihedron.rank([known, nameless], log, gravity_m_s2=9.81)
     assert not any(one.is_rejected for one in ranking.candidates)
     one = next(one for one in ranking.candidates if one.maker == "kalibr")
-    assert "holds no bias" in said_of(one)
+    assert "has no bias" in said_of(one)
 
 
 def test_parameters_of_a_board_are_judged_behind_what_it_had_done_to_the_log():

@@ -1,4 +1,4 @@
-"""Every row of a file is a reading or in a finding; what cannot be read right is refused, not read otherwise."""
+"""Every row of a file is a reading or in a finding; what cannot be read right is rejected, not read otherwise."""
 
 import numpy as np
 import pytest
@@ -111,13 +111,13 @@ def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
     counts = np.rint(rng.normal([0, 0, 16384], 20, (2000, 3)))
     table[:, 1:4] = counts * 9.80665 / 16384
     recording = read_recording(write(tmp_path / "log.csv", table))
-    steps = [f for f in recording.findings if f.code is FindingCode.RAW_STEP]
+    steps = [f for f in recording.findings if f.code is FindingCode.RAW_LSB]
     assert [f.severity for f in steps] == [Severity.NOTE]
     assert steps[0].numbers["x_step"] == pytest.approx(9.80665 / 16384, rel=1e-3)
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
     # Fine readings have no step, and whole numbers need no word about theirs.
     fine = np.column_stack([np.arange(2000) / 100, rng.normal([0, 0, 9.8, 0, 0, 0], 0.02, (2000, 6))])
-    assert FindingCode.RAW_STEP not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
+    assert FindingCode.RAW_LSB not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
 
 
 def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tmp_path):

@@ -1,4 +1,4 @@
-"""What cannot be read is refused in one sentence that names the file, the line and the remedy; never a traceback."""
+"""What cannot be read is rejected in one sentence that names the file, the line and the remedy; never a traceback."""
 
 import gzip
 

@@ -50,7 +50,7 @@ def test_the_period_is_right_and_losses_are_counted_where_they_are(law, lost, se
     found = np.flatnonzero(clock.lost_behind > 0)
     assert clock.lost_behind.sum() == lost
     if lost:
-        # Among late timestamps, or steps of one and two coarse ticks, the place is told to a few rows.
+        # Among late timestamps, or steps of one and two coarse ticks, the place is found to a few rows.
         assert np.abs(found - behind).max() <= (0 if law in ("exact", "scattered") else 12)
     kinds = {"exact": TimestampKind.EXACT, "rounded": TimestampKind.ROUNDED, "scattered": TimestampKind.SCATTERED}
     assert clock.kind is kinds.get(law, TimestampKind.LATE)
@@ -72,7 +72,7 @@ def motion(taken_s, seed=5):
 
 
 @pytest.mark.parametrize("law", ["late", "scattered", "rounded"])
-def test_motion_tells_whether_samples_were_taken_evenly_or_when_stamped(tmp_path, law):
+def test_motion_shows_whether_samples_were_taken_evenly_or_when_stamped(tmp_path, law):
     even = T * np.arange(N)
     timestamps = arrival(np.arange(N), law, 2)
     by_clock = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(even)]), HEADER))
@@ -126,7 +126,7 @@ def test_a_sensor_a_little_fast_of_whole_milliseconds_loses_nothing_to_its_stamp
     period = 1.0 / (rate_hz * (1.0 + 1e-6 * ppm))
     tick, behind = numbers(ppm % 7, lost)
     clock = find_even_clock(np.round(0.0021 + period * tick, 3))
-    # Rounding to 1 ms tells the slope of 6000 rows to a part in a million; an alias is off by hundreds and more.
+    # Rounding to 1 ms shows the slope of 6000 rows to a part in a million; an alias is off by hundreds and more.
     assert clock.period_s == pytest.approx(period, rel=1e-4)
     assert clock.kind is not TimestampKind.IRREGULAR
     np.testing.assert_array_equal(np.flatnonzero(clock.lost_behind), behind)

@@ -21,7 +21,7 @@ FUZZ = settings(FEW, max_examples=120)
 
 
 def read_bytes(tmp_path, content: bytes, **options) -> Recording | None:
-    """The recording, or None when it was refused in one sentence. Anything else is a failure of the test."""
+    """The recording, or None when it was rejected in one sentence. Anything else is a failure of the test."""
     path = tmp_path / "fuzz.csv"
     path.write_bytes(content)
     try:
@@ -70,7 +70,7 @@ FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
 def test_what_was_written_is_what_is_read(tmp_path, rows, kind):
     table = np.array(rows)
     if np.any(np.all(table == table[0], axis=0)):
-        return  # A constant channel is refused, and tested to be.
+        return  # A constant channel is rejected, and tested to be.
     names = ["ax", "ay", "az", "gx", "gy", "gz"]
     buffer = io.BytesIO()
     if kind == "npz":

@@ -1,8 +1,11 @@
 """Column names of common loggers mean what they mean there."""
 
+import numpy as np
 import pytest
 
+import trihedron
 from trihedron.read.names import parse_name
+from trihedron.records import FindingCode, Severity
 
 # Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two
 # code points for a micro.
@@ -72,3 +75,31 @@ def test_units_of_other_columns_do_not_hide_their_role():
 def test_raw_readings_rank_above_corrected_ones():
     assert parse_name("gx_measured").rank > parse_name("gx").rank > parse_name("gx_output").rank
     assert parse_name("motionUserAccelerationX(G)").rank < parse_name("accelerometerAccelerationX(G)").rank
+
+
+def log_of(tmp_path, header, change=lambda row: row):
+    """A log of a static sensor under ``header``; ``change`` of the cells of a row."""
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((300, 6))
+    read = noise + np.array([0.1, 0.2, 9.8, 0.01, 0.02, -0.01])
+    rows = [change([f"{0.01 * k:.2f}", *(f"{value:.5f}" for value in row)]) for k, row in enumerate(read)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([header, *(",".join(row) for row in rows)]))
+    return log
+
+
+def test_a_unit_in_the_name_of_one_axis_is_that_of_all_three(tmp_path):
+    read = trihedron.read(log_of(tmp_path, "t [s],ax [m/s^2],ay,az,gx [deg/s],gy,gz"))
+    assert (read.accelerometer_unit.value, read.gyroscope_unit.value) == ("m/s^2", "deg/s")
+    read = trihedron.read(log_of(tmp_path, "t [s],ax,ay,az [m/s^2],gx,gy [deg/s],gz"))
+    assert (read.accelerometer_unit.value, read.gyroscope_unit.value) == ("m/s^2", "deg/s")
+
+
+def test_an_axis_without_numbers_is_named(tmp_path):
+    named = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    read = trihedron.read(log_of(tmp_path, named, lambda row: [*row[:2], "north", *row[3:]]))
+    assert read.accelerometer is None
+    words = next(one for one in read.findings if one.code is FindingCode.COLUMN_LEFT_OUT)
+    assert "'ay [m/s^2]' contains no numbers (such as north), so the accelerometer" in words.seen
+    assert words.severity is Severity.WARNING
+    with pytest.raises(trihedron.RefusedError, match=r"column 'ay' of the accelerometer contains no numbers"):
+        trihedron.read(log_of(tmp_path, "t,ax,ay,az", lambda row: [*row[:2], "north", row[3]]))

@@ -62,7 +62,7 @@ def test_phone_two_clocks_are_merged(real_data):
     assert merged.numbers["lost_rows"] == 0
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
     assert recording.gyroscope_unit is RateUnit.RAD_S
-    # The unit is told by the turns, not guessed.
+    # The unit is recognised by the turns, not guessed.
     assert FindingCode.UNIT_ASSUMED not in codes(recording)
     assert np.isfinite(recording.gyroscope).all()
 
@@ -78,7 +78,7 @@ def test_mpu9150_without_header_or_time(real_data):
     assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
     assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.NOTE
     given = read_recording(path, rate_hz=100)
-    assert codes(given) <= QUIET | {FindingCode.COLUMNS_ASSUMED, FindingCode.RATE_STATED, FindingCode.RAW_STEP}
+    assert codes(given) <= QUIET | {FindingCode.COLUMNS_ASSUMED, FindingCode.RATE_STATED, FindingCode.RAW_LSB}
     # Counts of 9.81/2048 m/s^2 and 2000/32768 deg/s, of which the file's five decimals cut up to a five-hundredth off.
     np.testing.assert_allclose(given.facts.of("accelerometer").step, 9.81 / 2048, rtol=1e-6)
     np.testing.assert_allclose(given.facts.of("gyroscope").step, np.radians(2000 / 32768), rtol=1e-6)
@@ -104,7 +104,7 @@ def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):
     assert 4 < recording.temperature_degc.min() < recording.temperature_degc.max() < 30
     assert set(recording.auxiliary) == {"mx", "my", "mz", "depth_m"}
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    # A bias of 36 deg/s is no gyro's: mrad/s, but asked for.
+    # A bias of 36 deg/s is no gyro's: mrad/s, but as requested.
     assert recording.gyroscope_unit is RateUnit.MRAD_S
     assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
     assert read_recording(path, gyroscope_unit="mrad/s").gyroscope_unit is RateUnit.MRAD_S

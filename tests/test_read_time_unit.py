@@ -10,7 +10,7 @@ from trihedron.records import FindingCode, Severity
 
 
 def log(rate_hz, unit_s, n=3000, poses=False, seed=1, whole=None):
-    """(n, 7) rows of a sensor at rest or in poses of 30 rows, changed within one row or as smoothly as a hand does."""
+    """(n, 7) rows of a static sensor or of poses of 30 rows, changed within one row or as smoothly as a hand does."""
     rng = np.random.default_rng(seed)
     table = np.empty((n, 7))
     table[:, 0] = np.arange(n) / rate_hz / unit_s

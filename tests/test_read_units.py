@@ -1,4 +1,4 @@
-"""Units and column order told by what the readings can only be, and said to be a guess where they are one."""
+"""Units and column order recognised by what the readings can only be, and said to be a guess where they are one."""
 
 import math
 

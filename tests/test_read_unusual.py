@@ -1,4 +1,4 @@
-"""Unusual but legal texts: read whole or refused with what to do, never half, and never with a warning of Python's."""
+"""Unusual but legal texts: read whole or rejected with what to do, never half, and never with a warning of Python's."""
 
 import numpy as np
 import pytest

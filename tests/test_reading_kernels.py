@@ -1,4 +1,4 @@
-"""Kernels of reading and segmenting against slow twins: NumPy and SciPy saying the same in another way."""
+"""Kernels of reading and segmenting against slow counterparts: NumPy and SciPy saying the same in another way."""
 
 import numpy as np
 import pytest

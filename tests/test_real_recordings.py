@@ -130,9 +130,9 @@ def test_ferraris_session_is_calibrated_by_method_one_and_refused_by_method_two(
     np.testing.assert_allclose(S_a, np.array(published["K_a"]) @ np.array(published["R_a"]), atol=1.5e-2)
     np.testing.assert_allclose(b_a, published["b_a"], atol=0.1)
     assert "table-tilt" in codes(document)
-    refused = calibrated(capsys, *common, status=2)
-    assert "not-observable" in codes(refused)
-    advice = next(f for f in refused["findings"] if f["code"] == "not-observable")["action"]
+    rejected = calibrated(capsys, *common, status=2)
+    assert "not-observable" in codes(rejected)
+    advice = next(f for f in rejected["findings"] if f["code"] == "not-observable")["action"]
     assert "calibrate with --method faces, or add poses with (1)" in advice
 
 
@@ -143,7 +143,7 @@ def test_tomi_clips_in_moves_and_agrees_with_the_published_scales(real_data, cap
     published = [0.00060201, 0.00059684, 0.00058592]
     np.testing.assert_allclose(np.diag(document["accelerometer"]["S"]), published, rtol=0.01)
     gyroscope = np.diag(document["gyroscope"]["S"])
-    # Axis 1 clipped.
+    # X clipped.
     np.testing.assert_allclose(gyroscope[1:], [0.00013292, 0.00013394], rtol=0.01)
 
 

@@ -1,4 +1,4 @@
-"""A log held against known motion: what the reference says, how sure it is, and what it refuses."""
+"""A log held against known motion: what the reference says, how sure it is, and what it rejects."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(
 
 
 def fine_unit(seed, earth=None):
-    """A gyro that tells the Earth's rate before a tracker of a hundredth of a degree."""
+    """A gyro that shows the Earth's rate before a tracker of a hundredth of a degree."""
     return tracked(seed, 40, 0.005, earth=earth, is_fine=True, gyro_noise=5e-4)
 
 
@@ -185,19 +185,19 @@ def neighbour(seed, seconds):
 
 
 def test_two_rigidly_joined_units_show_how_they_are_joined():
-    """Rotation and lever arm between them; and without being told, each notices the other."""
+    """Rotation and lever arm between them; and without being given, each notices the other."""
     trial, other = tracked(41, seconds=20, has_path=True), neighbour(41, 20)
     found = trihedron.diagnose(trial.log, reference=other, gravity_m_s2=G).reference
     assert found.kind == "the log of another unit"
     assert np.all(np.abs(found.lever_arm.value - trial.arm) < np.maximum(4.5 * found.lever_arm.std, 1e-3))
-    # Nine numbers of S whose zero, unlike the tracker's, is the other unit's too.
+    # Nine parameters of S whose bias, unlike the tracker's, is the other unit's too.
     assert np.linalg.norm(z_of(found, trial)[:9]) < 4.5 * 3.0
     assert shared_log(trial.log, other, G) is not None
     assert shared_log(trial.log, neighbour(42, 20), G) is None
 
 
 def test_a_simulation_moved_as_the_log_was_is_a_model_first_and_a_reference_besides():
-    """A bias that the twin has as well is no turning in its poses: they are poses, and carry the comparison."""
+    """A bias that the other unit has as well is no turning in its poses: they are poses, and carry the comparison."""
     motion = hand_session(n_poses=9, pose_s=2.0, first_pose_s=4.0)
     log, _ = trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 5)
     log = replace(log, gyroscope=log.gyroscope + np.array([0.02, -0.03, 0.025]) * np.abs(log.gyroscope).std())
@@ -263,7 +263,7 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
 
 
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():
-    # Four fifths at rest, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
+    # Four fifths are static, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
     trial = tracked(4, 60, sigma_deg=0.2, rest_s=24.0)
     assert np.abs(z_of(fit_reference(trial.log, trial.motion, G), trial)).max() < 4.5
     with pytest.raises(ValueError, match="share no motion"):
@@ -278,12 +278,12 @@ def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_sam
         x = np.exp(1j * w * step * np.arange(n))
         ratio = windows.of(windows.curvature, x.real) + 1j * windows.of(windows.curvature, x.imag)
         ratio = ratio / (windows.of(windows.weight, x.real) + 1j * windows.of(windows.weight, x.imag))
-        # What is left is of fourth order: (ωT)⁴/240 by the next term of the series, times four for the others.
+        # The residual is of fourth order: (ωT)⁴/240 by the next term of the series, times four for the others.
         assert np.allclose(ratio / -(w**2), 1.0, atol=4.0 * (w * step) ** 4 / 240.0 + 1e-9)
 
 
 def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own(posed, found):
-    # The unit of this seed again, for twelve seconds: by itself it tells less than the first.
+    # The unit of this seed again, for twelve seconds: by itself it shows less than the first.
     more = tracked(3, seconds=12)
     result = trihedron.calibrate_references(
         [posed.log, more.log], [posed.motion, more.motion], gravity_m_s2=G, frame="case"

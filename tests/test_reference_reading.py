@@ -1,4 +1,4 @@
-"""References as files: what their columns are, and one sentence where nothing tells."""
+"""References as files: what their columns are, and one sentence where nothing states it."""
 
 import numpy as np
 import pytest

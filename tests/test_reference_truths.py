@@ -1,4 +1,4 @@
-"""Truths that wander beside walks, flights and robots: nothing sound is refused, and what is said is covered."""
+"""Truths that drift beside walks, flights and robots: nothing sound is rejected, and what is said is covered."""
 
 from dataclasses import replace
 
@@ -20,14 +20,14 @@ def z_of_bias(found, trial):
 
 def test_a_sound_truth_is_not_refused_for_the_filters_rounding():
     # The strengths' search passes by a white error of nothing beside slow ones: rounding was all that was left of a
-    # variance, and every third walk was refused.
+    # variance, and every third walk was rejected.
     trial = truth(6, "walk", has_path=True)
     found = fit_reference(trial.log, trial.motion, G)
     assert np.abs(z_of_bias(found, trial)).max() < 4.5
 
 
 def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
-    # It leans into its acceleration: its accelerometer's numbers are not told, and what its gyro feels still is.
+    # It leans into its acceleration: its accelerometer's parameters are not stated, and what its gyro feels still is.
     trial = truth(4, "drone", seconds=60, has_g_sensitivity=True, size_deg=0.1)
     found = fit_reference(trial.log, trial.motion, G)
     one = found.effects["gyro-g-sensitivity"]
@@ -73,7 +73,7 @@ def test_stretches_of_even_flight_are_no_poses(real_data):
 
 
 def test_a_truth_that_wanders_in_the_body_leaves_the_accelerometer_within_its_uncertainty():
-    # The gyro tells how the truth's error of 0.85° changes, and no motion tells its mean: that turns both sensors.
+    # The gyro shows how the truth's error of 0.85° changes, and no motion shows its mean: that turns both sensors.
     trial = truth(1006, "walk", has_path=True)
     found = fit_reference(trial.log, trial.motion, G)
     S = np.linalg.inv(trial.unit.N)

@@ -54,11 +54,11 @@ def right(folder, recording, result, tmp_path_factory):
         "demo": {"folder": place / "demo"},
         "export": {"calibration": result, "target": "c"},
         "extend": {"result": result},
-        "filter_noise": {"recording": folder / "rest.csv"},
+        "filter_noise": {"recording": folder / "static.csv"},
         "fleet": {"logs": [folder / "log.csv"], "out": place / "fleet"},
         "identify_noise": {"x": x, "rate_hz": 100.0},
         "integrate_rate": {"time_s": np.arange(50) / 100, "rate": np.zeros((50, 3))},
-        "allan": {"recording": folder / "rest.csv"},
+        "allan": {"recording": folder / "static.csv"},
         "plan": {},
         "plot": {"result": result},
         "ports": {},
@@ -140,7 +140,7 @@ def wrong_for(name, annotation):
     return [*values, *([-3] if name in ALSO_NEGATIVE else []), *([0] if name in ALSO_ZERO else [])]
 
 
-def refused(what, ask):
+def rejected(what, ask):
     """That a call ends in one sentence of ours, raised by us."""
     try:
         ask()
@@ -167,18 +167,18 @@ def test_every_wrong_argument_of_every_verb_is_one_sentence_of_ours(right, verb,
     ask = getattr(trihedron, verb)
     parameter = inspect.signature(ask).parameters[name]
     if parameter.kind is inspect.Parameter.VAR_KEYWORD:
-        refused(f"{verb}(nonsense=1)", lambda: ask("log.csv", "x.csv", nonsense=1))
-        refused(f"{verb}(rate_hz='x')", lambda: ask("log.csv", "x.csv", rate_hz="x"))
+        rejected(f"{verb}(nonsense=1)", lambda: ask("log.csv", "x.csv", nonsense=1))
+        rejected(f"{verb}(rate_hz='x')", lambda: ask("log.csv", "x.csv", rate_hz="x"))
         return
     for value in wrong_for(name, str(parameter.annotation)):
         arguments = {**right[verb], name: value}
-        refused(f"{verb}({name}={value!r:.60})", lambda ask=ask, arguments=arguments: ask(**arguments))
+        rejected(f"{verb}({name}={value!r:.60})", lambda ask=ask, arguments=arguments: ask(**arguments))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_or_a_missing_argument_is_a_sentence():
     for verb in verbs():
-        refused(verb, lambda verb=verb: getattr(trihedron, verb)(nonsense=1))
+        rejected(verb, lambda verb=verb: getattr(trihedron, verb)(nonsense=1))
 
 
 @pytest.mark.parametrize("kind", ["Calibration", "Diagnosis", "Finding", "Recording", "Segments"])
@@ -196,7 +196,7 @@ def test_a_record_made_by_hand_is_checked_where_it_is_made(kind, results):
             if name in ("extensions", "noise", "references", "numbers", "auxiliary") and isinstance(value, dict):
                 continue
             arguments = values | {name: value}
-            refused(f"{kind}({name}={value!r:.40})", lambda a=arguments: getattr(trihedron, kind)(**a))
+            rejected(f"{kind}({name}={value!r:.40})", lambda a=arguments: getattr(trihedron, kind)(**a))
 
 
 def test_a_recording_of_arrays_and_a_sensor_are_checked():
@@ -209,17 +209,17 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
         *({"temperature_degc": value} for value in ("x", acc, t[:5], t * 1j)),
     ):
         arguments = {"time_s": t, "accelerometer": acc} | change
-        refused(f"from_arrays({change})", lambda a=arguments: trihedron.Recording.from_arrays(**a))
+        rejected(f"from_arrays({change})", lambda a=arguments: trihedron.Recording.from_arrays(**a))
     good = {"S": np.eye(3), "b": np.zeros(3), "covariance": np.zeros((12, 12)), "raw_unit": "g", "si_unit": "m/s^2"}
     for name in good:
         for value in (object(), 3, [["a"]], np.zeros((5, 5)), np.eye(3) * np.nan, np.eye(3) * 1j, None):
             arguments = good | {"method": "given", name: value}
-            refused(f"SensorCalibration({name}={value!r:.40})", lambda a=arguments: SensorCalibration(**a))
+            rejected(f"SensorCalibration({name}={value!r:.40})", lambda a=arguments: SensorCalibration(**a))
 
 
 @pytest.fixture(scope="module")
 def results(folder, recording, result):
-    rest = folder / "rest.csv"
+    rest = folder / "static.csv"
     x = np.random.default_rng(0).normal(size=(2000, 2))
     return {
         "read": recording,

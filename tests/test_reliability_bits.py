@@ -17,7 +17,7 @@ THREADED_ROWS = 20_000
 WORDS = {
     "calibrate": ["calibrate", "log.csv", "--gravity", G, "--json", "OUT"],
     "diagnose": ["diagnose", "log.csv", "--gravity", G, "--json", "OUT"],
-    "allan": ["allan", "rest.csv", "--json", "OUT"],
+    "allan": ["allan", "static.csv", "--json", "OUT"],
     "simulate": ["simulate", "s.toml", "--seed", "7", "-o", "OUT"],
 }
 LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS", "POLARS_MAX_THREADS")

@@ -1,4 +1,4 @@
-"""Whatever lies behind the name of an input, a command ends in a sentence; a forked child computes or says why not."""
+"""Whatever lies behind the name of an input, a command ends in a sentence; a child by fork computes or says why not."""
 
 import contextlib
 import gzip

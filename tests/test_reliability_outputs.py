@@ -26,8 +26,8 @@ OUTPUTS = {
     "check": [["check", "log.csv", "--json"], ["check", "log.csv", "--report"]],
     "segment": [["segment", "log.csv", "--json"], ["segment", "log.csv", "--report"]],
     "calibrate": [["calibrate", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
-    "allan": [["allan", "rest.csv", flag] for flag in ("--json", "--csv", "--plot", "--report")],
-    "noise": [["noise", "rest.csv", flag] for flag in ("--json", "--report")],
+    "allan": [["allan", "static.csv", flag] for flag in ("--json", "--csv", "--plot", "--report")],
+    "noise": [["noise", "static.csv", flag] for flag in ("--json", "--report")],
     "kalman": [["kalman", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
     "verify": [["verify", "c.json", "log.csv", flag] for flag in ("--json", "--report")],
     "diagnose": [["diagnose", "log.csv", *WHOLE, flag] for flag in ("--json", "--report")],
@@ -211,7 +211,7 @@ def test_kill_9_at_any_instant_leaves_the_old_output_or_the_new_one(session):
 
 
 def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
-    # A limit on the size of files stands for the disk: no permission to mount one is needed.
+    # A limit on the size of files represents the disk: no permission to mount one is needed.
     target = session / "out.csv"
     quietly("convert", str(session / "log.csv"), "-o", str(target))
     whole = target.read_bytes()

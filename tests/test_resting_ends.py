@@ -1,4 +1,4 @@
-"""A coarse gyro's bias inside its step, told by moves: what stands still at their ends says nothing of it."""
+"""A coarse gyro's bias inside its LSB, recognised by moves: what stands still at their ends says nothing of it."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ LAWS = {
 
 @pytest.mark.parametrize("law", LAWS)
 def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_left(law):
-    """Sum of rate - (code at rest) over an end, both ways: the bias times what is not still, to first order."""
+    """Sum of rate - (code static) over an end, both ways: the bias times what is not still, to first order."""
     n, zero, lasted, told = np.arange(200.0), 0.1, 0.0, 0.0
     for way in (1.0, -1.0):
         for scale in np.linspace(20.0, 40.0, 41):
@@ -32,7 +32,7 @@ def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_lef
             told += np.sum(codes - rate)
             lasted += np.count_nonzero(~still[:, 0])
             assert not still[:5, 0].any()
-    # The mean over the ways; 200 readings all along would tell a bias a fifth to four fifths too small.
+    # The mean over the ways; 200 readings all along would show a bias a fifth to four fifths too small.
     assert told / lasted == pytest.approx(zero, rel=0.15)
 
 
@@ -61,6 +61,6 @@ def test_an_axis_that_turns_slowly_beside_a_quick_one_is_as_still_as_itself_show
         rate *= rng.uniform(0.8, 1.25, 3)
         codes = np.round(rate + place)
         told.append(np.sum(np.where(still_of(codes, 0, 260), -rate, codes - rate - place), axis=0))
-    # Readings in which the place still acts, of 260, known to 1 and to 1.4 on the slowest axis. With the quickest axis'
+    # Readings in which the place still acts, of 260, ± 1, ± 1.4 on the slowest axis. With the quickest axis'
     # stillness for all it acted for 10, 13 and 19 of them.
     assert np.abs(np.array(told).T @ places / (places @ places)).max() < 5.0

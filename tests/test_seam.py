@@ -1,4 +1,4 @@
-"""The seam: whatever arrives, a kernel answers or refuses in words; how an array lies in memory changes nothing."""
+"""The seam: whatever arrives, a kernel answers or rejects in words; how an array lies in memory changes nothing."""
 
 import ast
 import inspect
@@ -162,8 +162,8 @@ def test_any_arguments_are_answered_or_refused_in_words(name, trials):
                 continue
         try:
             target(*positional, **named)
-        except REFUSALS as refusal:
-            sentence = str(refusal)
+        except REFUSALS as rejection:
+            sentence = str(rejection)
             assert sentence
 
 
@@ -210,7 +210,7 @@ def test_how_an_array_lies_in_memory_changes_nothing_and_nothing_is_written_to_i
             got = flat(getattr(_core, name)(*call[:i], other, *call[i + 1 :]))
             for a, b in zip(got, expected, strict=True):
                 np.testing.assert_array_equal(a, b)
-    # Another number of columns is refused with the shape.
+    # Another number of columns is rejected with the shape.
     i = next(i for i, one in enumerate(call) if getattr(one, "ndim", 0) > 1)
     with pytest.raises(ValueError, match=r"shape|columns|\(n, 3"):
         getattr(_core, name)(*call[:i], call[i][..., :2], *call[i + 1 :])

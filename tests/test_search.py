@@ -116,7 +116,7 @@ def test_white_noise_has_no_colour_and_a_zero_that_jumps_in_some_poses_is_bounde
     for _ in range(100):
         halves = rng.normal(size=(40, 3)) * 2.0 * sigma
         assert coloured_variance(sigma, halves, density, lasts, np.array([move_s])) == pytest.approx(0.0, abs=1e-12)
-        # Error bars four times as wide because a quarter of the poses jumped: the quiet ones bound what is slow noise.
+        # Uncertainty four times as wide: a quarter of the poses jumped; the quiet ones bound what is slow noise.
         jumping = np.where(rng.random((40, 1)) < 0.25, 12.0 * sigma, 0.0)
         slow.append(coloured_variance(4.0 * sigma, halves + jumping, density, lasts, np.array([move_s])))
     as_error_bars_say = (4.0**2 - 1.0) * move_s * 0.1**2
@@ -125,7 +125,7 @@ def test_white_noise_has_no_colour_and_a_zero_that_jumps_in_some_poses_is_bounde
 
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
     recording, truth = simulated("gyro-scale-nonlinearity", 3, 16, c3=(3e-3, -3e-3, 3e-3))
-    # The gyro's zero is another in every pose.
+    # The gyro's bias is another in every pose.
     rng, zero = np.random.default_rng(3), np.zeros_like(recording.gyroscope)
     starts = [part.start for part in truth.segments if part.kind == "pose"]
     for start, stop in zip(starts, [*starts[1:], len(zero)], strict=True):

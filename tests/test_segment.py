@@ -1,4 +1,4 @@
-"""Still poses and moves found in simulated sessions, against the truth."""
+"""Poses and moves found in simulated sessions, against the truth."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Edges of poses, means over ranges and moments of moves: kernels of the core against NumPy twins."""
+"""Edges of poses, means over ranges and moments of moves: kernels of the core against NumPy counterparts."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_means_over_ranges_pass_over_what_is_no_number():
     ranges, owner = np.array([[0, 10], [10, 10], [20, 30], [30, 35], [40, 50]]), np.array([1, 0, 1, 2, 4])
     found = _core.column_means(values, ranges, owner, 5)
     for k, rows in ((1, np.vstack([values[:10], values[20:30]])), (4, values[40:])):
-        # Twenty numbers in the order of the twin.
+        # Twenty numbers in the order of the counterpart.
         np.testing.assert_allclose(found[k], np.nanmean(rows, axis=0), rtol=1e-14)
     assert np.isnan(found[[0, 3]]).all()
     assert np.isnan(found[2]).tolist() == [False, False, True, False]

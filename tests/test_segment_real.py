@@ -1,4 +1,4 @@
-"""Still poses in real recordings: how many there are, and that violent motion is none."""
+"""Poses in real recordings: how many there are, and that violent motion is none."""
 
 import json
 

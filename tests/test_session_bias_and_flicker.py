@@ -1,4 +1,4 @@
-"""One zero of the accelerometer for a session, and how far 1/f noise carries it from pose to pose."""
+"""One bias of the accelerometer for a session, and how far 1/f noise carries it from pose to pose."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ UP = np.tile([0.6, 0.0, 0.8], (POSES, 1))
 
 
 def test_the_zero_of_a_session_is_that_of_its_middle():
-    # A zero that drifts by 60 mm/s² over the session: the first pose's is 30 mm/s² from that of the middle.
+    # A bias that drifts by 60 mm/s² over the session: the first pose's is 30 mm/s² from that of the middle.
     drift = 0.06
     away = []
     for seed in range(3):
@@ -68,7 +68,7 @@ def test_flicker_inside_poses_says_how_far_zeros_scatter_between_them():
         said.append(expected_scatter(readings, spans, UP))
         means, _ = _core.means_by_owner(slow, spans, np.arange(POSES), POSES)
         true.append(np.std(means @ UP[0], ddof=1))
-    # Eighteen differences of halves tell a size to 17 %; in 60 sessions one standard error of the mean ratio is 3 %.
+    # Eighteen differences of halves show a size to 17 %; in 60 sessions one standard error of the mean ratio is 3 %.
     assert 0.8 < np.sqrt(np.mean(np.square(said))) / np.sqrt(np.mean(np.square(true))) < 1.25
     # Halves differ by 2.2 times what eighths lead to expect; fewer than a sixth of eighteen come out below 1.3.
     assert np.mean(np.array(said) > 0.0) > 0.7

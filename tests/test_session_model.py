@@ -123,7 +123,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
 
 
 def test_moves_that_are_believed_less_cost_their_normalisation():
-    """What moves miss is explained by an effect or by less belief in them: the likelihood has to pay for the latter."""
+    """What moves miss is explained by an effect or by less belief in them: the likelihood must weigh the latter."""
     recording, truth = session_of(3, 12)
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     core = fitted.core

@@ -22,7 +22,7 @@ UNIT = Instrument()
 
 @pytest.fixture(scope="module")
 def four_sessions():
-    """One unit on four days; on the third its gyro zero is 0.01 rad/s away, ten times its error."""
+    """One unit on four days; on the third its gyro bias is 0.01 rad/s away, ten times its error."""
     units = [UNIT, UNIT, UNIT.moved(b_g=[0.01, 0.0, 0.0]), UNIT]
     return [recorded(unit, seed) for seed, unit in enumerate(units, 1)]
 

@@ -322,7 +322,7 @@ def test_scattered_zeros_are_constant_in_a_pose_and_drawn_anew_after_a_move(effe
     poses = [added[s.start : s.stop] for s in truth.segments if s.kind == "pose"]
     assert max(np.ptp(part, axis=0).max() for part in poses) < 1e-12
     zeros = np.array([part[0] for part in poses])
-    # 40 draws: their deviation is known to 11 %; four of these.
+    # 40 draws: their deviation is uncertain by 11 %; four of these.
     assert np.all(np.abs(np.log(zeros.std(axis=0) / sigma)) < 0.45)
     assert np.abs(np.diff(added, axis=0)).max() < 0.02  # goes over within the move, no step
     assert truth.effects[effect_id]["sigma"] == tuple(sigma)

@@ -86,7 +86,7 @@ def test_specific_force_integrates_to_the_travel_within_1e_9():
     w = np.tile(0.5 * h * weights, n)
     q, _, _, f = plan.evaluate(t, G)
     acceleration = np.einsum("nij,nj->ni", matrix(q), f) - [0, 0, G]
-    assert np.abs(w @ acceleration).max() < 1e-9  # at rest again
+    assert np.abs(w @ acceleration).max() < 1e-9  # static again
     shift = (w * (1.7 - t)) @ acceleration
     ends, *_ = plan.evaluate(np.array([0.0, 1.8]), G)
     first, last = matrix(ends)

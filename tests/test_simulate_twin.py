@@ -1,4 +1,4 @@
-"""A twin repeats its original: pose means, moves, timestamps, noise spectrum, ADC."""
+"""A digital twin repeats its original: pose means, moves, timestamps, noise spectrum, ADC."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def compare(recording, gravity):
     return segments, calibration, copy, truth
 
 
-# Spectra within these factors, octave by octave: a twin has three numbers per axis for its noise.
+# Spectra within these factors, octave by octave: a digital twin has three numbers per axis for its noise.
 @pytest.mark.parametrize(
     ("which", "gravity", "accel_factor", "gyro_factor"),
     [("xsens_mti", 9.81744, 1.6, 1.4), pytest.param("mpu9150", 9.81, 2.0, 3.0, marks=pytest.mark.slow)],

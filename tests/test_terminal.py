@@ -62,7 +62,7 @@ def coloured():
     cause, action = "A low-pass filter in the sensor.", "All terms are quoted from below."
     findings = [
         Finding(
-            FindingCode.SPECTRUM_COLOURED, Severity.WARNING, f"{axis}: Above {hz} Hz the spectrum falls.", cause, action
+            FindingCode.SPECTRUM_LOW_PASS, Severity.WARNING, f"{axis}: Above {hz} Hz the spectrum falls.", cause, action
         )
         for axis, hz in (("gyro x", 8.84), ("gyro y", 12.5), ("accel x", 8.84))
     ]

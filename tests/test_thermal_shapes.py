@@ -24,7 +24,7 @@ def on_axes(values):
         (np.full(50, 0.01), 10, ["linear", "quadratic"]),
         (np.linspace(0.02, 0.001, 50), 10, ["linear", "quadratic", "rate"]),
         (np.repeat([0.04, -0.04], 25), 10, ["linear", "quadratic", "rate", "hysteresis"]),
-        # Taken off another log every shape exists.
+        # Subtracted from another log, every shape exists.
         (np.full(50, 0.01), 0, ["linear", "quadratic", "rate", "hysteresis"]),
     ],
 )

@@ -90,7 +90,7 @@ def test_the_uncertainty_of_the_speed_is_in_every_scale(table):
         recording, segments=segments, gravity_m_s2=G, turntable_deg_s=said, turntable_sigma=0.002
     ).gyroscope
     assert np.abs((gyro.S - truth.S_w) / gyro.sigma_S).max() < 4.0
-    # Two parts in a thousand beside one in ten thousand from the moves: the table tells what axes have to each other.
+    # Two parts in a thousand beside one in ten thousand from the moves: the table shows what axes have to each other.
     assert np.diag(gyro.sigma_S / gyro.S).min() > 5e-5
 
 

@@ -40,7 +40,7 @@ def settling_log(rng, n=16, settles_rad=1.5e-3):
 def test_error_along_the_vertical_is_the_noise_alone_where_poses_settle():
     white = NOISE / np.sqrt(POSE_S * RATE_HZ)
     found = [trihedron.segment(settling_log(np.random.default_rng(seed))) for seed in range(5)]
-    # Settling by 15 mm/s² shows on the axes. Along the vertical the law of 16 poses is known to 10 %, but one session
+    # Settling by 15 mm/s² shows on the axes. Along the vertical the relation of 16 poses is ± 10 %, but one session
     # in thirty looks like flicker and counts twice: the middle one of five.
     assert min(np.median(one.accelerometer_sigma_mean) for one in found) > 2.0 * white
     along = [np.median(one.accelerometer_sigma_up) for one in found]

@@ -19,7 +19,7 @@ SIGMA = 0.02
 
 
 def poses(seed, n_poses, amplitude, colour=0.0):
-    """Still poses of one accelerometer, every second one shaken by a line that is half a cycle short of whole."""
+    """Poses of one accelerometer, every second one shaken by a line that is half a cycle short of whole."""
     rng = np.random.default_rng(seed)
     lengths = rng.integers(120, 700, n_poses)
     edges = np.concatenate([[0], np.cumsum(lengths)])
@@ -54,7 +54,7 @@ def test_a_line_neither_biases_a_mean_nor_widens_its_error():
     plain = (segments.accelerometer_mean - truth)[shaken] / white[shaken]
     z = ((found.accelerometer_mean - truth) / found.accelerometer_sigma_mean)[shaken]
     assert plain.std() > 3.0
-    # 120 normal numbers: their spread is known to 6.5 %, three times that; 1.96 leaves out 6 of them, 13 once in 200.
+    # 120 normal numbers: their spread is ± 6.5 %, three times that; 1.96 leaves out 6 of them, 13 once in 200.
     assert 0.8 < z.std() < 1.2
     assert (np.abs(z) > 1.96).sum() <= 13
     # A constant beside a sinusoid of eight cycles or more is known as well as alone, to a few per cent.

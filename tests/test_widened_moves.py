@@ -41,13 +41,13 @@ def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, sol
     assert solution.inflation[0] > 10.0
     assert solution.inflation[1] == pytest.approx(NO_WEIGHT)
     domain, leverage = solution.core.labels[:, 0], solution.core.leverage()
-    # Widened along with gravity, as one error common to both, velocities told six of the gyro's nine numbers.
+    # Widened along with gravity, as one error common to both, velocities showed six of the gyro's nine parameters.
     assert leverage[domain == DYNAMICS].sum() < 0.1
     assert leverage[domain == MOVES].sum() > 8.9
     # Moves count as uncertain as they miss, not a third less; a likeliest excess counts rows, χ² degrees of freedom.
     assert solution.moves_chi2 / solution.inflation[0] ** 2 / solution.moves_dof < 1.2
     z = (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
-    # 5.1 and 3.8 before; nine numbers of one session are within 3.5 in all but one of two hundred sessions.
+    # 5.1 and 3.8 before; nine parameters of one session are within 3.5 in all but one of two hundred sessions.
     assert np.abs(z).max() < 3.5
 
 
@@ -87,7 +87,7 @@ def test_smooth_motion_is_not_fast_because_samples_between_are_missing():
 
 @pytest.mark.parametrize(("usual", "far"), [(1.0, 6.5), (30.0, 195.0)])
 def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(usual, far):
-    """In phone rec_3 one of fifteen missed by nine standard errors and widened the others by 2.5."""
+    """In phone rec_3 one of fifteen was off by nine standard errors and widened the others by 2.5."""
     rng = np.random.default_rng(8)
     n = 15
     rows = usual * rng.standard_normal((n, 2))
@@ -104,7 +104,7 @@ def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(
 
 
 def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
-    """Nine lengths of gravity tell no scatter of the bias from none: moves that are not bent do."""
+    """Nine lengths of gravity separate no spread of the bias from none: moves that are not bent do."""
     scores = []
     for seed in range(6):
         f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)

@@ -12,7 +12,7 @@ ARTICLE_CONSTANTS = np.array(
         [-0.00033471, -0.0017407, -0.032812, -2.3423],
     ]
 ) / [GRAVITY, GRAVITY, GRAVITY, 1.0]
-"""Published constants of the article, V/(m/s²) and V, rows x, y, z."""
+"""Published constants of the article, V/(m/s²) and V, rows X, Y, Z."""
 
 
 def covariance_of_pose_means(start, pose, *, white=0.0, quantisation=0.0, walk=0.0, slope=0.0, gauss_markov=()):

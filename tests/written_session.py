@@ -1,4 +1,4 @@
-"""A session as people write it to a file, its calibration, and the one sentence with which a command refuses."""
+"""A session as people write it to a file, its calibration, and the one sentence with which a command rejects."""
 
 from dataclasses import replace
 
@@ -35,8 +35,8 @@ def session(tmp_path_factory, recording):
     return folder
 
 
-def refused(capsys, *arguments):
-    """The one sentence with which a command refuses."""
+def rejected(capsys, *arguments):
+    """The one sentence with which a command rejects."""
     status = main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     assert status == 1, (status, err)
@@ -49,6 +49,6 @@ def refused(capsys, *arguments):
     return lines[0]
 
 
-def refused_only(capsys, *arguments):
+def rejected_only(capsys, *arguments):
     capsys.readouterr()
-    return refused(capsys, *arguments)
+    return rejected(capsys, *arguments)

@@ -115,8 +115,8 @@ def _motion(of, rng):
             tau = rng.uniform(0.15, 0.4)
             w = rng.normal(size=3) * 0.15 * DEG / tau * np.exp(-t / tau)
         if k == bumped:
-            knock = np.exp(-0.5 * ((t - 0.5 * n * dt) / 0.04) ** 2)
-            w, a = w + 0.15 * DEG / 0.1 * rng.normal(size=3) * knock, a + 0.8 * rng.normal(size=3) * knock
+            impact = np.exp(-0.5 * ((t - 0.5 * n * dt) / 0.04) ** 2)
+            w, a = w + 0.15 * DEG / 0.1 * rng.normal(size=3) * impact, a + 0.8 * rng.normal(size=3) * impact
         add(w, a, True)
     w, a = np.vstack(rates), np.vstack(pushes) + np.array([0.0, 0.0, G])
     # At the middle of each step, as the rates are: half a step apart is a delay between the sensors.

@@ -141,7 +141,7 @@ def noise(rng, N, V, K, throttle):
 
 def of_noise(N, V, K, h):
     """Mean squares over a horizon of the three axes together."""
-    return {"rest": 3 * N**2 * h, "vibration": 3 * V**2 * h, "bias": K**2 * h**3}
+    return {"static": 3 * N**2 * h, "vibration": 3 * V**2 * h, "bias": K**2 * h**3}
 
 
 def moved(rng, n):

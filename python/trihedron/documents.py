@@ -33,7 +33,7 @@ class DocumentError(RefusedError):
 def read_text(path: str | os.PathLike[str], what: str) -> str:
     """The text of a plain file of limited size; ``what`` it should be ("calibration file") is for error messages.
 
-    Refused when there is no such file, it is no plain file, too large, unreadable, or not text.
+    Raises ``RefusedError`` when there is no such file, it is no plain file, too large, unreadable, or not text.
     """
     try:
         # Non-blocking: opening a pipe without a writer would block.
@@ -63,25 +63,25 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
         raise DocumentError(f"this is not a {what} (not text); check the name.") from None
 
 
-def read_json(path: str | os.PathLike[str], what: str, meant: str, refusal: type[RefusedError]) -> Any:
+def read_json(path: str | os.PathLike[str], what: str, meant: str, rejection: type[RefusedError]) -> Any:
     """The JSON of a file that should be ``what``; ``meant`` describes the expected file in the error message.
 
-    Raises ``refusal`` in place of the errors of :func:`read_text` and :func:`parse_json`.
+    Raises ``rejection`` in place of the errors of :func:`read_text` and :func:`parse_json`.
     """
     try:
         text = read_text(path, what)
     except DocumentError as error:
-        raise refusal(of_path(path, error)) from None
+        raise rejection(of_path(path, error)) from None
     try:
         return parse_json(text)
     except DocumentError as error:
-        raise refusal(f"{Path(path)}: {error}; {meant}.") from None
+        raise rejection(f"{Path(path)}: {error}; {meant}.") from None
 
 
 def parse_json(text: str) -> Any:
     """JSON with finite numbers, limited depth and unique keys.
 
-    Refused when it is not; the message gives the line of a syntax error.
+    Raises ``RefusedError`` when it is not; the message gives the line of a syntax error.
     """
     try:
         document = json.loads(
@@ -100,7 +100,7 @@ def parse_json(text: str) -> Any:
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML of limited depth, with numbers that fit into a float.
 
-    Refused when it is not; the message gives the line of a syntax error.
+    Raises ``RefusedError`` when it is not; the message gives the line of a syntax error.
     """
     try:
         table = tomllib.loads(text)
@@ -116,7 +116,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 def check_values(document: Any) -> None:
     """Check the values of a parsed document, of any notation.
 
-    Refused for nesting that is too deep, and integers that do not fit into a float.
+    Raises ``RefusedError`` for nesting that is too deep, and integers that do not fit into a float.
     """
     level = [document]
     for _ in range(MOST_DEPTH):

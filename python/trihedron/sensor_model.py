@@ -34,7 +34,7 @@ def distort(truth: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Direct form → inverse form, or back: ``(S⁻¹, -S⁻¹ b)`` (eq. 3). Refused when S is singular."""
+    """Direct form → inverse form, or back: ``(S⁻¹, -S⁻¹ b)`` (eq. 3). Raises ``RefusedError`` when S is singular."""
     S = np.asarray(S, dtype=np.float64)
     if np.linalg.cond(S) > 1e12:
         raise RefusedError("S is singular: two sensor axes are parallel, or one has no scale")
@@ -93,7 +93,7 @@ def reframing(S: FloatArray, b: FloatArray, frame: Frame) -> Reframing:
     ``case``: the identity. Where ``det S < 0`` the sign stays on the diagonal: R is the proper rotation nearest to the
     identity.
 
-    Refused when S is singular.
+    Raises ``RefusedError`` when S is singular.
     """
     S = np.asarray(S, dtype=np.float64)
     b = np.asarray(b, dtype=np.float64)
@@ -154,7 +154,8 @@ def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibratio
 def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
     """Both sensors in another frame; the uncertainty of the accelerometer's axes also rotates the gyro's (eq. 6).
 
-    Refused when the accelerometer's S is singular, or ``frame`` is ``case``, which poses do not determine.
+    Raises ``RefusedError`` when the accelerometer's S is singular, or ``frame`` is ``case``, which poses do not
+    determine.
     """
     if frame == calibration.frame:
         return calibration

@@ -16,7 +16,7 @@ PATIENCE_S = 2.0
 """Time limit of the trial: milliseconds where polars works, a hundred times as long on a loaded machine."""
 
 SENTENCE = (
-    "this process was forked from one that had already read or written a table, and the library behind tables does not "
+    "this process is a fork of one that had already read or written a table, and the library behind tables does not "
     'outlive a fork: start workers with multiprocessing.get_context("spawn") (or "forkserver"), or read in the parent '
     "and hand recordings to them"
 )
@@ -34,7 +34,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def check_tables() -> None:
-    """Refuse to go on in a forked child in which polars would block for ever."""
+    """Error in a child process made by fork, in which polars would block forever."""
     global _is_doubtful
     if not _is_doubtful:
         return

@@ -82,13 +82,19 @@ def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | R
 
 
 def rate_lsb_to_si(text: str) -> float:
-    """LSB of a gyro, as in ``0.05 deg/s``, in rad/s. Refused when it is not a positive number and a unit."""
+    """LSB of a gyro, as in ``0.05 deg/s``, in rad/s.
+
+    Raises ``RefusedError`` when it is not a positive number and a unit.
+    """
     value, unit = _value_and_unit(text, [u.value for u in _RATE_TO_SI])
     return value * _RATE_TO_SI[RateUnit(unit)]
 
 
 def acceleration_lsb_to_si(text: str) -> float:
-    """LSB of an accelerometer, as in ``3.33 mg``, in m/s². Refused when it is not a positive number and a unit."""
+    """LSB of an accelerometer, as in ``3.33 mg``, in m/s².
+
+    Raises ``RefusedError`` when it is not a positive number and a unit.
+    """
     value, unit = _value_and_unit(text, [u.value for u in _ACCELERATION_TO_SI])
     return value * _ACCELERATION_TO_SI[AccelerationUnit(unit)]
 

@@ -49,7 +49,7 @@ class Attack(ABC):
 
     @abstractmethod
     def run(self, number: int) -> str:
-        """``taken``, ``refused`` or ``FAILED: why``."""
+        """``taken``, ``rejected`` or ``FAILED: why``."""
 
     def longest_s(self, _number: int) -> int:
         """Seconds of the processor that a case may take."""

@@ -39,11 +39,11 @@ BY_OPTION = {
 }
 OUTPUTS = {"output", "json", "report", "csv", "plot", "truth", "updated", "improved"}
 ENDINGS = [".csv", ".json", ".html", ".txt", ".png", ".npz", ".parquet", ".toml", ""]
-LOGS = ["log.csv", "short.csv", "rest.csv", "a.npy", "b.npz", "a.zip", "a.gz", "quoted.csv"]
+LOGS = ["log.csv", "short.csv", "static.csv", "a.npy", "b.npz", "a.zip", "a.gz", "quoted.csv"]
 # Files in the place of an input, and what else stands there in half of the cases.
 BY_FILE = {
     "calibration": (["c.json", "untrusted.json", "noise.json"], ["bad.json", *SPECIAL]),
-    "noise": (["noise.json", "axis.json", "rest.csv", "bad.json"], []),
+    "noise": (["noise.json", "axis.json", "static.csv", "bad.json"], []),
     "with-effects": (["diagnosis.json", "c.json", "bad.json"], []),
     "diagnosis": (["diagnosis.json", "c.json", "bad.json"], []),
     "reference": (["poses.csv", "bad.csv"], []),
@@ -176,11 +176,11 @@ class Commands(Attack):
             return f"FAILED: {left} left; {said}"
         if status == 1 and any(n in after for n in named if n.startswith("out") and n not in before):
             return f"half: status 1 with an output; {said}"
-        return {0: "taken", 1: "refused", 2: "doubted"}[status]
+        return {0: "taken", 1: "rejected", 2: "doubted"}[status]
 
 
 def _may_be_made(name: str, named: set[str]) -> bool:
-    """An output that was asked for, or a companion of one (a header beside a source, a demonstration's folder)."""
+    """An output that was requested, or a companion of one (a header beside a source, a demonstration's folder)."""
     stems = {os.path.splitext(word)[0] for word in named if word}
     top = name.split("/")[0]
     return any(top.startswith(stem) or name.startswith(stem) for stem in stems) or top.startswith("trihedron-demo")

@@ -77,7 +77,7 @@ def made() -> tuple[dict[str, Log], dict[str, Log]]:
 
 
 def _made_elsewhere() -> tuple[dict[str, Log], dict[str, Log]]:
-    """The same, by a process of its own: this one has then written no table and can be forked."""
+    """The same, by a process of its own: this one has then written no table and can fork."""
     code = "import pickle, sys; from attacks.formats import made; sys.stdout.buffer.write(pickle.dumps(made()))"
     path = os.pathsep.join([str(Path(__file__).parents[1]), *(p for p in sys.path if p)])
     environment = {**os.environ, "PYTHONPATH": path}

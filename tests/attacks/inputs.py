@@ -27,7 +27,7 @@ def read_whole(*paths: Path, **options: Any) -> Recording:
 
 
 def answered(*readers: Callable[[], object]) -> str:
-    """Whether readers took what they were given, refused it in a sentence, or failed."""
+    """Whether readers took what they were given, rejected it in a sentence, or failed."""
     try:
         for reader in readers:
             with np.errstate(all="ignore"):
@@ -37,8 +37,8 @@ def answered(*readers: Callable[[], object]) -> str:
     except ValueError as error:
         text = str(error)
         if not text or len(text) > 1500 or "panicked" in text or text.count("\n") > 12:
-            return f"FAILED: the refusal is {text[:300]!r}"
-        return "refused"
+            return f"FAILED: the rejection is {text[:300]!r}"
+        return "rejected"
     return "taken"
 
 

@@ -115,7 +115,7 @@ def px4_ulog2csv_two_topics() -> Layout:
 
 @layout
 def rostopic_echo() -> Layout:
-    """rostopic echo -b -p /imu: field.header.stamp in ns, covariances between."""
+    """rostopic echo -b -p /imu: ``field.header.stamp`` in ns, covariances between."""
     s = session(100)
     a, w = in_si(s)
     cov = [f"field.{{}}_covariance{i}" for i in range(9)]

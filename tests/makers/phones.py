@@ -116,7 +116,7 @@ def sensorlog_ios() -> Layout:
 
 @layout
 def androsensor() -> Layout:
-    """AndroSensor: semicolons, names with units, a date whose milliseconds stand behind a colon."""
+    """AndroSensor: semicolons, names with units, a date whose milliseconds follow a colon."""
     s = session(50)
     a, w = np.round(s.force, 4), np.round(s.rate, 4)
     names = [f"ACCELEROMETER {x} (m/s²)" for x in "XYZ"] + [f"GRAVITY {x} (m/s²)" for x in "XYZ"]
@@ -146,7 +146,7 @@ def matlab_mobile() -> Layout:
 
 @layout
 def metabase() -> Layout:
-    """MbientLab MetaBase: epoc (ms), a stamp with points in the clock, x-axis (g) and (deg/s)."""
+    """MbientLab MetaBase: epoc (ms), a timestamp with points in the clock, x-axis (g) and (deg/s)."""
     s = session(100)
     a, w = np.round(s.force / G, 3), np.round(np.degrees(s.rate), 3)
     ms = [1709294400000 + round(1000 * t) for t in s.time_s]

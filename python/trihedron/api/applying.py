@@ -38,7 +38,10 @@ AnyCalibration = HasCalibration | Calibration | str | os.PathLike[str]
 
 
 def calibration_of(given: AnyCalibration) -> Calibration:
-    """The calibration of a result or of a file, or the record itself. Refused when it is none of these."""
+    """The calibration of a result or of a file, or the record itself.
+
+    Raises ``RefusedError`` when it is none of these.
+    """
     if isinstance(given, Calibration):
         return given
     if isinstance(given, str | os.PathLike):
@@ -136,7 +139,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Raw readings with the effects of an extended calibration compensated, so that ``S raw + b`` is valid.
 
-    Refused when the calibration's extensions are not in the form that a diagnosis writes.
+    Raises ``RefusedError`` when the calibration's extensions are not in the form that a diagnosis writes.
     """
     effects = calibration.extensions.get("effects")
     if not effects:
@@ -164,7 +167,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
 def check_units(calibration: Calibration, recording: Recording) -> None:
     """Check that readings are in the units that a calibration was made for.
 
-    Refused when they are not; the message names both units.
+    Raises ``RefusedError`` when they are not; the message names both units.
     """
     pairs = (
         ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
@@ -208,7 +211,7 @@ ROWS = 1 << 17
 def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding, ...]:
     """A serious finding where a log was recorded outside the temperatures that a calibration was made for.
 
-    Refused when the calibration's range is not two numbers.
+    Raises ``RefusedError`` when the calibration's range is not two numbers.
     """
     stated = calibration.extensions.get("valid_range")
     if not isinstance(stated, Mapping) or "temperature_degc" not in stated:

@@ -50,7 +50,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
     """The argument in the plain type of its annotation (numbers of any library become Python's).
 
-    Refused when it is of another type, not finite, or outside the range of its quantity.
+    Raises ``RefusedError`` when it is of another type, not finite, or outside the range of its quantity.
     """
     kinds = set(_alternatives(annotation))
     for alias in kinds & set(_ALIASES):
@@ -63,7 +63,7 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
         kind = next(iter(kinds))
         if kind in _PLAIN:
             return _PLAIN[kind](where, name, value)
-        if kind.startswith("Callable[") or kind in ("Progress", "Tell"):
+        if kind.startswith("Callable[") or kind in ("Progress", "OnPose"):
             return _callable(where, value)
         if kind.startswith("Sequence["):
             return _listed(where, value, kind.removeprefix("Sequence[").removesuffix("]"))
@@ -219,7 +219,7 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 def asked_in_python(verb: Verb) -> Verb:
     """The verb with its plain arguments checked and its error messages in terms of Python parameters.
 
-    Refused when a number, a text or a switch is of another type.
+    Raises ``RefusedError`` when a number, a text or a switch is of another type.
     """
     signature = inspect.signature(verb)
 

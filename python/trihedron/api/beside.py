@@ -45,7 +45,7 @@ def beside(
 ) -> DiagnosisResult:
     """The ordinary diagnosis with the fit to the reference added, or that fit alone where the log has too few poses.
 
-    Refused as :func:`trihedron.api.referring.held_against`.
+    Raises ``RefusedError`` as :func:`trihedron.api.referring.held_against`.
     """
     gravity, source, said = settle_gravity(*place, gravity_of(given))
     found = held_against(recording, reference, gravity, columns=columns, given=given)
@@ -90,7 +90,7 @@ def beside(
 def in_si(log: Recording, gravity: float | None) -> Recording:
     """The log itself where its gyro is in rad/s or deg/s; a log in counts by its own calibration.
 
-    Refused when it is in counts and its poses do not determine a calibration.
+    Raises ``RefusedError`` when it is in counts and its poses do not determine a calibration.
     """
     if rate_to_si(log.gyroscope_unit) is not None:
         return log

@@ -57,7 +57,7 @@ def open_device(
 ) -> tuple[Source, Found]:
     """Open a source and detect its protocol.
 
-    Refused when it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
+    Raises ``RefusedError`` when it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
     """
     wanted = protocol_of(protocol)
     namer = column_namer(columns, time_unit)
@@ -201,7 +201,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
 def sensor_columns(columns: tuple[str, ...]) -> list[int]:
     """Indices of the accelerometer's columns, then the gyro's, among the columns of a stream.
 
-    Refused when there is no accelerometer.
+    Raises ``RefusedError`` when there is no accelerometer.
     """
     empty = tuple(np.zeros(1) for _ in columns)
     found = find_columns(Table(Path("the stream"), columns, empty), None, None)

@@ -17,7 +17,8 @@ def settle_gravity(
 ) -> tuple[float, str, tuple[Finding, ...]]:
     """|g| [m/s²], its source, and findings about it; where nothing is given ``known``, else the standard value.
 
-    Refused when two sources contradict each other, a height has no latitude, or a value is not plausible as gravity.
+    Raises ``RefusedError`` when two sources contradict each other, a height has no latitude, or a value is not
+    plausible as gravity.
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:

@@ -95,15 +95,15 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
 
     The logs are written as CSV and read back like any log: only the final comparison uses the truth.
     """
-    tell = say or (lambda _sentence: None)
+    notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
-    tell("simulating two sessions of one sensor")
+    notify("simulating two sessions of one sensor")
     first = _session(folder / "session.csv", 0, overwrite)
     second = _session(folder / "second-session.csv", 1, overwrite)
     truth = truth_of_the_day(_scenario(0), SEED)
-    tell("calibrating by the first")
+    notify("calibrating by the first")
     result = calibrate(first, latitude_deg=LATITUDE_DEG)
-    tell("verifying on the second")
+    notify("verifying on the second")
     segments = segment(second)
     judged = verify(result, second, segments=segments, latitude_deg=LATITUDE_DEG)
     comparison = compare_with_truth(result.calibration, truth)
@@ -112,7 +112,7 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
     document = demonstration_report(
         result.calibration, result.segments, first, judged.verification, comparison, before, LATITUDE_DEG, files
     )
-    tell("writing reports")
+    notify("writing reports")
     write_calibration(result.calibration, folder / "calibration.json", overwrite=overwrite)
     write_whole(folder / "truth.json", _truth_text(truth), overwrite=overwrite)
     pages = (

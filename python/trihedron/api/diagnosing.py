@@ -97,10 +97,10 @@ def diagnose(
         raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")
     if not 0.0 < alpha < 0.5:
         raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
-    tell = progress or (lambda _fraction, _text: None)
+    notify = progress or (lambda _fraction, _text: None)
     recording, against = recording_of(recording), _opened(against)
     ordinary = partial(
-        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, tell
+        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, notify
     )
     if reference is None and against is not None:
         reference = shared_log(recording, against, gravity_m_s2)
@@ -118,7 +118,7 @@ def _of_poses(
     calibration: AnyCalibration | None,
     against: GivenModel | None,
     alpha: float,
-    tell: Progress,
+    notify: Progress,
 ) -> DiagnosisResult:
     """The diagnosis by poses and moves, without a reference."""
     known = None if calibration is None else calibration_of(calibration)
@@ -129,23 +129,23 @@ def _of_poses(
         recording, more = without_effects(known, recording)
         findings += more
         segments = None if known.extensions.get("effects") else segments
-    tell(0.02, "finding poses")
+    notify(0.02, "finding poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
     resting = None if against is not None else at_rest(recording, segments, known, (gravity, source), calibrated)
     if resting is not None:
-        tell(0.1, "looking at biases and spectral lines")
+        notify(0.1, "looking at biases and spectral lines")
         return diagnosed_at_rest(
             recording, segments, resting, (gravity, source), tuple(findings), alpha, is_given=known is not None
         )
     simulated: _Free | None = None
     if against is not None:
-        simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, tell)
+        simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, notify)
         known = simulated.calibration
         findings += more
     begun = 0.05 if simulated is None else 0.45
-    tell(begun, "calibrating")
+    notify(begun, "calibrating")
     used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
     recording_used, segments_used = recording, segments
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
@@ -160,7 +160,7 @@ def _of_poses(
         used,
         calibration_is_given=not free,
         alpha=alpha,
-        progress=lambda fraction, text: tell(begun + (1.0 - begun) * fraction, text),
+        progress=lambda fraction, text: notify(begun + (1.0 - begun) * fraction, text),
     )
     updated, own_effects = None, found.effects
     if known is not None and free:
@@ -273,17 +273,17 @@ def _simulated_log(
 
 
 def _simulated(
-    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, tell: Progress
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, notify: Progress
 ) -> tuple[_Free, Recording, Segments, tuple[Finding, ...]]:
     """The simulation's own diagnosis, the recording with the sensors that both have, its segments, and findings."""
-    tell(0.05, "diagnosing the simulated recording")
+    notify(0.05, "diagnosing the simulated recording")
     logged = _simulated_log(against, recording, segments, gravity)
     logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
-    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
     return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
 
 
-def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, tell: Progress) -> _Free:
+def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> _Free:
     recording, scenario = logged
     of_world = rates_of_world(recording, segment(recording))
     if of_world is not None:
@@ -294,7 +294,7 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
         result = calibrate(recording, gravity_m_s2=own)
     except REFUSALS as error:
         raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
-    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
+    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=notify)
     noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)
     return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)

@@ -89,9 +89,9 @@ def disagree(
 
     The log is written and read back like any log; the file with the answer is opened after both verdicts.
     """
-    tell = say or (lambda _sentence: None)
+    notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
-    tell("drawing a unit with one flaw, and sealing which")
+    notify("drawing a unit with one flaw, and sealing which")
     gravity = normal_gravity(LATITUDE_DEG)
     scenario, sealed = _drawn(seed, gravity)
     write_whole(folder / "sealed.json", json.dumps(plain(sealed), indent=2) + "\n", overwrite=overwrite)
@@ -101,13 +101,13 @@ def disagree(
     scale = float(np.radians(1.0 / 65.5))
     write_whole(given, SIMULATION.format(gravity=gravity, scale=scale), overwrite=overwrite)
     taken = read(log)
-    tell("comparing the simulation with the log")
+    notify("comparing the simulation with the log")
     found = diagnose(taken, gravity_m_s2=gravity, against=given)
     write_scenario(improve(given, found).text, better, overwrite=overwrite)
-    tell("comparing the improved simulation with the log")
+    notify("comparing the improved simulation with the log")
     improved = diagnose(taken, gravity_m_s2=gravity, against=better)
     write_whole(folder / "disagreement.html", to_html(diagnosis_report(found, str(given))), overwrite=overwrite)
-    tell("opening the seal")
+    notify("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
     sizes = dict(diagnosed_sizes([e.to_dict() for e in found.own_effects])[0])
     document = disagreement_report(found, improved, opened, sizes, folder, seed)

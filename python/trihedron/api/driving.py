@@ -42,7 +42,7 @@ def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Ca
 
     ``own`` is the recording's own calibration, by which its motion is computed from its readings.
 
-    Refused when the recording lacks a sensor or has no static pose.
+    Raises ``RefusedError`` when the recording lacks a sensor or has no static pose.
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_scenario(recording, resegment(recording, segments), own).motion

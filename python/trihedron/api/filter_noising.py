@@ -87,7 +87,7 @@ def filter_noise(
 
     Examples
     --------
-    >>> found = trihedron.filter_noise("flight.csv", static="rest.csv", reference="truth.csv")  # doctest: +SKIP
+    >>> found = trihedron.filter_noise("flight.csv", static="static.csv", reference="truth.csv")  # doctest: +SKIP
     >>> found.sensor("gyroscope").N.value  # doctest: +SKIP
     0.00017
     """
@@ -120,7 +120,7 @@ def filter_noise(
         sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
-        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_AT_REST))
+        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC))
     return FilterNoise(
         sensors,
         recording.source,
@@ -178,8 +178,8 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
 def _sensors(found: Noise | None) -> Static:
     if found is None:
         return {}
-    told = {sensor: at_rest(found.axes, unit) for sensor, unit in UNITS.items()}
-    return {sensor: one for sensor, one in told.items() if one is not None}
+    stated = {sensor: at_rest(found.axes, unit) for sensor, unit in UNITS.items()}
+    return {sensor: one for sensor, one in stated.items() if one is not None}
 
 
 def _static(given: Noise | str | os.PathLike[str]) -> Static:
@@ -225,8 +225,8 @@ def _between_intervals(
     if recording.gyroscope is None or scale is None or "gyroscope" not in known:
         return None, None
     rate = np.nan_to_num(recording.gyroscope * scale)
-    told = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
-    return tilt_over_moves(*told), between_intervals(*told)
+    stated = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
+    return tilt_over_moves(*stated), between_intervals(*stated)
 
 
 def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
@@ -264,6 +264,6 @@ def _uncalibrated(one: SensorFilterNoise) -> tuple[float, float] | None:
     for horizon_s in {share.horizon_s for share in one.shares}:
         at = {share.cause: share.share for share in one.shares if share.horizon_s == horizon_s}
         removed = sum(at[cause].lower for cause in ("calibration", "g-sensitivity", "temperature") if cause in at)
-        if removed > sum(at[cause].upper for cause in ("rest", "vibration", "bias") if cause in at):
+        if removed > sum(at[cause].upper for cause in ("static", "vibration", "bias") if cause in at):
             found.append((removed, horizon_s))
     return max(found, default=None)

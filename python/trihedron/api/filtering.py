@@ -16,6 +16,7 @@ from trihedron.estimate.kalman.norm_invariant import NormFrame
 from trihedron.estimate.kalman.session import calibrate_session, calibrate_session_without_references
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.poses import noise_of_poses
+from trihedron.files.noise import read_noise_axes
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -28,7 +29,7 @@ from trihedron.records import (
     Segments,
     Severity,
 )
-from trihedron.records.noise import Noise
+from trihedron.records.noise import Noise, NoiseAxis
 from trihedron.records.progress import Progress
 from trihedron.records.results import KalmanResult
 
@@ -59,7 +60,8 @@ def kalman(
     sigma_angle_deg : float
         Standard error of the angles in the file.
     noise : AxisNoise, three of them, Noise, or file
-        Noise of the raw readings: from a JSON file, as identified, or a static log to identify it from.
+        Noise of the raw readings: as identified (the JSON of ``trihedron allan``), its Allan coefficients (a JSON of
+        your own), or a static log to identify it from.
         Without it, the noise inside the poses.
     frame : "lower" or "symmetric"
         Body frame where there is no reference; with one it is the frame of the reference.
@@ -104,7 +106,7 @@ def kalman(
     else:
         outcome = calibrate_session(recording, segments, table, noise=given)
     if identified is not None:
-        check_same_gravity(identified.axes, outcome.accelerometer, gravity)
+        check_same_gravity(identified, outcome.accelerometer, gravity)
     findings = (*said, *noted, *recording.findings, *segments.findings, *outcome.findings)
     calibration = Calibration(
         accelerometer=outcome.accelerometer,
@@ -122,16 +124,19 @@ def kalman(
 
 def _settle_noise(
     noise: NoiseSource | None, recording: Recording
-) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], Noise | None]:
-    """Noise in raw units, findings of its identification, and the noise identified from a log."""
+) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], Sequence[NoiseAxis] | None]:
+    """Noise in raw units, findings of its identification, and the axes identified from a log."""
     if isinstance(noise, str | os.PathLike):
         if os.fspath(noise).lower().endswith(".json"):
-            return read_axis_noise(noise), (), None
+            axes = read_noise_axes(noise)
+            if not axes:
+                return read_axis_noise(noise), (), None
+            return noise_from_identified(axes, recording.accelerometer_unit), (), axes
         noise = _identify(read_recording(noise))
     if isinstance(noise, Noise):
         noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
         weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
-        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise
+        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise.axes
     is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
     if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
         raise WrongTypeError(f"noise is what trihedron.allan found, or the name of a file, not {type(noise).__name__}.")

@@ -124,7 +124,7 @@ def conclude(
 ) -> tuple[CalibrationResult, VerificationResult | None]:
     """Calibrate from the samples before ``cut_s`` and verify on the later ones.
 
-    Refused when the samples do not determine a calibration.
+    Raises ``RefusedError`` when the samples do not determine a calibration.
     """
     before = recording if cut_s is None else part_of(recording, -np.inf, cut_s)
     result = calibrate(before, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)

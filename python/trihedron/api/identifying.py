@@ -14,7 +14,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import RefusedError
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.grid import readings_of, refuse_size_of_a_unit
+from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
@@ -155,7 +155,7 @@ def noise_of_file(
     disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
     continues from it with bit-identical results, and the end removes it.
 
-    Refused when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
+    Raises ``RefusedError`` when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
     stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
@@ -166,7 +166,7 @@ def noise_of_file(
         scale = _to_si(unit)
         if lsb is not None:
             scale = lsb_to_si(lsb)
-            refuse_size_of_a_unit(name, unit.value, scale)
+            reject_size_of_a_unit(name, unit.value, scale)
         names.append(f"{name} {role[1]}")
         units.append(unit.value if scale is None else si)
         factor.append(1.0 if scale is None else scale)
@@ -222,7 +222,7 @@ def noise_of_curve(
     ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
     whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
 
-    Refused when the table is not recognised, too short, or does not state the log's rate and length.
+    Raises ``RefusedError`` when the table is not recognised, too short, or does not state the log's rate and length.
     """
     table = read_allan_table(Path(path))
     rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
@@ -249,7 +249,7 @@ def noise_of_curve(
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
     """Recording time [s] for a relative uncertainty ``relative`` of each term present, by axis; None beyond a month.
 
-    Refused when ``relative`` is no positive fraction.
+    Raises ``RefusedError`` when ``relative`` is no positive fraction.
     """
     return {
         axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}

@@ -165,7 +165,7 @@ def _check_even(name: str, given: Any) -> None:
 def recording_of(given: AnyRecording) -> Recording:
     """A recording: the record itself, that of a result, or one read from an input of :func:`read`.
 
-    Refused when it cannot be read, is of another type, or is several recordings.
+    Raises ``RefusedError`` when it cannot be read, is of another type, or is several recordings.
     """
     if isinstance(given, Recording):
         return given
@@ -182,7 +182,10 @@ def recording_of(given: AnyRecording) -> Recording:
 
 
 def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
-    """Segments as given, or found in the recording. Refused when the given value is not a ``Segments``."""
+    """Segments as given, or found in the recording.
+
+    Raises ``RefusedError`` when the given value is not a ``Segments``.
+    """
     if given is None:
         return segment(recording, progress=progress)
     if not isinstance(given, Segments):

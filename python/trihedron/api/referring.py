@@ -41,7 +41,7 @@ NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
 def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
     """A reference from a file of attitude, rate or pose, or from the log of another unit that moved along.
 
-    Refused with the file and what to do.
+    Raises ``RefusedError`` with the file and what to do.
     """
     if isinstance(reference, ReferenceMotion):
         return reference
@@ -70,7 +70,7 @@ def held_against(
 ) -> AgainstReference:
     """Fit a log to a reference; ``given`` is a calibration whose replay is added for comparison.
 
-    Refused when the two share no time or motion, or the reference does not determine the sensors.
+    Raises ``RefusedError`` when the two share no time or motion, or the reference does not determine the sensors.
     """
     is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
         recording.source
@@ -88,7 +88,7 @@ def calibration_by(
 ) -> Calibration:
     """Both sensors from the reference, in the lower-triangular frame, or (``case``) in the reference's body.
 
-    Refused when the log has no accelerometer: a calibration file needs both.
+    Raises ``RefusedError`` when the log has no accelerometer: a calibration file needs both.
     """
     if recording.accelerometer is None:
         raise RefusedError(

@@ -24,7 +24,7 @@ STEP_S = 0.25
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 
-Tell = Callable[[GuideView], Any]
+OnPose = Callable[[GuideView], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ def guide(
     gravity_m_s2: float | None = None,
     latitude_deg: float | None = None,
     height_m: float | None = None,
-    on_pose: Tell | None = None,
+    on_pose: OnPose | None = None,
 ) -> tuple[CalibrationResult, VerificationResult | None]:
     """A guided session replayed from a log: calibrated when ``accuracy`` is reached, verified on the rest.
 
@@ -79,8 +79,11 @@ def guide(
     return conclude(done.recording, done.cut_s, **said)
 
 
-def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: Tell | None = None) -> Replay:
-    """Run the guide on a log, block by block, as in a live session. Refused when the log has no accelerometer."""
+def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: OnPose | None = None) -> Replay:
+    """Run the guide on a log, block by block, as in a live session.
+
+    Raises ``RefusedError`` when the log has no accelerometer.
+    """
     readings = readings_of(recording)
     now_s = 0.0
 
@@ -98,7 +101,7 @@ def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_po
                 on_pose(view)
         if made.is_done:
             break
-    return Replay(made.view(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s, made.is_done)
+    return Replay(made.finish(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s, made.is_done)
 
 
 def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:

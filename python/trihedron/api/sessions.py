@@ -84,14 +84,14 @@ def calibrate_sessions(
         raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
     if labels is not None and len(labels) != len(recordings):
         raise RefusedError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
-    tell = progress or (lambda _fraction, _text: None)
+    notify = progress or (lambda _fraction, _text: None)
     results: list[CalibrationResult] = []
     groups: list[str] = []
     left_out: list[tuple[str, str]] = []
     for k, given in enumerate(recordings):
         recording = recording_of(given)
         label = _label(recording, by) if labels is None else labels[k]
-        tell(k / len(recordings), f"calibrating {Path(recording.source).name}")
+        notify(k / len(recordings), f"calibrating {Path(recording.source).name}")
         try:
             if isinstance(given, CalibrationResult):
                 result = given

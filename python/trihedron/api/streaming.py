@@ -105,7 +105,8 @@ def log_on_disk(
 ) -> LogOnDisk:
     """A .npy, Parquet or text log whose columns, rate and units are given, not detected.
 
-    Refused when the file has another format, columns do not fit, or a sensor lacks an axis or the order x y z.
+    Raises ``RefusedError`` when the file has another format, columns do not fit, or a sensor lacks an axis or the
+    order x y z.
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
@@ -138,9 +139,9 @@ def segment_file(
     With ``checkpoint`` a file stores the state of the pass every half a minute; an interrupted run continues from it
     with bit-identical results, and the end removes it.
 
-    Refused when ``checkpoint`` is a file of another kind.
+    Raises ``RefusedError`` when ``checkpoint`` is a file of another kind.
     """
-    tell = progress or (lambda _fraction, _text: None)
+    notify = progress or (lambda _fraction, _text: None)
     # The segmentation only reads rows, which these types support.
     view = cast("Recording", log)
     sums = BlockSums(view)
@@ -155,10 +156,10 @@ def segment_file(
         triads = [part[:, t.first : t.first + 3] for t in (log.accelerometer, log.gyroscope) if t is not None]
         sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
         done += len(part)
-        tell(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
+        notify(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
         if kept:
             kept.keep(done, sums.state)
-    segments = segment_blocks(view, sums.channels(), progress=lambda f, text: tell(0.8 + 0.2 * f, text))
+    segments = segment_blocks(view, sums.channels(), progress=lambda f, text: notify(0.8 + 0.2 * f, text))
     if kept:
         kept.remove()
     return segments
@@ -176,10 +177,10 @@ def calibrate_file(
     ``checkpoint`` as in :func:`segment_file`, whose pass over the log takes most of the time. The result is that of
     :func:`trihedron.calibrate` on the whole log, if no pose is longer than two minutes.
     """
-    tell = progress or (lambda _fraction, _text: None)
-    segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: tell(0.7 * f, text))
+    notify = progress or (lambda _fraction, _text: None)
+    segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: notify(0.7 * f, text))
     recording, shown = condensed(log, segments)
-    tell(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
+    notify(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
     return calibrate(recording, segments=shown, **options)
 
 
@@ -263,8 +264,8 @@ def apply_file(
     An interrupted run continues where it stopped: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` has the number of rows
     and a hash of the inputs. Returns the number of rows written in this run.
 
-    Refused when the calibration depends on temperature or has effects, which are not supported here; when units differ;
-    when the output exists.
+    Raises ``RefusedError`` when the calibration depends on temperature or has effects, which are not supported here;
+    when units differ; when the output exists.
     """
     target = Path(output)
     known = calibration_of(calibration)

@@ -97,7 +97,7 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
     found = []
     rms_m_s2, rms_deg = judged.norm_rms, judged.angle_rms_deg
     if limit_mg is not None and not mg_from_m_s2(rms_m_s2) <= limit_mg:
-        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "rest", rms_m_s2=rms_m_s2, limit_mg=limit_mg))
+        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "static", rms_m_s2=rms_m_s2, limit_mg=limit_mg))
     if limit_deg is not None and not rms_deg <= limit_deg:
         found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg))
     return tuple(found)

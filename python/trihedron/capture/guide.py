@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.capture.stillness import MOVED_DEG, Orientation, Stillness
 from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 
 Examine = Callable[[], Examination]
@@ -23,7 +24,6 @@ SAME_POSE_DEG = 15.0
 N_CHECKS = 3
 MOST_POSES = 60
 RETRY_POSE_S = 2.0
-MOVED_DEG = 8.0
 
 
 class Guide:
@@ -54,6 +54,7 @@ class Guide:
         self._stillness = Stillness()
         self._time_s = 0.0
         self._is_taken = False
+        self._here = Orientation()
         self._asked_s = FIRST_POSE_S
         self._taken_up: FloatArray | None = None
         self._checks: list[FloatArray] = []
@@ -100,8 +101,17 @@ class Guide:
             n_events=self._events,
         )
 
+    def finish(self) -> GuideView:
+        """Count a pose that the end of the readings left unfinished; return what to show."""
+        if not self.is_done and self._here.is_uncounted:
+            self._take_left()
+        return self.view()
+
     def _step(self) -> None:
         still_s = self._stillness.still_for_s
+        if self._here.is_over(self._stillness) and self._here.is_uncounted:
+            self._take_left()
+        self._here.add(self._stillness)
         if self._is_taken and not self._has_moved():
             return
         self._is_taken = False
@@ -114,6 +124,16 @@ class Guide:
             self.phase = Phase.POSE
         if still_s >= self._asked_s:
             self._take()
+
+    def _take_left(self) -> None:
+        """Count a pose that was left before the time requested for it, if the segmentation finds it."""
+        if self.phase is Phase.CHECK:
+            return
+        examination = self._examine()
+        if len(examination.poses_up) > (0 if self.examination is None else len(self.examination.poses_up)):
+            self.examination, self._asked_s, self._remark = examination, examination.pose_s, ""
+            self._events += 1
+            self._go_on(examination)
 
     def _has_moved(self) -> bool:
         up = self._up()
@@ -141,6 +161,10 @@ class Guide:
         if before and self._is_repeat(examination):
             self._remark = "The board lies almost as in an earlier pose: turn it to the marked one to learn more."
         self._accepted()
+        self._go_on(examination)
+
+    def _go_on(self, examination: Examination) -> None:
+        """The next pose, or the poses to verify with."""
         is_last = len(examination.poses_up) >= self._most
         if not (examination.is_good_enough or is_last):
             self._target, self.phase = examination.next_up, Phase.MOVE
@@ -152,7 +176,7 @@ class Guide:
         self._target = self._far_from_all()
 
     def _accepted(self) -> None:
-        self._is_taken = True
+        self._is_taken = self._here.is_counted = True
         self._events += 1
         self._taken_up = self._up()
 
@@ -212,76 +236,3 @@ class Guide:
         if known is None:
             return "Turn the board to another side.", ""
         return f"Turn: {known.next_words}.", known.why
-
-
-# Immediate detection of stillness: the standard deviation over WINDOW_S against the lowest so far.
-#
-# The segmentation of the whole log decides later which poses count; this one only drives the display.
-
-WINDOW_S = 0.25
-LOUDER = 3.0
-"""Limit of a window's standard deviation over the calm one: noise exceeds it in < 10⁻⁶ of windows (25 rows, 6 axes)."""
-
-MEAN_SHIFT = 2.5
-"""Limit of the change of mean between windows over the calm standard deviation; noise of a mean is a fifth of it."""
-
-CALM_QUANTILE = 0.1
-SHAKY = 1.8
-"""A window's standard deviation over the calm one above which a static board is on a vibrating table, or held."""
-
-
-class Stillness:
-    """Detects stillness from readings as they arrive; :attr:`still_for_s` is how long the board has been static."""
-
-    def __init__(self) -> None:
-        self.still_for_s = 0.0
-        self.mean: FloatArray | None = None
-        self.is_shaky = False
-        self._rows: list[FloatArray] = []
-        self._since_s: float | None = None
-        self._spreads: list[FloatArray] = []
-        self._before: FloatArray | None = None
-        self._still_from_s: float | None = None
-
-    def add(self, time_s: FloatArray, readings: FloatArray) -> None:
-        """Add readings (n, 3) or (n, 6) at ``time_s`` (n,) [s]."""
-        start = 0
-        for i, t in enumerate(time_s):
-            if self._since_s is None:
-                self._since_s = float(t)
-            if t - self._since_s >= WINDOW_S:
-                self._rows.append(readings[start:i])
-                self._window(float(t))
-                start, self._since_s = i, float(t)
-        self._rows.append(readings[start:])
-
-    def _window(self, end_s: float) -> None:
-        rows = np.concatenate(self._rows)
-        self._rows = []
-        if len(rows) < 3 or not np.all(np.isfinite(rows)):
-            return
-        mean, spread = rows.mean(axis=0), rows.std(axis=0)
-        self._spreads.append(spread)
-        if len(self._spreads) > 4000:
-            del self._spreads[::2]
-        calm = np.quantile(np.array(self._spreads), CALM_QUANTILE, axis=0)
-        # With a coarse ADC the standard deviation in a pose may be 0.
-        calm = np.maximum(calm, 0.05 * np.median(np.array(self._spreads), axis=0) + 1e-12)
-        is_still = bool(np.all(spread <= LOUDER * calm + _step(rows)))
-        if self._before is not None:
-            is_still &= bool(np.all(np.abs(mean - self._before) <= MEAN_SHIFT * calm + _step(rows)))
-        self.is_shaky = is_still and bool(np.any(spread > SHAKY * calm + _step(rows)))
-        self._before, self.mean = mean, mean
-        if not is_still:
-            self._still_from_s = None
-            self.still_for_s = 0.0
-            return
-        if self._still_from_s is None:
-            self._still_from_s = end_s - WINDOW_S
-        self.still_for_s = end_s - self._still_from_s
-
-
-def _step(rows: FloatArray) -> FloatArray:
-    """(k,) allowance per axis: 1 LSB where readings are whole numbers, else 0."""
-    whole = np.all(rows == np.round(rows), axis=0)
-    return np.where(whole, 1.0, 0.0)

@@ -67,7 +67,7 @@ class GrowingLog:
         try:
             os.pwrite(self._handle, line, self._places[key])
         except OSError as error:
-            raise self._refused(error) from None
+            raise self._rejected(error) from None
 
     def row(self, text: str, time_s: float) -> None:
         """Add one row, given without its end of line."""
@@ -103,7 +103,7 @@ class GrowingLog:
             try:
                 os.fdatasync(self._handle)
             except OSError as error:
-                raise self._refused(error) from None
+                raise self._rejected(error) from None
 
     def close(self) -> None:
         """Write pending rows and close the file."""
@@ -129,7 +129,7 @@ class GrowingLog:
                 continue
             except OSError as error:
                 self._cut(start, bytes(text.encode())[: self._size - start])
-                raise self._refused(error) from None
+                raise self._rejected(error) from None
             self._size += n
             data = data[n:]
 
@@ -143,7 +143,7 @@ class GrowingLog:
         with suppress(OSError):
             os.ftruncate(self._handle, self._size)
 
-    def _refused(self, error: OSError) -> DiskError:
+    def _rejected(self, error: OSError) -> DiskError:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         why = "the disk is full" if full else f"the disk cannot be written ({error.strerror})"
         remedy = "free some space and capture anew" if full else "check the disk"

@@ -147,10 +147,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         if status == _INTERRUPTED:
             # Typer handled the Ctrl-C itself.
-            _refuse(SENTENCE)
+            _reject(SENTENCE)
         return int(status or 0)
     except (typer.Abort, Interrupted, KeyboardInterrupt) as error:
-        _refuse(SENTENCE)
+        _reject(SENTENCE)
         return status_of(error)
     except (BrokenPipeError, SystemExit) as error:
         # The reader closed the pipe (`| head`), which is no error. Where that happens inside a command, typer raises
@@ -160,15 +160,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         silence(sys.stdout)
         return 0
     except _UsageError as error:
-        return _refuse(_usage_sentence(error, words))
+        return _reject(_usage_sentence(error, words))
     except MemoryError:
-        return _refuse(_memory_sentence())
+        return _reject(_memory_sentence())
     except BaseException as error:
         # A panic in Rust raises PanicException, which does not derive from Exception.
-        is_told = isinstance(error, Exception) or type(error).__name__ == "PanicException"
-        if not is_told or os.environ.get("TRIHEDRON_TRACEBACK"):
+        is_in_words = isinstance(error, Exception) or type(error).__name__ == "PanicException"
+        if not is_in_words or os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
-        return _refuse(_sentence(error))
+        return _reject(_sentence(error))
 
 
 def _sentence(error: BaseException) -> str:
@@ -260,6 +260,6 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
     return f"{message}{stop} `{where}` lists what there is."
 
 
-def _refuse(sentence: str) -> int:
+def _reject(sentence: str) -> int:
     typer.echo(f"trihedron: {printable(sentence)}", err=True)
     return COULD_NOT_RUN

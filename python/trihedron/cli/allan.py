@@ -24,14 +24,14 @@ OPTIONS = {
         "FROM:TO",
         "Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
     ),
-    "keep_events": "Exclude nothing automatically: knocks, vibration and steps stay in.",
+    "keep_events": "Exclude nothing automatically: impacts, vibration and jumps of the mean stay in.",
     "accuracy": ("PERCENT", "How long to record for this uncertainty of each term; --full."),
     "plot": ("FILE.png", "Draw the Allan curves (also in the report)."),
     "csv": ("FILE", "Write the Allan curve as a table."),
     "curve": "LOG is a table of Allan deviations (--csv of another run, or published): terms from it.",
     "samples": ("N", "Readings of the log behind --curve, where the table is silent."),
     "stream": "Read a .npy, Parquet or CSV log in pieces, in at most 1.5 GB and without audit: --columns, --rate and "
-    "the units state what it holds.",
+    "the units state what it contains.",
     "full": "Print customary units, how long to record and Kalibr's names as well.",
 }
 

@@ -24,7 +24,7 @@ from trihedron.cli.streamed import calibrate_stream, needs_stream
 FIRST_SCREEN = 2
 OPTIONS = {
     "method": "joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces.",
-    "frame": "Body frame: lower, symmetric, or case (with --method faces).",
+    "frame": "Body frame: lower (lower-triangular, X along accelerometer X), symmetric, or case (with --method faces).",
     "faces": ("LIST", "With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."),
     "turns": ("LIST", "Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out."),
     "turntable": (
@@ -117,19 +117,19 @@ def calibrate(
         return calibration_record(result.calibration, result.segments, result.recording)
 
     sections = FIRST_SCREEN + (result.reference is not None)
-    results.tell_calibration(document, machine, result.calibration, output, sections, more)
+    results.emit_calibration(document, machine, result.calibration, output, sections, more)
 
 
 def _calibrated(sources: LogsSource, place: GravitySource, choices: dict[str, Any], *, extended: bool) -> Any:
     recording = sources.one().read()
     from trihedron.api import calibrating
 
-    with progress("calibrating") as tell:
-        result = calibrating.calibrate(recording, **place.said, progress=tell, **choices)
+    with progress("calibrating") as notify:
+        result = calibrating.calibrate(recording, **place.said, progress=notify, **choices)
         if extended:
             from trihedron.api import extending
 
-            result = extending.extend(result, progress=tell)
+            result = extending.extend(result, progress=notify)
     return result
 
 

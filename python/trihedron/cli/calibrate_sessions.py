@@ -51,7 +51,7 @@ def calibrate_beside(
         return {**record, "references": [one.to_dict() for one in result.references]}
 
     more = "Bias over time: --json FILE."
-    results.tell_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
+    results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
 
 
 def calibrate_many(
@@ -71,7 +71,7 @@ def calibrate_many(
 
     words = None if labels is None else [word.strip() for word in labels.split(",")]
     given = sources.each()
-    with progress("calibrating") as tell:
+    with progress("calibrating") as notify:
         # An unreadable log stops the command, unlike a recording that cannot be calibrated.
         recordings = list(_recordings(given, how))
         if words is not None and len(words) == len(given) < len(recordings):
@@ -81,13 +81,13 @@ def calibrate_many(
             by=how,  # type: ignore[arg-type]
             labels=words,
             frame=frame or "lower",
-            progress=tell,
+            progress=notify,
             **place.said,
         )
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
     machine = partial(sessions_record, result.model)
-    results.tell_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
+    results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
 
 
 def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:

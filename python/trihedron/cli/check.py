@@ -15,8 +15,8 @@ def check(source: LogSource, results: Results) -> None:
     from trihedron.report import check_report
     from trihedron.report.machine import check_record
 
-    with progress("checking") as tell:
-        result = checking.check(recording, progress=tell)
+    with progress("checking") as notify:
+        result = checking.check(recording, progress=notify)
     shown = (recording, result.segments, result.calibration, result.findings)
-    results.tell(check_report(*shown), lambda: check_record(*shown))
+    results.emit(check_report(*shown), lambda: check_record(*shown))
     leave(result.findings)

@@ -73,7 +73,7 @@ def diagnose(
     from trihedron.report import diagnosis_report
     from trihedron.report.diagnosis import first_screen
 
-    with progress("diagnosing") as tell:
+    with progress("diagnosing") as notify:
         result = diagnosing.diagnose(
             recording,
             **place.said,
@@ -82,7 +82,7 @@ def diagnose(
             reference=reference,
             reference_columns=reference_columns,
             alpha=alpha,
-            progress=tell,
+            progress=notify,
         )
     document = diagnosis_report(result, str(against or calibration or ""), str(improved or ""))
     results.show(document, first_screen(result))
@@ -112,9 +112,9 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
     recordings = [source.read() for source in sources.each()]
-    with progress("diagnosing") as tell:
-        found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=tell)
-    results.tell(shared_diagnosis_report(found), lambda: shared_diagnosis_record(found))
+    with progress("diagnosing") as notify:
+        found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=notify)
+    results.emit(shared_diagnosis_report(found), lambda: shared_diagnosis_record(found))
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
@@ -122,8 +122,8 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
     from trihedron.api import improving
     from trihedron.files.scenario import write_scenario
 
-    with progress("improving the scenario") as tell:
-        tell(0.1, "moving the improved scenario as the log was")
+    with progress("improving the scenario") as notify:
+        notify(0.1, "moving the improved scenario as the log was")
         better = improving.improve(given, result)
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")

@@ -60,11 +60,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "noise": (
         (
             "N and K beside a tracker's attitudes and a static log:",
-            "trihedron noise flight.csv --static rest.csv --reference truth.csv --report noise.html",
+            "trihedron noise flight.csv --static static.csv --reference truth.csv --report noise.html",
         ),
         (
             "Written for a filter:",
-            "trihedron noise flight.csv --static rest.csv --reference truth.csv --to kalibr -o imu.yaml",
+            "trihedron noise flight.csv --static static.csv --reference truth.csv --to kalibr -o imu.yaml",
         ),
         ("Without a reference, N and K from static intervals and gravity:", "trihedron noise flight.csv"),
     ),
@@ -74,7 +74,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "Counts of a known size:",
             'trihedron allan static.npz --rate 100 --gyro-lsb "0.05 deg/s" --accel-lsb "3.33 mg"',
         ),
-        ("Without the first minute and a knock:", "trihedron allan static.csv --exclude :60 --exclude 812:815"),
+        ("Without the first minute and an impact:", "trihedron allan static.csv --exclude :60 --exclude 812:815"),
         ("A log larger than the memory:", "trihedron allan static.npy --stream --columns gx,gy,gz --rate 1000"),
     ),
     "verify": (

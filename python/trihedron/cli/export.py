@@ -27,7 +27,7 @@ OPTIONS = {
     "gyro_lsb": ("SIZE", "The same of the gyro: '0.0305 deg/s'."),
     "current_parameters": (
         "FILE",
-        "Autopilots: the board's parameters when it logged, where the log does not hold them; 'none' if raw.",
+        "Autopilots: the board's parameters when it logged, where the log does not contain them; 'none' if raw.",
     ),
 }
 

@@ -47,7 +47,7 @@ def fleet(
     from trihedron.fleet import fleet as run
     from trihedron.report.fleet import fleet_report
 
-    with progress("fleet") as tell:
+    with progress("fleet") as notify:
         result = run(
             logs[0] if len(logs) == 1 else list(logs),
             out,
@@ -60,7 +60,7 @@ def fleet(
             rate_hz=rate,
             accelerometer_unit=accel_unit,
             gyroscope_unit=gyro_unit,
-            progress=tell,
+            progress=notify,
         )
     document = fleet_report(result.summary)
     shown = tuple(section for section in document.sections if section.heading != "Every log")

@@ -51,12 +51,12 @@ def guide(
     wanted = Accuracy.parse(accuracy)
     check_outputs(output, force=force, inputs=source.files)
 
-    def tell(view: GuideView) -> None:
+    def notify(view: GuideView) -> None:
         put(_line(view) + "\n")
         if every:
             put(as_text(view, *_size()) + "\n")
 
-    done = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=tell)
+    done = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=notify)
     put(as_text(done.view, *_size()) + "\n")
     finish(done.recording, done.cut_s, place, output, force=force)
 

@@ -17,8 +17,11 @@ OPTIONS = {
         "Without it the length of gravity is used.",
     ),
     "angle_sigma": ("DEG", "Standard error of the angles in the pose table."),
-    "noise": ("FILE", "A static log to identify the noise from, or a JSON of Allan coefficients."),
-    "frame": "Body frame without a pose table: lower or symmetric.",
+    "noise": (
+        "FILE",
+        "A static log, the JSON that trihedron allan writes of one, or a JSON of Allan coefficients.",
+    ),
+    "frame": "Body frame without a pose table: lower (lower-triangular, X along accelerometer X) or symmetric.",
     "full": "Print the whole report.",
 }
 
@@ -43,11 +46,11 @@ def kalman(
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
 
-    with progress("filtering") as tell:
+    with progress("filtering") as notify:
         result = filtering.kalman(
-            recording, reference, sigma_angle_deg=angle_sigma, **options, **place.said, progress=tell
+            recording, reference, sigma_angle_deg=angle_sigma, **options, **place.said, progress=notify
         )
     document = kalman_report(result.outcome, result.calibration)
     machine = partial(kalman_record, result.outcome, result.calibration)
     more = "Every pose: --full; convergence, innovations and residuals drawn: --report FILE.html."
-    results.tell_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
+    results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)

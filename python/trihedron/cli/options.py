@@ -32,7 +32,7 @@ SHARED: Table = {
     "output": ("FILE", "Write the calibration file (JSON).", "-o"),
     "reference_columns": ("LIST", "Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."),
     "stream": "A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
-    "units state what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
+    "units state the content. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
     "checkpoint": (
         "FILE",
         "With --stream: keep how far the pass is in FILE, so that a run that was stopped goes on from there.",
@@ -59,8 +59,8 @@ class ReadingOptions:
         "gyro_unit": ("UNIT", "rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
         "time_unit": ("UNIT", "s, ms, us or ns; detected otherwise."),
         "device": ("N", "Which device (from 1) of an archive of several."),
-        "topic": ("NAME", "Which topic, dataset or member of a file that holds several."),
-        "instance": ("N", "Which of several IMUs whose readings one file holds."),
+        "topic": ("NAME", "Which topic, dataset or member of a file that contains several."),
+        "instance": ("N", "Which of several IMUs whose readings one file contains."),
     }
 
 
@@ -140,7 +140,7 @@ class LogsSource(ReadingOptions):
         return self.each()[0]
 
     def each(self) -> list[LogSource]:
-        """One source per log; refused where the numbers of accelerometer and gyro logs differ."""
+        """One source per log; rejected where the numbers of accelerometer and gyro logs differ."""
         log, accel, gyro = (list(files or []) for files in (self.log, self.accel, self.gyro))
         rest: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(ReadingOptions)}
         if accel and gyro and len(accel) != len(gyro):

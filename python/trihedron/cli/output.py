@@ -32,7 +32,7 @@ NOT_TO_BE_TRUSTED = 2
 def check_outputs(
     *paths: Path | None, force: bool, report: Path | None = None, inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Refuse outputs that cannot be written, before minutes of work; none of ``inputs`` is overwritten."""
+    """Reject outputs that cannot be written, before minutes of work; none of ``inputs`` is overwritten."""
     if report is not None:
         check_report(report)
     check_free([*paths, report], overwrite=force, inputs=inputs)
@@ -91,7 +91,7 @@ class Results:
         """As :func:`check_outputs`, with ``more`` files that the command writes."""
         check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
 
-    def tell(self, document: Document, machine: Machine) -> None:
+    def emit(self, document: Document, machine: Machine) -> None:
         """Print the report on stdout; write JSON and report where requested."""
         show(document, self.json, sections=None)
         self.write(document, machine)
@@ -116,12 +116,12 @@ class FullResults(Results, _Extent):
         show(document, self.json, sections=None if self.full else sections)
 
     def finish(self, document: Document, machine: Machine, more: str) -> None:
-        """Write report and JSON where requested; say ``more``, where the rest is found, unless all was shown."""
+        """Write report and JSON where requested; say ``more``, where more is found, unless all was shown."""
         self.write(document, machine)
         if not self.full and self.report is None:
             say(more)
 
-    def tell_calibration(
+    def emit_calibration(
         self,
         document: Document,
         machine: Machine,

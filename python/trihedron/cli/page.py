@@ -70,7 +70,7 @@ class Page:
     """Serves the page until closed; ``address`` includes a token that is valid once.
 
     The token is exchanged for a cookie at the first visit and then invalid, so that a link seen over a shoulder, in a
-    list of processes or in a history opens nothing. Requests for another host name are refused: this prevents DNS
+    list of processes or in a history opens nothing. Requests for another host name are rejected: this prevents DNS
     rebinding by a page of the internet.
     """
 
@@ -116,7 +116,7 @@ class Page:
     def _answer(self, request: BaseHTTPRequestHandler) -> None:
         asked = urlsplit(request.path)
         if request.headers.get("Host") != self._host:
-            self._refuse(request, "This page answers to its own address only.")
+            self._reject(request, "This page answers to its own address only.")
             return
         cookie = SimpleCookie(request.headers.get("Cookie", "")).get(COOKIE)
         is_known = cookie is not None and secrets.compare_digest(cookie.value, self._session)
@@ -127,15 +127,15 @@ class Page:
                 if is_known:
                     self._token = None
         if not is_known:
-            self._refuse(request, "The link was used already, or is not the one that trihedron printed.")
+            self._reject(request, "The link was used already, or is not the one that trihedron printed.")
         elif asked.path == "/":
             self._send_page(request)
         elif asked.path == "/events":
             self._stream(request)
         else:
-            self._refuse(request, "There is nothing here.", 404)
+            self._reject(request, "There is nothing here.", 404)
 
-    def _refuse(self, request: BaseHTTPRequestHandler, sentence: str, status: int = 403) -> None:
+    def _reject(self, request: BaseHTTPRequestHandler, sentence: str, status: int = 403) -> None:
         body = (sentence + "\n").encode()
         request.send_response(status)
         request.send_header("Content-Type", "text/plain; charset=utf-8")

@@ -40,4 +40,4 @@ def plan(
         accelerometer_density=units.m_s2_from_micro_g(accel_noise),
         sigma_turn_rad=units.radians_from_degrees(turn_error),
     )
-    results.tell(plan_report(planned), lambda: plan_record(planned))
+    results.emit(plan_report(planned), lambda: plan_record(planned))

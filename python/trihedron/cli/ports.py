@@ -16,5 +16,5 @@ def ports() -> None:
     width = max(len(port.device) for port in found)
     for port in found:
         words = " ".join(part for part in (port.description, f"[{port.usb}]" if port.usb else "") if part)
-        refused = "" if port.is_permitted else "  (no permission for this user)"
-        typer.echo(f"{port.device:{width}}  {words}{refused}".rstrip())
+        rejected = "" if port.is_permitted else "  (no permission for this user)"
+        typer.echo(f"{port.device:{width}}  {words}{rejected}".rstrip())

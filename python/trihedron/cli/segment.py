@@ -21,15 +21,15 @@ def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None 
         log = opened(source)
         from trihedron.api.streaming import condensed, segment_file
 
-        with progress("segmenting") as tell:
-            found = segment_file(log, checkpoint=checkpoint, progress=tell)
+        with progress("segmenting") as notify:
+            found = segment_file(log, checkpoint=checkpoint, progress=notify)
         # Figures and times are from the rows of moves and of the ends of poses.
         recording, segments = condensed(log, found)
     else:
         recording = source.read()
         from trihedron.api import reading
 
-        with progress("segmenting") as tell:
-            segments = reading.segment(recording, progress=tell)
-    results.tell(segments_report(segments, recording), lambda: segments_record(segments, recording))
+        with progress("segmenting") as notify:
+            segments = reading.segment(recording, progress=notify)
+    results.emit(segments_report(segments, recording), lambda: segments_record(segments, recording))
     leave((*recording.findings, *segments.findings))

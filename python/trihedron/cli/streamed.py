@@ -22,7 +22,7 @@ def needs_stream(checkpoint: Path | None, *, stream: bool) -> None:
 
 
 def opened(source: LogSource) -> LogOnDisk:
-    """The log on disk; refused where an option that streaming needs is missing."""
+    """The log on disk; rejected where an option that streaming needs is missing."""
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
     from trihedron.api.streaming import log_on_disk
@@ -45,8 +45,8 @@ def calibrate_stream(
     log = opened(source)
     from trihedron.api.streaming import calibrate_file
 
-    with progress("calibrating") as tell:
-        return calibrate_file(log, checkpoint=checkpoint, progress=tell, **place.said, **options)
+    with progress("calibrating") as notify:
+        return calibrate_file(log, checkpoint=checkpoint, progress=notify, **place.said, **options)
 
 
 def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: bool) -> None:
@@ -57,8 +57,8 @@ def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: b
     from trihedron.files.calibration import read_calibration
 
     known = read_calibration(calibration)
-    with progress("applying") as tell:
-        written = apply_file(known, log, output, overwrite=force, progress=tell)
+    with progress("applying") as notify:
+        written = apply_file(known, log, output, overwrite=force, progress=notify)
     went_on = "" if written == log.n_samples else f", {log.n_samples - written} of them by an earlier run"
     say(f"{log.n_samples} samples{went_on}: {output}")
     leave(doubted(known))

@@ -56,8 +56,8 @@ def verify(
     note_file(paths[0])
     recording = log.read()
     if len(known) > 1:
-        with progress("ranking") as tell:
-            ranking = rank(paths, recording, progress=tell, **place.said)
+        with progress("ranking") as notify:
+            ranking = rank(paths, recording, progress=notify, **place.said)
         document = ranking_report(ranking)
         note_file(next(path for path in paths if path.name == ranking.best.name))
         results.show(document, FIRST_SCREEN)
@@ -66,9 +66,9 @@ def verify(
         return
     from trihedron.report import verification_report
 
-    with progress("verifying") as tell:
+    with progress("verifying") as notify:
         result = verifying.verify(
-            known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place.said
+            known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=notify, **place.said
         )
     document = verification_report(result.verification, result.segments, recording)
     results.show(document, FIRST_SCREEN)

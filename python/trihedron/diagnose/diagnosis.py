@@ -68,14 +68,14 @@ def diagnose_recordings(
     all of them (eq. 11.21). Refused with fewer than two."""
     if len(given) < FEWEST_RECORDINGS:
         raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
-    tell = progress or _silently
+    notify = progress or _silently
     each = []
     for k, (recording, segments, calibration) in enumerate(given):
-        tell(0.8 * k / len(given), f"diagnosing {recording.source}")
+        notify(0.8 * k / len(given), f"diagnosing {recording.source}")
         each.append(_diagnosed(recording, segments, calibration, False, alpha, _silently))
-    tell(0.8, "asking what all recordings share")
+    notify(0.8, "asking what all recordings share")
     effects, candidates_together = shared_effects([model for _, model in each], alpha)
-    tell(1.0, "done")
+    notify(1.0, "done")
     return SharedDiagnosis(tuple(one for one, _ in each), effects, candidates_together)
 
 
@@ -89,7 +89,7 @@ def _diagnosed(
     calibration: Calibration,
     calibration_is_given: bool,
     alpha: float,
-    tell: Progress,
+    notify: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
     # A test with a false-alarm rate of one half or more carries no information.
@@ -101,7 +101,7 @@ def _diagnosed(
     if prior is None and is_open(calibration):
         begin = nominal(recording, segments, (calibration.gravity_m_s2, calibration.gravity_source))
         prior = prior_of(obs, begin, is_weak=True)
-    answer = _run(obs, start_state(obs, begin), prior, alpha, tell)
+    answer = _run(obs, start_state(obs, begin), prior, alpha, notify)
     model = answer.found.model
     relations = records(answer.found.related)
     verdict = verdict_of(answer, has_relations=bool(relations))
@@ -117,7 +117,7 @@ def _diagnosed(
         recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
         residuals=residuals, relations=relations, stages=held_out_stages(answer),
     )  # fmt: skip
-    tell(1.0, "done")
+    notify(1.0, "done")
     return result, model
 
 
@@ -140,14 +140,14 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     )
 
 
-def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, tell: Progress) -> Answer:
-    tell(0.05, "fitting the session")
+def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
+    notify(0.05, "fitting the session")
     predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
     context = Context(predicted.obs, predicted)
-    tell(0.2, "looking at the samples")
+    notify(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
-    domains = _all_domains(context, alpha, observed.refused)
-    tell(0.3, "letting effects compete")
+    domains = _all_domains(context, alpha, observed.rejected)
+    notify(0.3, "letting effects compete")
     bare, found = _searched(observed, prior, alpha)
     # Effects hidden by another effect, or mistaken for it, are tested once more.
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
@@ -155,16 +155,16 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     if len(more.seen) > len(observed.seen):
         observed = more
         bare, found = _searched(observed, prior, alpha)
-    tell(0.8, "asking what biases do by themselves")
+    notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
     biases, asked = bias_strengths(found.related.model, alpha)
-    tell(0.9, "checking what remains")
+    notify(0.9, "checking the unexplained part")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
     answer = Answer(
         predicted, bare, found, with_shapes(found.model), biases, observed.seen, judged.fitted, asked, known, domains
     )
     named = {one.effect.id for one in observed.seen}
-    remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
+    remaining = _all_domains(judged.context, alpha, observed.rejected | (sought - named))
     remaining = accounted_for(answer, remaining)
     if not answer.ids and not any(one.disagrees for one in remaining):
         domains = remaining  # 1/f noise inside the poses explains the disagreement
@@ -191,19 +191,19 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
     return tune_noise(with_settling(context, found), start, prior)
 
 
-def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
-    """Every domain's test; ``refused`` are ids of effects that did not improve the prediction of held-out moves: jolts
+def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
+    """Every domain's test; ``rejected`` are ids of effects that did not improve the prediction of held-out moves: jolts
     look like lost samples."""
     rows, within = judge_rows(context.fitted, alpha), judge_within_poses(context.obs, alpha)
-    return (*rows, within, _judge_timing(context, alpha, refused))
+    return (*rows, within, _judge_timing(context, alpha, rejected))
 
 
-def _judge_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
+def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests."""
     value, spread, n = common_time_error(context)
     if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
-    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
+    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in rejected]
     found = [evidence for look in looks if (evidence := look.find(context)) is not None]
     z = value / spread
     p = min([min(1.0, 2.0 * e.p_value) for e in found], default=float(min(1.0, max(2.0 * ndtr(-z), 0.05))))

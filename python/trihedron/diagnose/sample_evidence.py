@@ -35,13 +35,13 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations corrected for the effects detected in the samples, fitted in predicted noise; ``refused`` are ids of
+    """Observations corrected for the effects detected in the samples, fitted in predicted noise; ``rejected``: ids of
     effects whose correction did not improve the prediction of held-out moves."""
 
     bare: Observations
     fitted: Fit
     seen: tuple[Seen, ...] = ()
-    refused: frozenset[str] = frozenset()
+    rejected: frozenset[str] = frozenset()
 
     @property
     def obs(self) -> Observations:
@@ -58,7 +58,7 @@ def look(
     only: Collection[str] = (),
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations corrected for every effect that its own test detects, and the result of every test."""
-    held = {one.effect.id for one in observed.seen if not one.effect.is_local} | observed.refused
+    held = {one.effect.id for one in observed.seen if not one.effect.is_local} | observed.rejected
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
@@ -89,7 +89,7 @@ def _with_one(
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
         fitted = tune_noise(obs, begin, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
-            return replace(observed, refused=observed.refused | {effect.id})
+            return replace(observed, rejected=observed.rejected | {effect.id})
         gain = _explained(observed.fitted, fitted)
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
 

@@ -44,7 +44,7 @@ def integrate_rate(
         [rad], of length up to π.
     between : "linear", "constant" or "coning"
         The rate is a straight line from sample to sample (second order, with the coning of that line), each sample
-        until the next (first order), or a cubic through four samples (fourth order, with the coning inside a step;
+        until the next (first order), or a cubic through four samples (fourth order, with the coning inside an interval;
         several times slower).
     start : matrix (3, 3), quaternion (4,) or rotation vector (3,), optional
         Attitude at the first sample; the identity otherwise.

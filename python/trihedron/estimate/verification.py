@@ -117,7 +117,7 @@ def _worse_than_none(
     assert segments.accelerometer_mean is not None
     noise = _variance(segments.norm_sigma, segments.n_poses)
     bare, _, _ = norm_error(without.accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
-    pairs = {"rest": (error, bare)}
+    pairs = {"static": (error, bare)}
     gyroscope = without.gyroscope
     if gyroscope is not None and len(angle):
         with_it = replace(calibration, gyroscope=gyroscope)
@@ -204,7 +204,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray) -> Iterator[Finding]:
     times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
     yield Finding.of(
         FindingCode.RESIDUAL_ABOVE_NOISE,
-        "verify-rest",
+        "verify-static",
         severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
         norm_rms_m_s2=rms,
         worst_pose=worst + 1,

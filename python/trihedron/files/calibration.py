@@ -100,7 +100,8 @@ def calibration_text(calibration: Calibration) -> str:
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """A calibration as plain JSON types.
 
-    Refused when a sensor's covariance differs from its block of the full one: the file stores each number once.
+    Raises ``RefusedError`` when a sensor's covariance differs from its block of the full one: the file stores each
+    number once.
     """
     sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
     for k, (name, sensor) in enumerate(sensors.items()):
@@ -134,7 +135,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
 def calibration_from_document(document: object, source: str = "document") -> Calibration:
     """The calibration in a document; ``source`` is its name in error messages.
 
-    Refused when it does not follow the schema or its content is invalid.
+    Raises ``RefusedError`` when it does not follow the schema or its content is invalid.
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(

@@ -43,7 +43,8 @@ class Checkpoint:
     def load(self) -> tuple[int, dict[str, FloatArray]]:
         """Number of rows processed and the state after them; 0 and an empty state where there is no file.
 
-        Refused when the file is no checkpoint, or one of another log or other options; it is not changed.
+        Raises ``RefusedError`` when the file is no checkpoint, or one of another log or other options; it is not
+        changed.
         """
         if not self.path.exists():
             return 0, {}

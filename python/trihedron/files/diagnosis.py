@@ -19,7 +19,7 @@ class DiagnosisFileError(RefusedError):
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """A diagnosis as plain JSON types, valid against the schema; a number that is not finite is ``null``.
 
-    Refused when it does not follow the schema: a defect of this program.
+    Raises ``RefusedError`` when it does not follow the schema: a defect of this program.
     """
     document: dict[str, Any] = plain(diagnosis.to_dict())
     complaint = complaint_about(document)
@@ -31,7 +31,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
 def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read and check a diagnosis written by ``trihedron diagnose --json``.
 
-    Refused when the file is missing, is no JSON, or does not follow the schema.
+    Raises ``RefusedError`` when the file is missing, is no JSON, or does not follow the schema.
     """
     path = Path(path)
     meant = "name a file written by `trihedron diagnose --json`"

@@ -26,7 +26,7 @@ _CHECKSUM_KEYS = {"kind", "at", "from", "to"}
 def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     """The frame that a TOML file declares.
 
-    Refused when a key is wrong or missing; the message names the file and the key.
+    Raises ``RefusedError`` when a key is wrong or missing; the message names the file and the key.
     """
     path = Path(path)
     try:

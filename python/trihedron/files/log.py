@@ -20,7 +20,7 @@ _TIME = "t [s]"
 
 
 def check_suffix(path: str | os.PathLike[str]) -> None:
-    """Refuse a file name whose ending is not that of a format, before any work; the message lists the valid ones."""
+    """Reject a file name whose ending is not that of a format, before any work; the message lists the valid ones."""
     if Path(path).suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{path}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
 
@@ -30,7 +30,8 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 
     ``-`` is CSV on stdout.
 
-    Refused when the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
+    Raises ``RefusedError`` when the ending is none of .csv, .npz, .parquet, or the file exists and may not be
+    replaced.
     """
     if str(path) != "-":
         check_suffix(path)

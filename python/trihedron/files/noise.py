@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from trihedron.documents import read_json
 from trihedron.errors import RefusedError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
+from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, TermName
 
+MEANT = "name a file written by `trihedron allan --json`"
+_OF_A_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate", "fitted")
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
 
 
@@ -23,16 +27,16 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 
     For a term that was not detected the value is the upper limit from the log.
 
-    Refused when the file is missing or is not what ``trihedron allan --json`` writes, or its readings are not in SI.
+    Raises ``RefusedError`` when the file is missing or is not what ``trihedron allan --json`` writes, or its readings
+    are not in SI.
     """
-    meant = "name a file written by `trihedron allan --json`"
-    return noise_figures(read_json(path, "file of noise terms", meant, NoiseFileError), str(Path(path)))
+    return noise_figures(read_json(path, "file of noise terms", MEANT, NoiseFileError), str(Path(path)))
 
 
 def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:
     """As :func:`read_noise`, from the JSON document itself; ``source`` is its name in error messages.
 
-    Refused when it contains no noise terms, or its readings are not in SI.
+    Raises ``RefusedError`` when it contains no noise terms, or its readings are not in SI.
     """
     try:
         axes = document["axes"]
@@ -52,6 +56,41 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
             "--gyro-lsb, or with --calibration FILE."
         )
     return out, rate
+
+
+def read_noise_axes(path: str | os.PathLike[str]) -> tuple[NoiseAxis, ...]:
+    """The axes of a file that ``trihedron allan --json`` writes, in their unit; none where it is another JSON object.
+
+    Raises ``RefusedError`` when the file is missing or no JSON, or its axes lack values.
+    """
+    document = read_json(path, "file of noise terms", MEANT, NoiseFileError)
+    if not isinstance(document, dict) or "axes" not in document:
+        return ()
+    try:
+        return tuple(_axis(one, float(document["rate_hz"]), int(document["n_samples"])) for one in document["axes"])
+    except (KeyError, TypeError, ValueError, ArithmeticError):
+        raise NoiseFileError(f"{Path(path)}: its axes lack noise terms; {MEANT}.") from None
+
+
+def _axis(said: dict[str, Any], rate_hz: float, n_samples: int) -> NoiseAxis:
+    process = said["gauss_markov"]
+    return NoiseAxis(
+        name=str(said["name"]),
+        unit=str(said["unit"]),
+        rate_hz=rate_hz,
+        n_samples=n_samples,
+        duration_s=n_samples / rate_hz,
+        mean=float(said["mean"]),
+        sample_sigma=float(said["sample_sigma"]),
+        resolution=float(said["resolution"]),
+        terms=MappingProxyType({symbol: _term(symbol, said["terms"][symbol.value]) for symbol in TermName}),
+        gauss_markov=None if process is None else GaussMarkov(**{name: float(v) for name, v in process.items()}),
+    )
+
+
+def _term(symbol: TermName, said: dict[str, Any]) -> NoiseTerm:
+    figures: dict[str, Any] = {name: float(said[name]) for name in _OF_A_TERM}
+    return NoiseTerm(symbol=symbol, is_present=bool(said["present"]), **figures)
 
 
 def _figure(axes: list[dict[str, Any]], unit: str, term: str) -> NoiseFigure:

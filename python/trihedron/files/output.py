@@ -135,9 +135,9 @@ class OutputError(RefusedError):
 
 
 def check_report(path: Path) -> None:
-    """Refuse a report whose ending is not that of a format.
+    """Reject a report whose ending is not that of a format.
 
-    Refused when the ending is unknown; the message lists the valid ones.
+    Raises ``RefusedError`` when the ending is unknown; the message lists the valid ones.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
         raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
@@ -146,12 +146,12 @@ def check_report(path: Path) -> None:
 def check_free(
     paths: Iterable[Path | None], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str] | None] = ()
 ) -> None:
-    """Refuse outputs that cannot be written, before the work is done.
+    """Reject outputs that cannot be written, before the work is done.
 
     ``inputs`` are the files that the outputs are made from: none of them is overwritten, even with ``overwrite``.
 
-    Refused when a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable,
-    or one name is given twice.
+    Raises ``RefusedError`` when a file exists and may not be replaced, is an input or read-only, its folder is missing
+    or not writable, or one name is given twice.
     """
     read = {identity: Path(path) for path in inputs if path is not None and (identity := _identity(path))}
     seen: set[str] = set()
@@ -219,7 +219,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
 
     A link is followed. Temporary files of killed processes in the folder are deleted.
 
-    Refused as :func:`check_free`, or when the system refuses.
+    Raises ``RefusedError`` as :func:`check_free`, or when the system rejects.
     """
     target = Path(path)
     check_free([target], overwrite=overwrite)
@@ -261,7 +261,7 @@ def is_stream(path: Path, found: os.stat_result | None) -> bool:
 def write_stream(path: Path, found: os.stat_result | None, data: bytes) -> None:
     """Write all of ``data`` to a device or pipe.
 
-    Raises OSError when a pipe has no reader, or the system refuses.
+    Raises OSError when a pipe has no reader, or the system rejects.
     """
     with os.fdopen(_opened(path, found), "wb", buffering=0) as stream:
         left = memoryview(data)

@@ -23,8 +23,8 @@ ROUNDING = 1e-9
 def require_plausible(calibration: Calibration) -> Calibration:
     """The calibration, if it is plausible for a sensor.
 
-    Refused when S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger than any sensor's,
-    or a covariance is invalid (a negative variance, correlations beyond one).
+    Raises ``RefusedError`` when S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger
+    than any sensor's, or a covariance is invalid (a negative variance, correlations beyond one).
     """
     for name, sensor in named_sensors(calibration):
         largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))

@@ -96,11 +96,11 @@ def improved_scenario(
         entries.append(table)
     if len(entries):
         document.add("effect", entries)
-    return tomlkit.dumps(document)
+    return tomlkit.dumps(document).rstrip("\n") + "\n"
 
 
 def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write an improved scenario to a file. Refused when the file exists and may not be replaced."""
+    """Write an improved scenario to a file. Raises ``RefusedError`` when the file exists and may not be replaced."""
     write_whole(path, text, overwrite=overwrite)
 
 
@@ -111,7 +111,8 @@ def _under_own_head(text: str, name: str) -> str:
 
 
 def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
-    if name not in parent:
+    is_new = name not in parent
+    if is_new:
         parent.add(name, tomlkit.table())
     table = parent[name]
     for key, value in values.items():
@@ -123,6 +124,8 @@ def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
             table[key] = item
             if not is_same:
                 item.trivia.comment = item.trivia.comment_ws = ""
+    if is_new:
+        table.add(tomlkit.nl())
 
 
 def _item(value: Any) -> Item:

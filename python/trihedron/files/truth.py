@@ -43,7 +43,7 @@ def truth_document(truth: Truth) -> dict[str, Any]:
 
 
 def check_truth_suffix(path: Path) -> None:
-    """Refuse a file name whose ending is not that of a format, before any work."""
+    """Reject a file name whose ending is not that of a format, before any work."""
     if path.suffix.lower() not in (".npz", ".json"):
         raise OutputError(f"{path}: truth is written as .npz (everything) or .json (no samples).")
 
@@ -51,7 +51,7 @@ def check_truth_suffix(path: Path) -> None:
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the truth; ``.npz`` contains everything, ``.json`` all but the arrays per sample.
 
-    Refused when the ending is another one, or the file exists and may not be replaced.
+    Raises ``RefusedError`` when the ending is another one, or the file exists and may not be replaced.
     """
     target = Path(path)
     check_truth_suffix(target)
@@ -66,7 +66,10 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
 
 
 def read_truth(path: str | os.PathLike[str]) -> Truth:
-    """Read a truth file that :func:`write_truth` wrote as ``.npz``. Refused when the file is not such a file."""
+    """Read a truth file that :func:`write_truth` wrote as ``.npz``.
+
+    Raises ``RefusedError`` when the file is not such a file.
+    """
     try:
         with np.load(path, allow_pickle=False) as archive:
             header = json.loads(str(archive["header"]))

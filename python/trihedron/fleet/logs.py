@@ -51,7 +51,7 @@ def find_jobs(
     ``serial`` is a regular expression whose first group, found in a log's path, names its device; without it devices
     are those of an archive, or else the log's folder. ``apart_from`` is excluded: the output of the fleet.
 
-    Refused when there is no log, a named log is missing, or the expression does not match.
+    Raises ``RefusedError`` when there is no log, a named log is missing, or the expression does not match.
     """
     paths = [
         path for path in _paths(source) if apart_from is None or apart_from.resolve() not in path.resolve().parents

@@ -96,8 +96,8 @@ def fleet(
     }
     if workers is not None and workers < 0:
         raise RefusedError(f"--workers is 0 or more, not {workers}.")
-    tell = progress or (lambda _fraction, _text: None)
-    tell(0.0, "looking at logs")
+    notify = progress or (lambda _fraction, _text: None)
+    notify(0.0, "looking at logs")
     jobs = find_jobs(logs, options, serial=serial, apart_from=folder)
     if folder.exists() and not folder.is_dir():
         raise RefusedError(f"{folder}: this is a file; name a folder for the results.")
@@ -108,9 +108,9 @@ def fleet(
     for done, (job, row) in enumerate(_results(todo, options, scheduler, workers), 1):
         _keep(folder, job, row)
         rows[job.key] = _of_table(row)
-        tell(done / len(todo), f"{n_before + done} of {n_before + len(todo)} logs")
+        notify(done / len(todo), f"{n_before + done} of {n_before + len(todo)} logs")
     made = [{"path": job.path, "name": job.name, "serial": job.serial, "key": job.key} | rows[job.key] for job in jobs]
-    tell(1.0, "writing the table and the page")
+    notify(1.0, "writing the table and the page")
     result = summarise(made, folder, n_before)
     write_tables(result.rows, result.summary, folder)
     write_calibrations(jobs, folder / RESULTS, folder)
@@ -174,7 +174,7 @@ def _why(error: BaseException | None) -> str:
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """A Dask client of the given scheduler, or of a cluster of processes on this machine.
 
-    Refused when Dask is not installed, or the scheduler does not answer.
+    Raises ``RefusedError`` when Dask is not installed, or the scheduler does not answer.
     """
     try:
         dask, distributed = import_module("dask"), import_module("distributed")

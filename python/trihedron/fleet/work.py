@@ -22,7 +22,7 @@ REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)
 def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     """The row of one log; raises nothing: the reason of a failure is in the row.
 
-    ``status`` is ``done``, ``refused`` (the log is unusable, with the reason) or ``crashed`` (a defect of the program
+    ``status`` is ``done``, ``rejected`` (the log is unusable, with the reason) or ``crashed`` (a defect of the program
     or lack of memory; tried again by the next run).
     """
     began = time.monotonic()
@@ -30,7 +30,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     try:
         row |= {"status": "done", "reason": "", **_calibrated(path, device, options)}
     except REFUSED as error:
-        row |= {"status": "refused", "reason": str(error)}
+        row |= {"status": "rejected", "reason": str(error)}
     except MemoryError:
         row |= {"status": "crashed", "reason": "there was not enough memory for this log"}
     except Exception as error:  # a defect met in one log must not cost the results of the others
@@ -45,14 +45,14 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
     from trihedron.api import calibrating, diagnosing, reading
     from trihedron.records.results import CalibrationResult
 
-    told: dict[str, Any] = {
+    stated: dict[str, Any] = {
         key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)
     }
     place: dict[str, Any] = {key: options.get(key) for key in ("gravity_m_s2", "latitude_deg", "height_m")}
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
         raise RefusedError(f"{path}: this is {kind}, not a file.")
-    recording = reading.read(path, device=device, **told)
+    recording = reading.read(path, device=device, **stated)
     diagnosis = None
     if options.get("diagnose", True):
         found = diagnosing.diagnose(recording, **place)

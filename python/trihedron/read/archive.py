@@ -95,7 +95,7 @@ def read_npz(path: Path, device: int | None) -> Table:
 
 
 def _check_members(path: Path, archive: Any) -> None:
-    """Refuse an archive whose members do not fit into memory, or are shorter than their headers state."""
+    """Reject an archive whose members do not fit into memory, or are shorter than their headers state."""
     packed = unpacked = 0
     for info in archive.zip.infolist():
         packed, unpacked = packed + info.compress_size, unpacked + info.file_size

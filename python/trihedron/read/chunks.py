@@ -20,7 +20,7 @@ from trihedron.read.errors import (
     errors_of_polars,
     first_line,
     from_os_error,
-    refuse_after_fork,
+    reject_after_fork,
 )
 from trihedron.read.text.layout import MISSING, Layout, detect
 
@@ -144,7 +144,7 @@ def _layout_of(log: Path) -> Layout:
 def _convert(log: Path, layout: Layout, target: Path) -> None:
     import polars
 
-    refuse_after_fork(log)
+    reject_after_fork(log)
     names = [f"column {k + 1}" for k in range(layout.n_fields + layout.trailing_separator)]
     remedy = "; repair it, or read the log whole (without --stream), which says which rows"
     with errors_of_polars(log, f"not every row is {layout.n_fields} numbers", remedy):
@@ -215,7 +215,7 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     if magic == b"\x93NUMPY":
         n_rows, n_columns, read = _rows_of_array(path)
     else:
-        refuse_after_fork(path)
+        reject_after_fork(path)
         n_rows, n_columns, read = _rows_of_parquet(path, None if magic[:4] == b"PAR1" else TextOnDisk(path))
     words = [word.strip().lower() for word in columns.split(",")]
     if len(words) != n_columns:

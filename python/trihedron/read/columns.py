@@ -26,7 +26,8 @@ _ALIASES = {
     **{"counter": "counter", "n": "counter", "seq": "counter", "device": "device"},
 }
 _SKIP = {"-", "_", "skip", ""}
-_SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+SENSORS: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+"""Roles of three columns."""
 _SINGLE = ("time", "temperature", "supply", "counter", "device")
 """Roles of one column."""
 _BY_PLACE = (3, 4, 6, 7)
@@ -88,12 +89,25 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     if mapping is not None and re.search(r"(?:^|,)\s*(?:t|time)\s*=\s*(?:none|-)\s*(?:,|$)", mapping):
         chosen = replace(chosen, time=None)
     if chosen.accelerometer is None and chosen.gyroscope is None:
-        listed = ", ".join(table.names) if table.names else f"{len(table.columns)} columns without names"
-        raise ReadError(
-            f"{table.path}: no accelerometer and no gyro columns recognised among: {listed[:300]}; "
-            "name them, for example --columns time=1,ax=2,ay=3,az=4."
-        )
+        raise ReadError(f"{table.path}: {_without_sensor(table)}")
     return chosen
+
+
+def _without_sensor(table: Table) -> str:
+    """Why no sensor was found: an axis without numbers, else names that mean none."""
+    for column, name in enumerate(table.names or ()):
+        role = parse_name(name).role
+        if role in SENSORS and not len(table.columns[column]):
+            example = f" (such as {table.words[column]!r})" if table.words.get(column) else ""
+            return (
+                f"column '{name}' of the {role} contains no numbers{example}; correct it, or name another column, for "
+                "example --columns time=1,ax=2,ay=3,az=4."
+            )
+    listed = ", ".join(table.names) if table.names else f"{len(table.columns)} columns without names"
+    return (
+        f"no accelerometer and no gyro columns recognised among: {listed[:300]}; "
+        "name them, for example --columns time=1,ax=2,ay=3,az=4."
+    )
 
 
 def columns_or_none(table: Table) -> Columns | None:
@@ -149,7 +163,7 @@ def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
         roles[role] = _column_number(table, column_text.strip(), role)
     found: dict[str, Any] = {role: roles.get(role) for role in _SINGLE}
     named = [parse_name(name) for name in table.names or [""] * len(table.columns)]
-    for sensor_name in _SENSORS:
+    for sensor_name in SENSORS:
         axes = {f"{sensor_name[0]}{axis}": roles.get(f"{sensor_name[0]}{axis}") for axis in "xyz"}
         given = tuple(column for column in axes.values() if column is not None)
         if not given:
@@ -206,7 +220,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     notes: list[Finding] = []
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
-    for role in _SENSORS:
+    for role in SENSORS:
         groups = _triads(parsed, role)
         triads[role], units[role] = _choose(table, parsed, groups, role, notes)
     if triads["accelerometer"] is None and triads["gyroscope"] is not None:
@@ -223,7 +237,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     bare = _triads(parsed, "bare")
     if bare and not any(triads.values()):
         name = parsed[bare[0][0]]
-        by_unit: list[Sensor] = [one for one in _SENSORS if name.unit_for(one)]
+        by_unit: list[Sensor] = [one for one in SENSORS if name.unit_for(one)]
         told = sensor or sensor_of_file_name(table.path.name) or (by_unit[0] if len(by_unit) == 1 else None)
         guess: Sensor = told or "accelerometer"
         triads[guess] = bare[0]
@@ -244,7 +258,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         accelerometer_unit=units["accelerometer"],
         gyroscope_unit=units["gyroscope"],
         time_unit=parsed[time].time_unit if time is not None else "",
-        positional=unnamed in (6, 7) and not any(p.role in _SENSORS for p in parsed),
+        positional=unnamed in (6, 7) and not any(p.role in SENSORS for p in parsed),
         findings=tuple(notes),
     )
 
@@ -283,11 +297,17 @@ def sensor_of_file_name(name: str) -> Sensor | None:
 
 
 def _triads(parsed: list[ColumnName], role: str) -> list[Triad]:
-    """Complete groups of x, y, z columns of one role, in file order."""
+    """Complete groups of ``x``, ``y``, ``z`` columns of one role, in file order."""
     groups: dict[str, dict[str, int]] = {}
     for i, name in enumerate(parsed):
         if name.role == role and name.axis:
             groups.setdefault(name.group, {}).setdefault(name.axis, i)
+    for key, axes in groups.items():
+        stem, bar, unit = key.partition("|")
+        # A unit in the name of one axis is that of all: "gx [rad/s], gy, gz".
+        without = groups.get(stem + bar, {}) if unit else {}
+        if without and len(axes) < len("xyz") and axes.keys().isdisjoint(without):
+            axes |= without
     triads: list[Triad] = []
     for axes in groups.values():
         for labels in ("xyz", "012", "123"):
@@ -308,34 +328,4 @@ def _choose(
         taken = " ".join(table.label(c) for c in best)
         listed = [" ".join(table.label(c) for c in triad) for triad in others[:4]]
         notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "one-of-several", sensor=role, taken=taken, others=listed))
-    return best, parsed[best[0]].unit
-
-
-# The roles of a table's columns, as a finding and as the value of --columns.
-
-
-def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
-    """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
-    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
-    time = [] if columns.time is None else [f"time={columns.time + 1}"]
-    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
-    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
-
-
-def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
-    """The finding that states the role of each column, and the columns without a role."""
-    roles = []
-    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
-        value = getattr(columns, role)
-        if value is not None:
-            which = value if isinstance(value, tuple) else (value,)
-            roles.append((role, " ".join(table.label(c) for c in which)))
-    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
-    return Finding.of(
-        FindingCode.COLUMNS_RECOGNISED,
-        has_file=bool(file_name),
-        file=file_name,
-        roles=roles,
-        has_rest=bool(rest),
-        rest=rest[:24],
-    )
+    return best, next((parsed[column].unit for column in best if parsed[column].unit), "")

@@ -75,8 +75,8 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
     return ReadError(f"{path}: the system cannot read this file ({error.strerror or error}); copy it to a local disk.")
 
 
-def refuse_after_fork(path: Path) -> None:
-    """Refuse to use polars in a forked child process, where it would wait forever.
+def reject_after_fork(path: Path) -> None:
+    """Error in a child process made by fork, where polars would wait forever.
 
     Raises
     ------

@@ -67,7 +67,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
 
 
 def _table(path: Path, name: str, value: Any) -> Table | None:
-    """A data frame as a table; columns named only x, y, z get the name of their table as prefix."""
+    """A data frame as a table; columns named only ``x``, ``y``, ``z`` get the name of their table as prefix."""
     if not (hasattr(value, "columns") and hasattr(value, "dtypes")):
         return None
     items = frame_columns(value)

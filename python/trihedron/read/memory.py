@@ -72,7 +72,7 @@ def rows_that_fit(left: int, n_columns: int) -> int:
 
 
 def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
-    """Refuse a log that does not fit into memory.
+    """Reject a log that does not fit into memory.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
 
 
 def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Refuse a malicious archive.
+    """Reject a malicious archive.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") 
 
 
 def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Refuse a malicious archive, or one whose content does not fit into memory.
+    """Reject a malicious archive, or one whose content does not fit into memory.
 
     Raises
     ------

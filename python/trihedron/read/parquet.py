@@ -9,7 +9,7 @@ import polars as pl
 
 from trihedron.arrays import FloatArray
 from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, errors_of_polars, refuse_after_fork
+from trihedron.read.errors import ReadError, errors_of_polars, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -17,7 +17,7 @@ from trihedron.records import Finding, FindingCode
 
 def read_parquet(path: Path) -> Table:
     """Numeric and time columns of a Parquet file; other columns are excluded with a finding."""
-    refuse_after_fork(path)
+    reject_after_fork(path)
     with errors_of_polars(path, "this Parquet file is damaged or cut off", "; write it again"):
         n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
         check_memory(path, n_rows, len(pl.read_parquet_schema(path)))

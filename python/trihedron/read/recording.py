@@ -21,7 +21,8 @@ from trihedron.read.audit.seam import audit_seam
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
-from trihedron.read.columns import Sensor, Triad, mapping_of
+from trihedron.read.column_roles import mapping_of
+from trihedron.read.columns import Sensor, Triad
 from trihedron.read.devices import Choice, by_sensor, one_beside
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
@@ -298,7 +299,7 @@ def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
 
 
 def _triads_of(names: tuple[str, ...], taken: set[int]) -> list[Triad]:
-    """Triads of columns whose names differ only in one letter: x, y, z."""
+    """Triads of columns whose names differ only in one letter: ``x``, ``y``, ``z``."""
     left = {name.strip().lower(): i for i, name in enumerate(names) if i not in taken}
     out: list[Triad] = []
     for name, i in left.items():

@@ -15,8 +15,8 @@ TOO_FEW_TO_JUDGE = 20
 """Number of rows below which a working channel may be constant."""
 
 
-def refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
-    """Refuse readings (n, 3), from columns ``where``, of which an axis is constant.
+def reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
+    """Reject readings (n, 3), from columns ``where``, of which an axis is constant.
 
     Raises
     ------

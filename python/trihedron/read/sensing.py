@@ -96,7 +96,7 @@ def judge_accelerometer(
             return Judged(
                 nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", rest_norm=norm, unit=nearest.value),)
             )
-        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-at-rest", rest_norm=norm, unit=nearest.value)
+        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", rest_norm=norm, unit=nearest.value)
         return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
         return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, rest_norm=norm),))

@@ -14,15 +14,16 @@ from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
-from trihedron.read.columns import Columns, Sensor, find_columns, mapping_of, statement
+from trihedron.read.column_roles import columns_of_words, mapping_of, statement
+from trihedron.read.columns import Columns, Sensor, find_columns
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
-from trihedron.read.repeated import copied_rows, refuse_constant
+from trihedron.read.repeated import copied_rows, reject_constant
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
-from trihedron.read.time_column import refuse_unread_time, summed_steps, with_arrivals
+from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
@@ -125,12 +126,9 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [*table.findings, *chosen.findings]
-    for i, example in table.words.items():
-        left_out = Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
-        findings.append(left_out)
+    findings = [*table.findings, *chosen.findings, *columns_of_words(table, chosen)]
     if chosen.time is None:
-        refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
+        reject_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
     clock = _without_copies(table, chosen, clock, findings)
     accelerometer = None if sensor == "gyroscope" else _triad(table, chosen.accelerometer, clock.rows)
@@ -150,7 +148,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         ("gyroscope", gyroscope, chosen.gyroscope),
     ):
         if triad is not None and where is not None:
-            refuse_constant(table, name, triad, where)
+            reject_constant(table, name, triad, where)
     return Sensors(
         clock.time_s,
         clock.start_s,

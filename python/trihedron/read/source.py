@@ -37,8 +37,8 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
 )
 
 
-def refuse_foreign(path: Path, magic: bytes) -> None:
-    """Refuse a file of a known format that is not supported.
+def reject_foreign(path: Path, magic: bytes) -> None:
+    """Reject a file of a known format that is not supported.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     known = _ecosystem(path, magic, choice, progress)
     if known is not None:
         return tuple(replace(table, is_chosen=True) for table in known)
-    refuse_foreign(path, magic)
+    reject_foreign(path, magic)
     from trihedron.read.text.blocks import compression_of
     from trihedron.read.text.open import read_text
 

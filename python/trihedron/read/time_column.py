@@ -1,4 +1,4 @@
-"""The time of a log: summed time steps, times from arrivals, and refusal of a time column that is not understood."""
+"""The time of a log: summed time steps, times from arrivals, and rejection of a time column that is not understood."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ NEARLY_ALL = 0.99
 """Smallest share of increasing steps of a clock; a few timestamps may be equal."""
 
 
-def refuse_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_hz: float | None) -> None:
-    """Refuse a table with a column that looks like a time but is not understood, unless ``mapping`` names the time.
+def reject_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_hz: float | None) -> None:
+    """Reject a table with a column that looks like a time but is not understood, unless ``mapping`` names the time.
 
     ``rate_hz`` is the rate that is known without a clock, if any.
 

@@ -32,7 +32,7 @@ SUFFIX = "_fifo"
 
 
 def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
-    """All samples in order: ``timestamp_sample`` [µs] and x, y, z in SI, each (n,); None where fields are missing."""
+    """All samples in order: ``timestamp_sample`` [µs] and X, Y, Z in SI, each (n,); None where fields are missing."""
     present = {"timestamp_sample", "dt", "scale", "samples"} <= set(data)
     width = sum(f"x[{k}]" in data for k in range(256))
     if not present or not width or any(f"{axis}[{width - 1}]" not in data for axis in AXES):

@@ -40,7 +40,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
                 return (read_npz(path, choice.device),)
             if choice.device is not None:
                 raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
-            _refuse_containers(path, names)
+            _reject_containers(path, names)
             members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
             picked = _chosen(path, members, choice.topic) or _by_name(members)
             if not picked:
@@ -66,7 +66,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
     return tuple(tables)
 
 
-def _refuse_containers(path: Path, names: list[str]) -> None:
+def _reject_containers(path: Path, names: list[str]) -> None:
     known = {
         "xl/workbook.xml": ("an Excel workbook (.xlsx)", "save the sheet as CSV"),
         "word/document.xml": ("a Word document", "name the log itself"),

@@ -98,7 +98,7 @@ class RecordingFacts(Frozen):
         return RecordingFacts(*(one and one.moved(to) for one in (self.accelerometer, self.gyroscope)))
 
     def of(self, sensor: str) -> ChannelFacts:
-        """The channel properties of one sensor. Refused when the recording lacks that sensor."""
+        """The channel properties of one sensor. Raises ``RefusedError`` when the recording lacks that sensor."""
         facts = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}[sensor]
         if facts is None:
             raise RefusedError(f"the recording has no {sensor}")

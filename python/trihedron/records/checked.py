@@ -38,7 +38,7 @@ def said(value: Any) -> str:
 def numbers_of(name: str, value: Any) -> npt.NDArray[Any]:
     """An array of real numbers of any shape; masked entries become NaN (missing).
 
-    Refused when it is not an array of numbers.
+    Raises ``RefusedError`` when it is not an array of numbers.
     """
     try:
         array = np.ma.filled(value.astype(np.float64), np.nan) if np.ma.isMaskedArray(value) else np.asarray(value)
@@ -66,7 +66,7 @@ def number_of(name: str, value: Any) -> float:
 def word_of(name: str, value: Any, kind: type[Word]) -> Word:
     """A member of the enumeration ``kind``.
 
-    Refused when it is not a member; the message lists the members while the list is short.
+    Raises ``RefusedError`` when it is not a member; the message lists the members while the list is short.
     """
     with suppress(ValueError, TypeError):
         return kind(value)

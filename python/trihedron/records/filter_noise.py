@@ -9,8 +9,8 @@ from trihedron.records.finding import Finding
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Presented
 
-Cause = Literal["rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
-CAUSES: tuple[Cause, ...] = ("rest", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
+Cause = Literal["static", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
+CAUSES: tuple[Cause, ...] = ("static", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
 """Noise as in static intervals, vibration, bias drift, its part that follows a logged temperature,
 errors of S, errors by g-sensitivity, the reference's own error."""
 

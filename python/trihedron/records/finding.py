@@ -56,7 +56,7 @@ class FindingCode(str, Enum):
     DEVICES_INTERLEAVED = "devices-interleaved"
     AXES_CHANGED = "axes-changed"
     CLOCK_JUMPED = "clock-jumped"
-    RAW_STEP = "raw-step"
+    RAW_LSB = "raw-lsb"
     UNIT_DETECTED = "unit-detected"
     UNIT_CONTRADICTED = "unit-contradicted"
     RATE_STATED = "rate-stated"
@@ -110,7 +110,7 @@ class FindingCode(str, Enum):
     REFERENCE_OF_ITSELF = "reference-of-itself"
     REFERENCE_ONLY = "reference-only"
     # noise for a filter
-    FILTER_NOISE_AT_REST = "filter-noise-at-rest"
+    FILTER_NOISE_STATIC = "filter-noise-static"
     FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"
@@ -134,14 +134,14 @@ class FindingCode(str, Enum):
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
     # noise
-    LOG_STEP = "log-step"
-    LOG_KNOCK = "log-knock"
+    LOG_JUMP = "log-jump"
+    LOG_IMPACT = "log-impact"
     LOG_DRIFT = "log-drift"
     LOG_MOTION = "log-motion"
     LOG_TOO_SHORT = "log-too-short"
     TEMPERATURE_DRIVEN = "temperature-driven"
     SPECTRAL_LINE = "spectral-line"
-    SPECTRUM_COLOURED = "spectrum-coloured"
+    SPECTRUM_LOW_PASS = "spectrum-low-pass"
     SPECTRUM_UNEXPLAINED = "spectrum-unexplained"
     CURVE_ALONE = "curve-alone"
     RAMP_OR_WALK = "ramp-or-walk"
@@ -151,7 +151,7 @@ class FindingCode(str, Enum):
     # kalman
     INNOVATIONS_TOO_LARGE = "innovations-too-large"
     INNOVATIONS_TOO_SMALL = "innovations-too-small"
-    INNOVATIONS_COLOURED = "innovations-coloured"
+    INNOVATIONS_CORRELATED = "innovations-correlated"
     NOISE_ASSUMED = "noise-assumed"
     SCALE_NOT_NOMINAL = "scale-not-nominal"
     POSE_NOT_A_FACE = "pose-not-a-face"
@@ -208,9 +208,9 @@ class Finding(Frozen, Plain):
         Raises KeyError when the catalogue lacks the case, or a placeholder of its sentences has no value.
         """
         severity, seen, cause, action = ask("words_of", code, case, severity, values)
-        told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
+        plain = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
         # An infinite value or NaN means not estimated, and JSON cannot hold it.
-        figures = {name: v for name, v in (told | dict(numbers or {})).items() if math.isfinite(v)}
+        figures = {name: v for name, v in (plain | dict(numbers or {})).items() if math.isfinite(v)}
         return cls(code, severity, seen, cause, action, MappingProxyType(figures))
 
     def __str__(self) -> str:

@@ -16,7 +16,7 @@ class FleetLog:
 
     name: str
     serial: str
-    status: Literal["done", "refused", "crashed"]
+    status: Literal["done", "rejected", "crashed"]
     reason: str
     verdict: str
     effects: tuple[str, ...]

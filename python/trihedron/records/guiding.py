@@ -27,7 +27,7 @@ class Accuracy:
     def parse(cls, text: str) -> Accuracy:
         """From ``"accel 0.05 %, gyro 0.1 %"``; a sensor that is not named keeps its default.
 
-        Refused when a part is not understood.
+        Raises ``RefusedError`` when a part is not understood.
         """
         chosen: dict[str, float] = {}
         for part in (piece.strip() for piece in text.split(",") if piece.strip()):

@@ -29,13 +29,13 @@ def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
     ``None`` where a figure cannot be cross-validated.
     """
     out: dict[str, dict[str, Any]] = {}
-    at_rest = calibration.accelerometer.quality
-    if at_rest is not None:
+    quality = calibration.accelerometer.quality
+    if quality is not None:
         out["gravity_error_in_static_poses"] = {
             "definition": f"| |S a' + b| - |g| | of the means of the poses, {AT_REST}",
             "unit": "m/s^2",
-            "rms": float(at_rest.rms),
-            "held_out_rms": None if at_rest.held_out_rms is None else float(at_rest.held_out_rms),
+            "rms": float(quality.rms),
+            "held_out_rms": None if quality.held_out_rms is None else float(quality.held_out_rms),
         }
     moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
     if moved is not None and moved.angle_deg is not None:

@@ -84,3 +84,8 @@ def axes_of(sensor: SensorCalibration) -> Axes:
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
     sigma_at_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
     return Axes(sensitivity, sigma[:3], at_zero, sigma_at_zero, at_zero / sensitivity, sigma[6:], skew, sigma[3:6])
+
+
+def term_in_print(term: str) -> str:
+    """A term of compared noise and sampling: figures of the poses are distinct from those of the whole log."""
+    return {"bandwidth": "bandwidth in the poses", "jitter": "timestamp error"}.get(term, term)

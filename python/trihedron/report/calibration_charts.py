@@ -54,7 +54,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, line
 
 
 def _highest(held: FloatArray, held_sigma: FloatArray | None, residual: FloatArray, limit: FloatArray) -> float:
-    """Limit of the axis: every point is shown, error bars up to ``MOST_OF_A_BAR`` times their median.
+    """Limit of the axis: every point is shown, uncertainties up to ``MOST_OF_A_BAR`` times their median.
 
     The cross-validated residual of a pose that alone determines a parameter has a huge σ, which would hide all others.
     """
@@ -93,10 +93,12 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, tips, "excluded", "soft"))
     if held is not None:
-        told_held = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
-        marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "cross-validated", "accent"))
-    told_noise = [said(f"noise alone, {w}", v, "° rms") for w, v in zip(names, noise, strict=True)]
-    marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
+        held_labels = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
+        marks.append(
+            Bars(move + shift, np.where(is_out, np.nan, held), width, held_labels, "cross-validated", "accent")
+        )
+    noise_labels = [said(f"noise alone, {w}", v, "° rms") for w, v in zip(names, noise, strict=True)]
+    marks.append(Points(move, noise, noise_labels, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
     # An excluded move may have a hundred times the error: the others must stay readable.

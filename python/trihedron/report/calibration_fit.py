@@ -101,10 +101,10 @@ def move_floor(quality: FitQuality) -> float:
 def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> Table | None:
     """Residuals of the saved S and b beside those of the session's fit, in which biases vary."""
     rows = []
-    at_rest = calibration.accelerometer.quality
-    if at_rest is not None:
-        held = "–" if at_rest.held_out_rms is None else in_mm_s2(at_rest.held_out_rms)
-        rows.append(("gravity error in static poses", in_mm_s2(at_rest.rms), held, in_mm_s2(at_rest.floor)))
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        held = "–" if quality.held_out_rms is None else in_mm_s2(quality.held_out_rms)
+        rows.append(("gravity error in static poses", in_mm_s2(quality.rms), held, in_mm_s2(quality.floor)))
     moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
     seen = [f"{plain_number(rms)}°" for _, rms, _ in angles_of(moved)] if moved is not None else []
     if moved is not None and seen:

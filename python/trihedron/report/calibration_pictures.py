@@ -36,7 +36,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
         return None
     caption = "Norm of gravity minus its true value in every pose, against 3 σ of noise alone"
     if _is_held(quality):
-        caption += "; circles: cross-validated, predicted by a fit that did not see that pose, bars: 1 σ"
+        caption += "; circles: cross-validated, predicted by a fit without that pose, ± 1 σ"
     caption += "."
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)

@@ -11,6 +11,7 @@ from trihedron.report.document import Table
 from trihedron.report.numbers import MINUS, plain_number, unit_in_print
 
 UNKNOWN = "not known"
+CHANNELS = "The channels; bandwidth in the quietest stretches of the whole log"
 
 
 def channels_table(recording: Recording) -> Table:
@@ -31,7 +32,7 @@ def channels_table(recording: Recording) -> Table:
             rows.append((name, *cells[0]))
         else:
             rows += [(f"{name} {axis.upper()}", *cell) for axis, cell in zip(AXES, cells, strict=True)]
-    return Table(("", "resolution (LSB)", "range limits met", "-3 dB bandwidth"), tuple(rows), "The channels")
+    return Table(("", "resolution (LSB)", "range limits met", "-3 dB bandwidth"), tuple(rows), CHANNELS)
 
 
 def channels_record(recording: Recording) -> dict[str, Any]:
@@ -48,7 +49,7 @@ def channels_record(recording: Recording) -> dict[str, Any]:
 
 
 def logged_sensors(recording: Recording) -> list[tuple[str, FloatArray, str]]:
-    """Name, readings (n, 3) and raw unit of the sensors that the log holds."""
+    """Name, readings (n, 3) and raw unit of the sensors that the log contains."""
     both = (
         ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
         ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),

@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray
 Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "grey"]
 """Names of colours, which the page defines for light, dark and paper. c1, c2, c3 are the axes X, Y, Z."""
 MOST_OF_A_BAR = 3.0
-"""Longest error bar shown in full, in multiples of the median bar."""
+"""Longest uncertainty drawn in full, in multiples of the median one."""
 AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 
 
@@ -21,7 +21,7 @@ AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 class Scale:
     """An axis of a panel: ``limits`` in data units (from the marks where None), ``unit`` for values shown.
 
-    ``names`` label the positions 1, 2, ... along x, if they fit, and −1, −2, ... along y, the first at the top.
+    ``names`` label the positions 1, 2, ... along ``x``, if they fit, and −1, −2, ... along ``y``, the first at the top.
 
     """
 
@@ -50,7 +50,7 @@ class Line:
 class Points:
     """Dots with ``sigma`` as uncertainties; ``said`` is the tooltip of each.
 
-    ``is_across``: the uncertainties are along x, as in a forest plot.
+    ``is_across``: the uncertainties are along ``x``, as in a forest plot.
     """
 
     x: FloatArray
@@ -65,7 +65,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Bars at ``x`` from 0 (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y`` along x."""
+    """Bars at ``x`` from 0 (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y`` along ``x``."""
 
     x: FloatArray
     y: FloatArray
@@ -171,7 +171,7 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along x together."""
+    """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along ``x`` together."""
 
     panels: tuple[Panel | Disc | Sphere | Matrix, ...]
     columns: int = 1

@@ -79,7 +79,7 @@ def _session(segments: Segments, recording: Recording) -> str:
     still = float(np.sum(segments.duration_s))
     return (
         "A person picks up a 16-bit MEMS IMU and sets it down by hand in one pose after another: faces and edges of "
-        f"its case and some tilts between, no angle measured. After {duration(recording.duration_s)} the log holds "
+        f"its case and some tilts between, no angle measured. After {duration(recording.duration_s)} the log contains "
         f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
         f"noise separates {segments.n_poses} poses ({duration(still)} in all) from {len(segments.moves)} moves; no "
         "threshold was set."

@@ -49,7 +49,7 @@ MOST_PARAMETERS = 9
 
 
 def first_screen(diagnosis: Diagnosis) -> int:
-    """Number of sections on the first screen: disagreement, parameters that differ, missing effects, the rest."""
+    """Number of sections on the first screen: disagreement, parameters that differ, missing effects, unexplained."""
     return 4 if diagnosis.parameters else 3
 
 
@@ -278,9 +278,9 @@ def _drawn_in_words(effect: AcceptedEffect) -> str:
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
-    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; bars: ± 2 σ of the predicted noise."
+    caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
-        caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
+        caption += " Velocity and angle of one move share most of their noise: χ² compares the rest of it."
     segments = getattr(diagnosis, "segments", None) if residuals.kind == "pose" else None
     lines = () if segments is None else pose_lines(segments, segments.time_mid_s)
     chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects), lines=lines)

@@ -58,7 +58,7 @@ def _limits(sides: Sequence[Side], factor: float, *, is_angle: bool) -> tuple[fl
     seen = np.concatenate([np.abs(factor * value).ravel() for _, _, value, *_ in sides])
     bars = np.concatenate([2.0 * factor * sigma for _, _, _, sigma, _ in sides])
     top = float(np.nanmax(seen, initial=0.0))
-    # Very long error bars may exceed the limits; residuals may not.
+    # Very long uncertainties may exceed the limits; residuals may not.
     usual = MOST_OF_A_BAR * float(np.nanmedian(bars)) if bars.size else 0.0
     top = 1.08 * max(top, min(float(np.nanmax(bars, initial=0.0)), usual)) or 1.0
     return (0.0 if is_angle else -top), top

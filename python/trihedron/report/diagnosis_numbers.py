@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.report.axes import BIAS
+from trihedron.report.axes import BIAS, term_in_print
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
 from trihedron.report.numbers import (
@@ -95,7 +95,7 @@ def _remarks(parameters: Iterable[ParameterDifference]) -> list[str]:
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     """Differences for one sentence: every parameter if they are few, else groups with their largest member.
 
-    The most significant first; the rest is counted.
+    The most significant first; the others are counted.
     """
     # A sentence about noise as a clause is cut at its first semicolon.
     clauses = {
@@ -138,7 +138,7 @@ def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:
 
 
 def _sentence(n: NoiseDifference) -> str:
-    said = n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's"
+    said = n.remark or f"{_sensor(n)} {term_in_print(n.term)} is {_ratio(n)} times the recording's"
     return capital(said).rstrip(".") + "."
 
 
@@ -173,7 +173,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
             f"{_sensor(n)} {n.axis.upper()}".strip(),
-            f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term,
+            f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else term_in_print(n.term),
             *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
             _ratio(n),
             unit_in_print(n.unit),

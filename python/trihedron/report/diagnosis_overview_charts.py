@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.axes import axis_in_print
+from trihedron.report.axes import axis_in_print, term_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
 from trihedron.report.diagnosis_words import MEANING
@@ -149,7 +149,7 @@ def _ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
 
 def _row_name(n: NoiseDifference) -> str:
     sensor = {"gyroscope": "gyro", "accelerometer": "accel", "both": "sampling"}[n.sensor]
-    return " ".join(part for part in (sensor, axis_in_print(n.axis), n.term) if part)
+    return " ".join(part for part in (sensor, axis_in_print(n.axis), term_in_print(n.term)) if part)
 
 
 def _ratio_words(n: NoiseDifference, name: str) -> str:

@@ -37,7 +37,7 @@ MEANING = {
     "dynamics": "velocity error over a rotation",
     "rate": "angular rate beside the reference",
     "within-static": "noise within static poses",
-    "timing": "even sampling (seen in motion)",
+    "timing": "time error of samples, seen in motion",
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
@@ -102,7 +102,7 @@ def _disagree(subjects: list[str]) -> str:
 
 
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
-    """The next step; ``improved`` is the scenario already written with the parameters that differ."""
+    """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
         store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
         return _dependent(diagnosis) or store

@@ -112,7 +112,7 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
     room = max(around[0], _letters(y_ticks))
-    crowded = " crowded" if sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS else ""
+    dense = " dense" if sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS else ""
     words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
     notes = "".join(_note(note, at) for note in words)
     back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
@@ -133,7 +133,7 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
         f'<div class="plot"><svg role="img" aria-label="{escape(about)}" viewBox="0 0 {UNITS} {UNITS}" '
         f'preserveAspectRatio="none"><g class="back">{"".join(back)}</g><path class="grid" d="{grid}"/>'
         f'<g class="front">{"".join(front)}</g></svg>{notes}</div>'
-        f'<div class="xticks{crowded}" aria-hidden="true">{x_words}</div>'
+        f'<div class="xticks{dense}" aria-hidden="true">{x_words}</div>'
         f'<div class="xlabel">{escape(panel.x.label)}</div></div>'
     )
 

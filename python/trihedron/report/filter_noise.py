@@ -25,7 +25,7 @@ OF_SENSOR = {
 }
 NEXT = "Put these values into your filter: `... --to kalibr -o imu.yaml` (other targets: `trihedron noise --help`)."
 CAUSE_WORDS = {
-    "rest": ("static noise", "a better sensor; nothing else"),
+    "static": ("static noise", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
     "bias": ("bias random walk", "warm up; log the temperature and calibrate it"),
     "temperature": ("temperature", "trihedron calibrate with a logged temperature: none of it goes into N or K"),
@@ -33,7 +33,7 @@ CAUSE_WORDS = {
     "g-sensitivity": ("g-sensitivity", "trihedron calibrate with known motion: none of it goes into N or K"),
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
-"""Words for every cause, and measures that lower its share."""
+"""Words for every cause, and measures that reduce its share."""
 
 
 TERMS = {"N": "white noise N", "K": "bias random walk K"}
@@ -92,7 +92,7 @@ def _headlines(one: SensorFilterNoise) -> list[Headline]:
 
 
 def _terms(one: SensorFilterNoise) -> tuple[tuple[str, str, Bounded, Bounded | None], ...]:
-    """Name and unit of N and K, their values for the filter and at rest."""
+    """Name and unit of N and K, their values for the filter and in static poses."""
     static = one.static
     return (
         ("N", "/√Hz", one.N, None if static is None else static.N),
@@ -180,7 +180,7 @@ def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
         if (cause, horizons[0]) in by
     )
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
-    # Measures that lower the three largest shares.
+    # Measures that reduce the three largest shares.
     advice = Facts(tuple(CAUSE_WORDS[share.cause] for share in _ranked(one)[:3]))
     return Table(head, rows, "Shares of the mean square error, 95 % intervals"), advice
 
@@ -239,9 +239,11 @@ def filter_noise_columns(found: FilterNoise) -> Columns:
     rows = []
     for one in found.sensors:
         for term, per, value, static in _terms(one):
-            at_rest = None if static is None else static.filter_value
+            static_value = None if static is None else static.filter_value
             unit = f"{one.unit}{per}"
-            rows.append((one.sensor, term, value.filter_value, value.lower, value.upper, value.is_limit, at_rest, unit))
+            rows.append(
+                (one.sensor, term, value.filter_value, value.lower, value.upper, value.is_limit, static_value, unit)
+            )
     return of_rows(("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"), rows)
 
 

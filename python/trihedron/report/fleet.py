@@ -55,10 +55,12 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     lead = None
     if n_done:
-        caption = "The parameters that differ most beside their uncertainties: a point for each log, about the median "
-        caption += "of devices; bars: 1 σ."
+        caption = (
+            "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the median "
+        )
+        caption += "of devices."
         lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
-        caption = "Every parameter by device, a point for each log (bars: 1 σ); the line is the median of devices."
+        caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
     n_usable = sum(map(_is_usable, summary.logs))
@@ -148,8 +150,8 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         codes = Counter(code for log in doubtful for code in log.serious).most_common()
         why = ", ".join(f"{code} ({count})" for code, count in codes)
         facts.append(("not to be trusted", f"{how_many(len(doubtful), 'log')}: {why}"))
-    if status["refused"]:
-        facts.append(("not calibrated", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
+    if status["rejected"]:
+        facts.append(("not calibrated", f"{how_many(status['rejected'], 'log')}: they do not allow a calibration"))
     if status["crashed"]:
         facts.append(("failed", f"{how_many(status['crashed'], 'log')}: tried again by the next run"))
     if summary.n_before:

@@ -15,6 +15,8 @@ _SAME = (
     "reference reference-columns serial static time-unit topic workers"
 )
 """Options whose parameters have the same name."""
+_VERBS = "allan|calibrate|check|diagnose|kalman|segment|verify"
+"""Commands whose arguments are those of the function of the same name."""
 _PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | {
     "--accel-unit": "accelerometer_unit",
     "--gyro-unit": "gyroscope_unit",
@@ -44,6 +46,15 @@ _COMMANDS = {
     "trihedron segment LOG": "trihedron.segment(recording)",
     "trihedron segment": "trihedron.segment(recording)",
 }
+_PLACES = {"LOG": "recording"}
+"""Arguments in capitals whose Python name is another word."""
+_AROUND = {
+    "--extended": "trihedron.extend({})",
+    "-o": "trihedron.write_calibration({}, path)",
+    "--json": "trihedron.report({}, path)",
+    "--report": "trihedron.report({}, path)",
+}
+"""Options that are calls with the result."""
 Value = TypeVar("Value")
 
 
@@ -62,8 +73,29 @@ def _replacements() -> tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], st
         (re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"), lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"'),
         (re.compile(r"--method (\w+)"), lambda m: f'method="{m[1]}"'),
         (re.compile(f"`({commands})`"), lambda m: f"`{_COMMANDS[m[1]]}`"),
+        (re.compile(rf"trihedron ({_VERBS})((?: (?:-o|--[\w-]+|[A-Z][A-Z_]*(?:\.json)?)(?![\w-]))+)"), _call),
         (re.compile(rf"({flags})(?![\w-]){place}"), lambda m: _PARAMETERS[m[1]]),
     )
+
+
+def _call(command: re.Match[str]) -> str:
+    """``trihedron diagnose LOG --reference MOTION`` as ``trihedron.diagnose(recording, reference=motion)``."""
+    given, around, flag = [], [], ""
+    for word in command[2].split():
+        value = _PLACES.get(word, word.lower())
+        if word in _AROUND:
+            around.append(_AROUND[word])
+        elif word.startswith("-"):
+            given.append(f"{_PARAMETERS.get(word, word.lstrip('-').replace('-', '_'))}=True")
+        elif not flag:
+            given.append(value)
+        elif flag not in _AROUND:
+            given[-1] = given[-1].replace("True", value)
+        flag = word if word.startswith("-") else ""
+    call = f"trihedron.{command[1]}({', '.join(given)})"
+    for outer in around:
+        call = outer.format(call)
+    return call
 
 
 def in_python(text: str) -> str:

@@ -123,7 +123,7 @@ def _coloured(noise: Noise) -> list[tuple[str, str]]:
         f"{axis_in_print(axis.name)} {plain_number(axis.highest_hz, 3)} Hz"
         for axis in noise.axes
         for finding in axis.findings
-        if finding.code is FindingCode.SPECTRUM_COLOURED
+        if finding.code is FindingCode.SPECTRUM_LOW_PASS
     ]
     return [("low-pass filtered", f"above {', '.join(limits)}; terms fitted below")] if limits else []
 
@@ -177,7 +177,7 @@ def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
         for term in TermName
     ]
     if any(axis.is_slow_noise_unresolved for axis in axes):
-        words = ("not both zero" if axis.is_slow_noise_unresolved else "" for axis in axes)
+        words = ("not both 0" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))
     caption = "95 % intervals with every other term free; they are valid whether a term is named or not"
     return _by_axis(axes, rows, caption)

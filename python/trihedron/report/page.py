@@ -70,7 +70,7 @@ def to_html(document: Document) -> str:
 
 
 def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
-    """Findings on the first screen: the foremost, severity and clause of the next ones, and a link to the rest."""
+    """Findings on the first screen: the foremost, severity and clause of the next ones, and a link to the others."""
     first = document.foremost
     if first is None:
         return Markup(""), [], ""

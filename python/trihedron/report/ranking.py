@@ -70,7 +70,7 @@ def said_of(one: Ranked) -> str:
         said = ["nothing found, but another fits better"]
     said = said or ["nothing found"]
     if one.without_bias:
-        said.append(f"its file holds no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
+        said.append(f"its file has no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
     return "; ".join(said)
 
 

@@ -28,7 +28,7 @@ _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1
 _SIGNS = {
     "quieter-than-gyro": "the difference between the two is quieter than the static gyro",
     "mounted-without-error": "it lies along the gyro's own axes",
-    "S-depends-on-duration": "S changes with the time over which attitude is carried",
+    "S-depends-on-duration": "S changes with the time over which attitude is integrated",
 }
 
 
@@ -63,7 +63,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     if found.accelerometer is not None:
         blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
     blocks += [_effect(ident, one) for ident, one in found.effects.items()]
-    caption = "What is left of the rate, window by window."
+    caption = "Residual of the rate, window by window."
     return (*blocks, Picture("reference", caption, partial(residual_chart, found)))
 
 
@@ -252,7 +252,7 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
     caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
     caption += "reference's world: the reference's error, and the gyro's random walk of "
     caption += f"{walk}°/√s. Band: ± 2 σ of the slow error."
-    caption += " Orange: where it stands apart from the rest." if found.error.apart_s else ""
+    caption += " Orange: where it differs from the other windows." if found.error.apart_s else ""
     caption += " Grey: gaps." if found.error.gaps_s else ""
     return Picture(name, caption, partial(error_chart, found))
 
@@ -264,7 +264,7 @@ def error_chart(found: AgainstReference) -> Chart:
     reach = np.full(2, TWO_SIGMA * DEGREES * error.slow_rad[0])
     marks: list[Mark] = [Band(ends, -reach, reach, "2 σ of its slow error"), Level(y=0.0)]
     marks += [Span(first, last, "gap", "grey") for first, last in error.gaps_s]
-    marks += [Span(first, last, "apart from the rest", "warn") for first, last in error.apart_s]
+    marks += [Span(first, last, "differs from the others", "warn") for first, last in error.apart_s]
     for k, colour in enumerate(AXIS_COLOURS):
         marks.append(Line(apart.time_s, DEGREES * apart.angle[:, k], XYZ[k], colour))
     x = Scale("time [s]", "s", limits=(float(ends[0]), float(ends[1])))

@@ -78,7 +78,7 @@ def report_of(saved: Any) -> Document:
 
 @cache
 def _converter() -> Converter:
-    """Converter for the dataclasses of a report; values of a wrong type raise, since they are read from a file.
+    """Reader of the dataclasses of a report; values of a wrong type raise, since they are read from a file.
 
     The entry ``is`` names the class of a value of a union.
     """

@@ -23,7 +23,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
     findings = segments.findings if recording is None else (*recording.findings, *segments.findings)
     found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
     still = f"{duration(_still_s(segments))} in all"
-    facts = (("found", f"{found}, {still} still"),) if recording is None else recording_facts(recording, segments)
+    facts = (("found", f"{found}, {still} static"),) if recording is None else recording_facts(recording, segments)
     return Document(
         title="Poses and moves",
         subtitle="" if recording is None else recording.source,
@@ -92,7 +92,7 @@ def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the poses shaded."""
-    caption = "The recording; shaded where the sensor stood still"
+    caption = "The recording; shaded where the sensor was static"
     caption += ", darker where it moved or vibrated throughout a pose" if any(map(_is_shaken, segments.poses)) else ""
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture("signals", caption, partial(signals_chart, recording, segments))

@@ -27,7 +27,7 @@ DRIFTING = {
 """Groups of parameters in the first picture and the headlines; the others follow below."""
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
-BARS = "bars: 1 σ, the bias drift within a recording included"
+ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
 NEXT = "Use the common parameters (`... -o common.json` writes them): their uncertainty is that of the next recording."
 
 
@@ -91,7 +91,7 @@ def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
     chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
     has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
-    caption = f"Scale and bias of both sensors in every recording, about the common value; {BARS}"
+    caption = f"Scale and bias of both sensors in every recording, about the common value; {ONE_SIGMA}"
     caption += "; band: session to session (1 σ)." if has_band else "."
     return Picture("drift", caption, chart)
 
@@ -209,14 +209,15 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
             cells = each_with_sigma(term.coefficients[k], sigma, factor)
             rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
         spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
-        rows.append((f"{term.id}, order {term.order}: what remains [{unit}]", *spread))
+        rows.append((f"{term.id}, order {term.order}: residual [{unit}]", *spread))
         if term.hysteresis is not None:
             cells = [plain_number(float(v) * factor, 2) for v in term.hysteresis]
             rows.append((f"{term.id}: half of heating less cooling [{unit}]", *cells))
     return [
         Paragraph(
             f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
-            f"has not seen. Valid from {_range(thermal)}: `trihedron apply` holds the ends outside it and says so."
+            f"has not seen. Valid from {_range(thermal)}: outside it `trihedron apply` uses the nearest end and "
+            "reports it."
         ),
         Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis"),
     ]
@@ -239,7 +240,7 @@ def _further(model: SessionsModel) -> list[Picture]:
     """Groups of parameters that the first picture does not show."""
     others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
     chart = partial(sessions_chart, model, others)
-    caption = f"The other parameters in every recording, about the common value; {BARS}."
+    caption = f"The other parameters in every recording, about the common value; {ONE_SIGMA}."
     return [Picture("sessions", caption, chart)] if others else []
 
 

@@ -29,7 +29,7 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
         ("motion", f"{poses}, {moves}"),
     )
-    caption = "The simulated log; shaded where the body truly stood still."
+    caption = "The simulated log; shaded where the body was truly static."
     return Document(
         title="Simulation",
         subtitle=recording.source,

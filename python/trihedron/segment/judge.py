@@ -36,13 +36,13 @@ def judge_runs(
                 worst_s=_start_s(recording, poses[k]), worst_sigmas=worst, which=_named([c for _, c in creeping]),
             )
         )  # fmt: skip
-    bumped = [k for k, pose in enumerate(poses) if pose.disturbed]
-    if bumped:
-        spans = [span for k in bumped for span in poses[k].disturbed]
+    disturbed = [k for k, pose in enumerate(poses) if pose.disturbed]
+    if disturbed:
+        spans = [span for k in disturbed for span in poses[k].disturbed]
         lost = sum(b - a for a, b in spans) / recording.rate_hz
         found.append(
             Finding.of(
-                FindingCode.POSE_DISTURBED, disturbances=len(spans), poses=len(bumped), which=_named(bumped),
+                FindingCode.POSE_DISTURBED, disturbances=len(spans), poses=len(disturbed), which=_named(disturbed),
                 left_out_s=lost, first_s=recording.time_s[spans[0][0]],
             )
         )  # fmt: skip

@@ -29,15 +29,15 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
     """
     shortest = max(int(SHORTEST_PIECE_S * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
-    was_bumped = False
+    was_disturbed = False
     for i, pose in enumerate(segments.poses):
         edges = [pose.start, *(k for cut in pose.disturbed if cut[1] > cut[0] for k in cut), pose.stop]
-        was_bumped |= len(edges) > 2
+        was_disturbed |= len(edges) > 2
         kept = [(a, b, i) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest]
         spans += kept or [(pose.start, pose.stop, i)]
     shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
     merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
-    if len(merged) == segments.n_poses and not shaken and not was_bumped:
+    if len(merged) == segments.n_poses and not shaken and not was_disturbed:
         return segments
     return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
 

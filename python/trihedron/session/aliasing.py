@@ -30,7 +30,7 @@ order, remove smooth motion."""
 OF_A_STEP = 1.0 / 3.0
 """Power folded onto zero over that at half the sampling frequency for a rate with steps: 1/(2^p - 1) with p = 2."""
 OF_ITS_BAND = 0.4
-"""Part of the power around a quarter of the sampling frequency that is not slower motion, for a body that knocks and
+"""Part of the power around a quarter of the sampling frequency that is not slower motion, for a body that impacts and
 rocks at a tenth of the sampling frequency."""
 LENGTH = len(_AT_HALF)
 GAP = 1.5

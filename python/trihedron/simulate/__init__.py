@@ -15,7 +15,7 @@ from trihedron.simulate.scenario_file import read_scenario, scenario_from_table
 from trihedron.simulate.sessions import (
     dividing_head,
     hand_session,
-    long_rest,
+    long_static,
     poses_in_order,
     rate_table,
     six_faces,
@@ -60,7 +60,7 @@ __all__ = [
     "effects_of",
     "hand_session",
     "list_scenarios",
-    "long_rest",
+    "long_static",
     "low_pass_like",
     "make_noise",
     "noise_of_octaves",

@@ -20,7 +20,7 @@ from trihedron.simulate.sessions import (
     FACES,
     dividing_head,
     hand_session,
-    long_rest,
+    long_static,
     poses_in_order,
     rate_table,
     six_faces,
@@ -33,7 +33,7 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
     "table-turns": table_turns,
     "dividing-head": dividing_head,
     "rate-table": rate_table,
-    "rest": long_rest,
+    "static": long_static,
 }
 """Sessions that a scenario file can name, and the functions that make them."""
 
@@ -64,16 +64,16 @@ def _manual() -> Scenario:
     for face in FACES[::2]:
         steps += poses_in_order([face], pose_s=4.0, move_s=3.0, arrive=True).steps
         for angle in (1440.0, -1440.0):
-            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "rest")]
+            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "static")]
     accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
     return Scenario(Motion(tuple(steps), start=poses.start), "", accel, gyro, ANALOG_6DOF.clock)
 
 
-def _rest_manual() -> Scenario:
+def _static_manual() -> Scenario:
     accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
     accel = replace(accel, adc=replace(accel.adc, lsb=0.0))
     gyro = replace(gyro, adc=replace(gyro.adc, lsb=0.0))
-    return Scenario(long_rest(7200.0), "", accel, gyro, ANALOG_6DOF.clock)
+    return Scenario(long_static(7200.0), "", accel, gyro, ANALOG_6DOF.clock)
 
 
 def _dividing_head() -> Scenario:
@@ -123,11 +123,11 @@ _SCENARIOS: dict[str, tuple[str, Callable[[], Scenario]]] = {
         "24 poses by hand with several effects at once: what a linear model cannot reproduce.", _imperfect,
     ),
     "lossy-log": ("The hand session with lost samples whose timestamps were made anew, and jitter.", _lossy),
-    "rest-hour": ("One hour at rest, consumer 16-bit part.", lambda: _of(MPU, long_rest(3600.0))),
-    "rest-manual": (
-        "Two hours at rest, the manual's unit with a finer ADC, for Allan curves.", _rest_manual,
+    "static-hour": ("One hour static, consumer 16-bit part.", lambda: _of(MPU, long_static(3600.0))),
+    "static-manual": (
+        "Two hours static, the manual's unit with a finer ADC, for Allan curves.", _static_manual,
     ),
-    "rest-industrial": ("10,000 s at rest, industrial 14-bit part.", lambda: _of(ADIS, long_rest(10000.0))),
+    "static-industrial": ("10,000 s static, industrial 14-bit part.", lambda: _of(ADIS, long_static(10000.0))),
 }  # fmt: skip
 
 

@@ -63,7 +63,7 @@ _MOST_POSES = 100_000
 
 def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:
     """A scenario from the tables of a TOML file."""
-    _refuse_unknown(table, _KEYS, "the file")
+    _reject_unknown(table, _KEYS, "the file")
     profile = profile_by_name(str(table.get("profile", "mpu")))
     accelerometer, gyroscope = profile.accelerometer, profile.gyroscope
     if "unit" in table:
@@ -135,7 +135,7 @@ def _tupled(value: Any) -> Any:
     return tuple(_tupled(v) for v in value) if isinstance(value, list) else value
 
 
-def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+def _reject_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in values:
         if key not in known:
             tables = ("clock", "environment", "accelerometer", "gyroscope") if where == "the file" else ()
@@ -160,7 +160,7 @@ def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
 
 
 def _fields(cls: type[Any], values: Mapping[str, Any], base: Any, where: str) -> dict[str, Any]:
-    _refuse_unknown(values, tuple(f.name for f in dataclasses.fields(cls)), where)
+    _reject_unknown(values, tuple(f.name for f in dataclasses.fields(cls)), where)
     hints = typing.get_type_hints(cls)
     return {k: _value(hints[k], v, getattr(base, k, None), f"{where}.{k}") for k, v in values.items()}
 

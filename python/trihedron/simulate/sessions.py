@@ -116,15 +116,15 @@ def table_turns(
     if not speed_deg_s > 0.0:
         raise RefusedError(f"speed_deg_s must be positive, got {speed_deg_s!r}")
     rng = stream(layout, "table turns")
-    steps: list[Step] = [Pose(10.0, name="rest")]
+    steps: list[Step] = [Pose(10.0, name="static")]
     for count, face in enumerate(faces):
         if count:
-            steps += [MoveTo(face, 3.0, wobble_deg=3.0), Pose(pose_s, name="rest")]
+            steps += [MoveTo(face, 3.0, wobble_deg=3.0), Pose(pose_s, name="static")]
         for turn in turns_deg:
             duration = max(1.0, abs(turn) / speed_deg_s * 1.25)
             error = error_deg * float(rng.standard_normal())
             turned = Turn(face, turn, duration, error_deg=error, name=f"turn {turn:+g} deg")
-            steps += [turned, Pose(pose_s, name="rest")]
+            steps += [turned, Pose(pose_s, name="static")]
     return Motion(tuple(steps), start=attitude_with_up(faces[0]))
 
 
@@ -153,9 +153,9 @@ def rate_table(
     arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Motion:
     """Constant rates of both signs about each body axis, which points up, with smooth ramps before and after."""
-    steps: list[Step] = [Pose(5.0, name="rest")]
+    steps: list[Step] = [Pose(5.0, name="static")]
     for axis in axes:
-        steps += [MoveTo(axis, 3.0), Pose(3.0, name="rest")]
+        steps += [MoveTo(axis, 3.0), Pose(3.0, name="static")]
         for rate in rates_deg_s:
             for sign in (1.0, -1.0):
                 duration = plateau_s + 2.0 * ramp_s
@@ -163,11 +163,11 @@ def rate_table(
                 name = f"rate {sign * rate:+g} deg/s"
                 steps += [
                     Turn(axis, angle, duration, ramp=ramp_s / duration, arm_m=arm_m, name=name),
-                    Pose(2.0, name="rest"),
+                    Pose(2.0, name="static"),
                 ]
     return Motion(tuple(steps))
 
 
-def long_rest(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
+def long_static(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
     """One static pose, for Allan variance."""
-    return Motion((Pose(duration_s, name="rest"),), start=attitude_with_up(up))
+    return Motion((Pose(duration_s, name="static"),), start=attitude_with_up(up))

@@ -17,4 +17,4 @@ class AccelBiasRepeatability(BiasProcess):
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         sigma, error = float((size**2).mean() ** 0.5), float((std**2).mean() ** 0.5)
-        return (EffectParameter("sigma", sigma, error, self.unit),), self.told("scatter", sigma=sigma)
+        return (EffectParameter("sigma", sigma, error, self.unit),), self.reported("scatter", sigma=sigma)

@@ -37,10 +37,10 @@ class AxisHandedness(DirectEffect):
         reversed_axes = [AXES[j] for j in range(3) if signs[j] < 0]
         kept = [AXES[j] for j in range(3) if signs[j] > 0]
         # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
-        told = self.told(
+        statement = self.reported(
             "reversed", is_one=n_reversed == 1, is_two=n_reversed == 2, is_three=n_reversed == 3,
             reversed=reversed_axes, kept=kept,
         )  # fmt: skip
         signed = zip(AXES, signs, strict=True)
         parameters = tuple(EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in signed)
-        return Evidence(1e-300, 1e6, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))
+        return Evidence(1e-300, 1e6, parameters, statement, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))

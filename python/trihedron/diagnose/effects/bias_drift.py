@@ -76,7 +76,7 @@ class BiasDrift(BiasProcess):
         return True
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
-        return per_axis_parameters("range", size, std, self.unit), self.told("walk", range=size)
+        return per_axis_parameters("range", size, std, self.unit), self.reported("walk", range=size)
 
 
 def _shortest_time_constant(context: Context) -> float:

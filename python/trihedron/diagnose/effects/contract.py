@@ -138,7 +138,7 @@ class Effect(ABC):
         shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())
         return linear + shape
 
-    def told(self, case: str, /, **values: Any) -> Words:
+    def reported(self, case: str, /, **values: Any) -> Words:
         """The catalogue's sentence for this effect, by case and values (SI)."""
         return effect_words(self.id, case, **values)
 
@@ -146,7 +146,7 @@ class Effect(ABC):
         """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
         linear = [p for p in parameters if p.name not in SHAPE_NAMES]
         strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, 1e-300))
-        return self.told(
+        return self.reported(
             "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
             unit=strongest.unit,
         )  # fmt: skip

@@ -29,7 +29,7 @@ class Evidence:
     ``strength`` is the gain in twice a log-likelihood, for ranking.
     ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: these moves must improve.
     ``share`` is the share of its domain's misfit that it explains, for effects that do not show in poses and moves.
-    ``statement`` is the catalogue's (:meth:`Effect.told`), or that of a user's own effect.
+    ``statement`` is the catalogue's (:meth:`Effect.reported`), or that of a user's own effect.
     ``restate`` gives the parameters again from the session fitted with ``reweigh`` applied.
     """
 

@@ -147,30 +147,30 @@ class DisturbedPose(DirectEffect):
         obs = context.obs
         seen = [(span, bump) for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None]
         bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
-        bumped = list(bumps)
-        held = _gained_by_cutting(context) if bumped else ()
-        if bumped:
+        disturbed = list(bumps)
+        held = _gained_by_cutting(context) if disturbed else ()
+        if disturbed:
             held = (*held, max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before))
         restless, predicted = _restless(obs)
         if len(restless) > MOST * obs.n_poses:
             restless = []
         if restless and predicted is not None:
             held = (*held, predicted)
-        if not bumped and not restless:
+        if not disturbed and not restless:
             return None
         t = obs.time_s
         poses = obs.segments.poses
-        spans = tuple(bumped) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
+        spans = tuple(disturbed) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
         # The session state already excludes the disturbance: rank it behind effects that improve the fit.
-        strength = 10.0 * (len(bumped) + len(restless))
+        strength = 10.0 * (len(disturbed) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))
-        told = self.told(
-            "not-still", is_bumped=bool(bumped), disturbed_s=[(0.5 * (a + b),) for a, b in bumped[:MOST_NAMED]],
-            is_restless=bool(restless), restless=names[:MOST_NAMED], are_both=bool(bumped and restless),
+        statement = self.reported(
+            "not-still", is_timed=bool(disturbed), disturbed_s=[(0.5 * (a + b),) for a, b in disturbed[:MOST_NAMED]],
+            is_restless=bool(restless), restless=names[:MOST_NAMED], are_both=bool(disturbed and restless),
         )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
-            1e-30, strength, parameters, told, "within-static",
+            1e-30, strength, parameters, statement, "within-static",
             Where((), obs.pose_names(restless), spans), held, share=min(len(spans) / obs.n_poses, 1.0),
         )  # fmt: skip
 
@@ -188,4 +188,4 @@ class DisturbedPose(DirectEffect):
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         pose = next(p.value for p in parameters if p.name == "pose")
         size = float(np.sqrt(sum(p.value**2 for p in parameters if p.name.startswith("push"))))
-        return self.told("pushed", pose=pose, off=size)
+        return self.reported("moved", pose=pose, off=size)

@@ -159,7 +159,7 @@ class DroppedSamples(DirectEffect):
                 for one in losses
             ),
         )
-        told = self.told(
+        statement = self.reported(
             "losses", losses=[(loss.count, t[loss.sample]) for loss in losses[:NAMED]],
             has_more=len(losses) > NAMED, more=len(losses) - NAMED,
         )  # fmt: skip
@@ -178,7 +178,7 @@ class DroppedSamples(DirectEffect):
         weakest = min(max(loss.per_sensor) for loss in losses)
         p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
         return Evidence(
-            p, gain, parameters, told, "timing", where,
+            p, gain, parameters, statement, "timing", where,
             reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),
         )  # fmt: skip
 

@@ -138,7 +138,7 @@ class EarthRate(Effect):
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         by_name = {p.name: p for p in parameters}
         at, heading = by_name["latitude"], by_name["north_azimuth"]
-        return self.told(
+        return self.reported(
             "latitude", latitude_deg=at.value, latitude_std_deg=at.std, azimuth_deg=heading.value,
             azimuth_std_deg=heading.std,
         )  # fmt: skip

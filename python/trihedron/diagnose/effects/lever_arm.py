@@ -94,7 +94,7 @@ class LeverArm(DirectEffect):
         strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
             max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
-            self.told("arm", arm_m=length, share=share), "dynamics", Where(("ax", "ay", "az")), (held,),
+            self.reported("arm", arm_m=length, share=share), "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
 
 

@@ -38,6 +38,6 @@ class PeriodicInterference(DirectEffect):
         held = HeldOut("within-static", (before / noise) ** 2, (after / noise) ** 2, before, after, "raw")
         return Evidence(
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
-            self.told("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),
+            self.reported("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),
             "within-static", where, (held,), share=min(max(line.share for line in same), 1.0),
         )  # fmt: skip

@@ -150,12 +150,12 @@ class Quantisation(DirectEffect):
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
         grid = worst.step**2 / 12.0  # variance of the staircase; that of the noise before the ADC is added below
         names = tuple(CHANNELS[one.channel] for one in found)
-        told = self.told(
+        statement = self.reported(
             "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
             times=worst.step / worst.sigma,
         )  # fmt: skip
         return Evidence(
-            1e-300, strength, _parameters(context, found), told, "within-static", Where(names),
+            1e-300, strength, _parameters(context, found), statement, "within-static", Where(names),
             reweigh=reweigh, share=grid / (grid + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip

@@ -54,7 +54,7 @@ class _Saturation(DirectEffect):
         t = obs.time_s
         times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
         channels = tuple(sorted({"ag"[self.sensor] + AXES[r.axis] for r in runs}))
-        statement = self.told(
+        statement = self.reported(
             "plateaus", plateaus=len(runs), samples=_n_samples(runs), touched=len(touched), moves=obs.n_moves
         )
         # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that

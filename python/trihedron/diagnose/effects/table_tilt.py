@@ -66,5 +66,5 @@ class TableTilt(TableEffect):
             return None
         return Evidence(
             max(p, 1e-300), chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
-            self.told("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
+            self.reported("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip

@@ -175,7 +175,7 @@ class TimingJitter(DirectEffect):
         return Evidence(
             float(max(ndtr((found.followed - 1.0) / max(found.sigma, 1e-3)), 1e-300)), max(found.gain, 1.0),
             (EffectParameter("timestamp_error", found.rms_s, found.rms_s * max(found.sigma, 1e-3), "s"),),
-            self.told("timestamps", rms_s=found.rms_s, followed=found.followed, sigma=found.sigma),
+            self.reported("timestamps", rms_s=found.rms_s, followed=found.followed, sigma=found.sigma),
             "timing", reweigh=reweigh,
         )  # fmt: skip
 
@@ -191,5 +191,5 @@ class TimingJitter(DirectEffect):
         return Evidence(
             float(max(ndtr(-z), 1e-300)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
-            self.told("samples", jitter_s=jitter), "timing", reweigh=lambda obs: replace(obs, jitter_s=jitter),
+            self.reported("samples", jitter_s=jitter), "timing", reweigh=lambda obs: replace(obs, jitter_s=jitter),
         )  # fmt: skip

@@ -40,7 +40,7 @@ class TurnAngleError(TableEffect):
         spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
         return Evidence(
             max(p, 1e-300), chi2, parameters,
-            self.told(
+            self.reported(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),
             "moves", Where(("gx", "gy", "gz"), context.obs.move_names([turns[k].move for k in bad]), spans),

@@ -65,7 +65,7 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
         experiment=relation_experiment(signal.family),
         statement=words(
             "relation-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
-            is_at_rest=not signal.is_motion, axes=axes, depends=names, share=_share(held),
+            is_static=not signal.is_motion, axes=axes, depends=names, share=_share(held),
         ),
     )  # fmt: skip
 

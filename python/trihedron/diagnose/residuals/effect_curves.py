@@ -15,8 +15,8 @@ from trihedron.records.domains import DomainResiduals
 from trihedron.records.words import words
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
-    ("static-accel", "length-at-rest", "m/s^2", "pose", ("norm",)),
-    ("static-gyro", "rate-at-rest", "rad/s", "pose", ("gx", "gy", "gz")),
+    ("static-accel", "static-length", "m/s^2", "pose", ("norm",)),
+    ("static-gyro", "static-rate", "rad/s", "pose", ("gx", "gy", "gz")),
     ("moves", "gravity-missed", "deg", "move", ("angle",)),
     ("dynamics", "velocity-over-move", "m/s", "move", ("vx", "vy", "vz")),
 )

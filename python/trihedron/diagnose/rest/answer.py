@@ -117,7 +117,7 @@ class _Side:
     @property
     def case(self) -> str:
         """Case of the sentence: sizes in customary units, or in counts where the scale is unknown."""
-        return "at-rest-counts" if self.unit == "raw" else "at-rest"
+        return "static-counts" if self.unit == "raw" else "static"
 
 
 def _matrix(model: LinearModel, sensor: int) -> FloatArray:
@@ -228,7 +228,7 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         id=effect_id, statement=statement, parameters=tuple(parameters),
         p_adjusted=float(min(1.0, max(curve.p_value, 1e-300) * n_effects)), delta_bic=curve.gain - curve.cost,
         held_out=(held,), confounded_with=("accel-thermal-scale",) if is_accelerometer else (),
-        separating_experiment=experiment_for(effect_id, at_rest=True) if is_accelerometer else "",
+        separating_experiment=experiment_for(effect_id, is_static=True) if is_accelerometer else "",
         model=_model("rest-curve", series),
         share=float(np.clip(1.0 - (rest**2).sum() / (raw**2).sum(), 0.0, 1.0)),
     )  # fmt: skip

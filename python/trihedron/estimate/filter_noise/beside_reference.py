@@ -80,7 +80,7 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
     stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN["gyroscope"])
-    _refuse_short(stretches, motion)
+    _reject_short(stretches, motion)
     left = left_over(found, asked.horizons_s)
     of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
     out = [_sensor(of_gyro, asked, asked.gyroscope, left)]
@@ -131,7 +131,7 @@ def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: Sta
     )
 
 
-def _refuse_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
+def _reject_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
     shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
     if shared < LEAST_S:
         raise RefusedError(
@@ -274,7 +274,7 @@ def parts_of(
     """
     s = dict(zip(NAMES, draws.T, strict=True))
     h = horizon_s
-    out: dict[Cause, FloatArray] = {"rest": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
+    out: dict[Cause, FloatArray] = {"static": 3.0 * s["noise"] ** 2 * h, "vibration": 3.0 * s["vibration"] ** 2 * h}
     out["bias"] = s["bias_walk"] ** 2 * h**3
     if tilt is None:
         same = matern(h, s["slow_s"])

@@ -119,8 +119,8 @@ def left_out_as_by_losses(
             float(np.exp(-0.5 * np.einsum("...i,ij,...j->...", left, inverse, left)).mean()) / size
             for left in (missed - off, missed - some[:, None] - some[None])
         ]
-        knock = 1.0 / (np.pi * np.e * float(missed @ missed))
-        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / knock))
+        impact = 1.0 / (np.pi * np.e * float(missed @ missed))
+        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / impact))
     return log_odds > float(np.log(STRONG))
 
 

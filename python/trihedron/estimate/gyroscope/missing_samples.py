@@ -32,7 +32,7 @@ CHANCE = 1e-3
 sessions have 0 to 7 long steps, 0 to 4 short ones; healthy sessions of two generators 0 to 2 of up to 50 000: none has
 a finding."""
 FALSE_SHARE = 5e-4
-"""Share of long steps that knocks during brisk motion cause (18 in 38 000 of filtered noise with knocks)."""
+"""Share of long steps that impacts during brisk motion cause (18 in 38 000 of filtered noise with impacts)."""
 SERIOUS_SHARE = 0.002
 """Share of lost samples above which the scale factor, too small by that share, exceeds its usual uncertainty."""
 

@@ -96,7 +96,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
         yield Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
     if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
         yield Finding.of(
-            FindingCode.INNOVATIONS_COLOURED,
+            FindingCode.INNOVATIONS_CORRELATED,
             case,
             axis=name,
             whiteness_p=seen.whiteness_p,

@@ -174,7 +174,7 @@ def _screened(points: CurvePoints) -> _Found:
         # The effect of a filter halves per octave: two more points reduce it below the tolerance.
         first = min(first + MARGIN, most)
         used = points.from_point(first, TOLERANCE)
-        findings.append(Finding.of(FindingCode.SPECTRUM_COLOURED, "curve", first_s=float(used.tau_s[0])))
+        findings.append(Finding.of(FindingCode.SPECTRUM_LOW_PASS, "curve", first_s=float(used.tau_s[0])))
     fit, evidence = used.select()
     chi2, z = used.misfit(fit.squares)
     dof = len(used.clusters) - len(fit.active)

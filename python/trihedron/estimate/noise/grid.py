@@ -10,7 +10,7 @@ from trihedron.records import Recording
 from trihedron.units import acceleration_to_si, rate_to_si
 
 
-def refuse_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
+def reject_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
     """Check that the ``size`` of a count is stated only for readings in counts.
 
     Raises ``RefusedError`` when a ``size`` is stated and the readings have a physical unit.
@@ -52,7 +52,7 @@ def readings_of(
     ):
         if readings is None:
             continue
-        refuse_size_of_a_unit(sensor, unit, stated[sensor])
+        reject_size_of_a_unit(sensor, unit, stated[sensor])
         columns.append(readings if factor in (None, 1.0) else readings * factor)
         names += [f"{sensor} {axis}" for axis in AXES]
         units += [unit if factor is None else si_unit] * 3

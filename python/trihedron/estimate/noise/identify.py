@@ -17,7 +17,7 @@ from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.gaps import bridged
-from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks, tail_error
+from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
@@ -116,7 +116,7 @@ def identify_noise(
     exclude_s : sequence of (start, stop)
         Intervals to exclude, in seconds from the first reading.
     automatic : bool
-        Exclude knocks and intervals of vibration, and start a new level at each step; each is a finding.
+        Exclude impacts and intervals of vibration, and start a new level at each step; each is a finding.
     clusters : (k,) of int, optional
         Readings per cluster of the Allan curve.
     source : str
@@ -155,7 +155,7 @@ def identify_noise(
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
     if repeated > 0.001:
-        findings.append(Finding.of(FindingCode.REPEATED_ROWS, "at-rest", share=repeated))
+        findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
 
     def screened(c: int) -> _Screened:
         return _screen(readings[:, c], rate_hz, excluded, names[c], units[c], automatic=automatic)
@@ -199,15 +199,15 @@ def _screen(
     cuts: list[tuple[int, int]] = []
     findings: list[Finding] = []
     if automatic:
-        steps, knocks = steps_and_knocks(bridged(column))
-        calm = column.copy() if knocks else column
-        for knock in knocks:
-            calm[knock.start : knock.stop] = np.nan
+        steps, impacts = steps_and_impacts(bridged(column))
+        calm = column.copy() if impacts else column
+        for impact in impacts:
+            calm[impact.start : impact.stop] = np.nan
         shocks = shaken(calm, rate_hz)
         # Steps during shaking are part of it.
         steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
-        findings += remarks.events(steps, knocks, shocks, rate_hz, unit)
-        cuts = merged([(e.start, e.stop) for e in (*shocks, *knocks)])
+        findings += remarks.events(steps, impacts, shocks, rate_hz, unit)
+        cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
         share = sum(stop - start for start, stop in cuts) / len(column)
         if share > MOST_DISTURBED:
             # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.

@@ -17,18 +17,18 @@ NAMED = 4
 
 
 def events(
-    steps: Sequence[Event], knocks: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str
+    steps: Sequence[Event], impacts: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str
 ) -> Iterator[Finding]:
-    """Findings for steps, knocks and shaking of one axis; the largest step and knock with their times."""
+    """Findings for steps, impacts and shaking of one axis; the largest step and impact with their times."""
     if steps:
         worst = max(steps, key=lambda e: abs(e.size))
         yield Finding.of(
-            FindingCode.LOG_STEP, n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz
+            FindingCode.LOG_JUMP, n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz
         )
-    if knocks:
-        worst = max(knocks, key=lambda e: abs(e.size))
+    if impacts:
+        worst = max(impacts, key=lambda e: abs(e.size))
         yield Finding.of(
-            FindingCode.LOG_KNOCK, n_knocks=len(knocks), knock=worst.size, unit=unit, time_s=worst.start / rate_hz
+            FindingCode.LOG_IMPACT, n_impacts=len(impacts), impact=worst.size, unit=unit, time_s=worst.start / rate_hz
         )
     if shocks:
         total = sum(e.stop - e.start for e in shocks) / rate_hz
@@ -49,7 +49,7 @@ def written(readings: Readout) -> Iterator[Finding]:
     """Finding for readings at the range limit of one axis."""
     if readings.clipped == 0.0:
         return
-    yield Finding.of(FindingCode.CLIPPING, "at-rest", share=readings.clipped)
+    yield Finding.of(FindingCode.CLIPPING, "static", share=readings.clipped)
 
 
 def dead(readings: Readout, unit: str) -> Finding:
@@ -80,9 +80,9 @@ def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
 def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding:
     """Finding for an upper end of the spectrum that no sum of noise terms explains (low-pass filtering)."""
     if math.isnan(at_nyquist):
-        return Finding.of(FindingCode.SPECTRUM_COLOURED, "throughout")
+        return Finding.of(FindingCode.SPECTRUM_LOW_PASS, "throughout")
     return Finding.of(
-        FindingCode.SPECTRUM_COLOURED,
+        FindingCode.SPECTRUM_LOW_PASS,
         "falls" if at_nyquist < 1.0 else "rises",
         highest_hz=highest_hz,
         nyquist_hz=nyquist_hz,

@@ -1,4 +1,4 @@
-"""Detection of steps, knocks and shaking in a static log, and of resolution and saturation of its readings.
+"""Detection of steps, impacts and shaking in a static log, and of resolution and saturation of its readings.
 
 Every detector measures the log's own scatter robustly; its threshold is the value that Gaussian noise of any spectrum
 exceeds once in 10 000 logs.
@@ -40,8 +40,8 @@ class Event:
     score: float
 
 
-def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
-    """Steps of the level, and short excursions (knocks), of one channel ``x`` (n,); NaN marks a missing reading.
+def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
+    """Steps of the level, and short excursions (impacts), of one channel ``x`` (n,); NaN marks a missing reading.
 
     Means of neighbouring clusters are differenced at every power of two; the differences of stationary or random-walk
     noise are Gaussian for any spectrum, so that one far outside their spread is an event.
@@ -56,7 +56,7 @@ def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
     found = _core.find_jumps(x, scales) if scales else []
     found = sorted(found, reverse=True)[:MOST_EVENTS]
     steps: list[Event] = []
-    knocks: list[Event] = []
+    impacts: list[Event] = []
     taken: list[tuple[int, int]] = []
     for score_ratio, at, width, jump in found:
         if any(a - 2 * width <= at <= b + 2 * width for a, b in taken):
@@ -64,15 +64,15 @@ def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
         reach = 4 * width
         levels = [_level_change(x, at, width, times * width) for times in STEP_REACHES if times * width < n // 4]
         slack = max(width // 4, 2)
-        # A step keeps at least half of its jump over all reaches; a knock returns.
+        # A step keeps at least half of its jump over all reaches; a impact returns.
         if at + reach < n and at > reach and all(change / jump > 0.5 for change in levels):
             steps.append(Event(max(0, at - slack), min(n, at + slack), levels[0], score_ratio))
             taken.append((at - 2 * width, at + 2 * width))
         else:
             start, stop = max(0, at - width - slack), min(n, at + 2 * width + slack)
-            knocks.append(Event(start, stop, jump, score_ratio))
+            impacts.append(Event(start, stop, jump, score_ratio))
             taken.append((start, stop))
-    return sorted(steps, key=lambda e: e.start), sorted(knocks, key=lambda e: e.start)
+    return sorted(steps, key=lambda e: e.start), sorted(impacts, key=lambda e: e.start)
 
 
 def _level_change(x: FloatArray, at: int, width: int, reach: int) -> float:

@@ -21,7 +21,7 @@ from trihedron.estimate.noise.allan import (
     default_clusters,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
-from trihedron.estimate.noise.screening import readout, steps_and_knocks, tail_error
+from trihedron.estimate.noise.screening import readout, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
@@ -48,7 +48,7 @@ def stream_noise(
     """Noise terms and Allan curve of a log that is read in chunks (k, channels), in one pass (docs/noise.md, 4).
 
     Slow terms come from means over the whole log, fast ones from its first million readings. Steps are detected in the
-    means; knocks are not excluded.
+    means; impacts are not excluded.
 
     ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
     pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``RefusedError``
@@ -132,7 +132,7 @@ def _axis(
     if blank.sample_sigma == 0.0:
         return blank
     means, size = stream.means(channel, block)
-    steps, _ = steps_and_knocks(means)
+    steps, _ = steps_and_impacts(means)
     blank = replace(blank, findings=(*remarks.events(steps, [], [], rate_hz / size, unit), *blank.findings))
     bands = ordinates_of_means(means, size, rate_hz, stretches_between(len(means), steps), head)
     return identify_axis(bands, blank, curve, channel, tail_error(head))

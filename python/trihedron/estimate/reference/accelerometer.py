@@ -124,7 +124,7 @@ def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArra
     size = _turning(windows, reference, time)
     solution = solve(design, target, windows.start // windows.spacing, size)
     S, b = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
-    _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
+    _reject_mirror(reference, float(np.linalg.det(S)), handedness)
 
     def left(at: FloatArray) -> FloatArray:
         design, target = rows(at)
@@ -162,7 +162,7 @@ def _along_path(
         up = up + across @ solution.theta[15:]
         up /= np.linalg.norm(up)
     S, b = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
-    _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
+    _reject_mirror(reference, float(np.linalg.det(S)), handedness)
     up_covariance = across @ solution.covariance[15:, 15:] @ across.T
     arm, arm_covariance = solution.theta[12:15], solution.covariance[12:15, 12:15]
     own = solution.theta[:15]
@@ -291,7 +291,7 @@ def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> 
     return sign * u, sign * M
 
 
-def _refuse_mirror(reference: Reference, determinant: float, handedness: float) -> None:
+def _reject_mirror(reference: Reference, determinant: float, handedness: float) -> None:
     if determinant * handedness < 0.0:
         raise RefusedError(
             f"{reference.motion.source}: the reference is mirrored against the log: its turns and its forces are those "

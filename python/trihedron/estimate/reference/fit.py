@@ -16,11 +16,11 @@ from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
 from trihedron.estimate.reference.refusals import (
-    refuse_parts_elsewhere,
-    refuse_still,
-    refuse_strangers,
-    refuse_two_clocks,
-    refuse_units,
+    reject_parts_elsewhere,
+    reject_still,
+    reject_strangers,
+    reject_two_clocks,
+    reject_units,
     share_left,
 )
 from trihedron.estimate.reference.replay import held_out
@@ -99,8 +99,8 @@ def fit_references(
     ready = [_prepared(recording, motion, gravity_m_s2) for recording, motion in pairs]
     found, effects = _fitted([one.side for one in ready])
     for k, one in enumerate(ready):
-        refuse_two_clocks(found, k)
-        refuse_still(one.side.reference.motion, found.value(k, "S"), found.covariance(k, ("S",)))
+        reject_two_clocks(found, k)
+        reject_still(one.side.reference.motion, found.value(k, "S"), found.covariance(k, ("S",)))
     return tuple(_answer(one, found, k, effects, given) for k, one in enumerate(ready))
 
 
@@ -133,10 +133,10 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=clock)
     reference, gyro, is_turned = _right_way_round(grid, reference, windows, gyro, clock)
     motion = reference.motion
-    refuse_strangers(gyro, motion)
-    refuse_units(recording, gyro, motion)
-    refuse_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
-    refuse_parts_elsewhere(grid, reference, gyro)
+    reject_strangers(gyro, motion)
+    reject_units(recording, gyro, motion)
+    reject_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
+    reject_parts_elsewhere(grid, reference, gyro)
     wide = windows_on(seen, grid.step_s, max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s)))
     force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, gyro.handedness)
     felt = None if force is None else force_along(grid, force, gyro.A, gravity_m_s2)
@@ -205,9 +205,9 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     time = grid.time_s * (1.0 + found.rate) + found.offset_s
     windows = _windows(grid, reference, grid.is_valid & reference.covers(time))
     gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1)
-    refuse_strangers(gyro, motion)
+    reject_strangers(gyro, motion)
     # With little rotation two logs resemble each other by chance.
-    refuse_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
+    reject_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
     return found.correlation
 
 

@@ -24,13 +24,13 @@ TURNING = 0.5
 
 
 def share_left(gyro: GyroFit) -> float:
-    """Median residual over the median reference rate, of rows that rotate; medians are robust to knocks."""
+    """Median residual over the median reference rate, of rows that rotate; medians are robust to impacts."""
     turns = gyro.size >= TURNING * float(np.sqrt(np.mean(gyro.size**2)))
     left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
     return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
 
 
-def refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
+def reject_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
     """Raise ``RefusedError`` where the rates agree in magnitude, but no mounting rotation makes them equal."""
     left = share_left(gyro)
     if left > STRANGERS and not motion.is_stepwise:
@@ -40,7 +40,7 @@ def refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
         )
 
 
-def refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
+def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
     """Raise ``RefusedError`` where the rates differ by a factor of units: 57.3, 1000, 60 or 9.55 (rpm)."""
     nominal = rate_to_si(recording.gyroscope_unit)
     if nominal is None:
@@ -63,7 +63,7 @@ def refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -
             )
 
 
-def refuse_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
+def reject_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
     """Raise ``RefusedError`` for axes of S (9,) whose relative σ by its covariance (9, 9) is 0.5 or more."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
     size = np.linalg.norm(S.reshape(3, 3), axis=0)
@@ -82,7 +82,7 @@ REACH_S, SHIFT_S = 0.3, 0.02
 """Range and step of the shifts that are tried: larger ones are excluded by the alignment of the rates' magnitudes."""
 
 
-def refuse_two_clocks(found: MotionFit, k: int) -> None:
+def reject_two_clocks(found: MotionFit, k: int) -> None:
     """Raise ``RefusedError`` with both offsets where the evidence of another is within ``NAMED_FROM`` of the best."""
     if "clock" not in found.places[k]:
         return
@@ -126,14 +126,14 @@ SEARCH_S = 2.0
 LEFT_AT_ZERO = 0.05
 """Least misfit at lag 0, relative to the stretch's rate²: a jump of 50 ms leaves a tenth for rotation at 1 Hz."""
 LEFT_AT_LAG = 0.25
-"""Largest misfit at another lag, relative to that at lag 0: noise and knocks are equal at every lag."""
+"""Largest misfit at another lag, relative to that at lag 0: noise and impacts are equal at every lag."""
 TURNING_PART = 0.2
 """Least rms rate of a stretch, relative to the log's, for a lag."""
 FEWEST = 2
 """Consecutive stretches with one lag that prove a jump."""
 
 
-def refuse_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> None:
+def reject_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> None:
     """Check that no part of the reference fits at another lag than the whole.
 
     The alignment's stretches are 8 s long and use only magnitudes of rates: it excludes a jump in the last seconds as

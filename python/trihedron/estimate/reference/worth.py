@@ -98,7 +98,7 @@ def residual_density(side: Beside, found: MotionFit, k: int) -> float:
     rows = fine.blocks.rows()[:, 0] > 0
     change = np.diff(fine.observed.reshape(-1, 3), axis=0)[rows[1:] & rows[:-1]]
     # Means of a random walk over neighbouring blocks differ by 2/3 of its variance per block; the median is robust
-    # to knocks and divided by that of chi-square with 3 degrees of freedom.
+    # to impacts and divided by that of chi-square with 3 degrees of freedom.
     return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chi2.median(3))))
 
 

@@ -56,7 +56,8 @@ def needs(one: Format) -> list[str]:
 def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:
     """A calibration for ``target``, one of :func:`targets`: text by file name ending; ``""`` where there is one file.
 
-    Refused when the target is unknown, the calibration is not plausible, or it cannot be expressed in that convention.
+    Raises ``RefusedError`` when the target is unknown, the calibration is not plausible, or it cannot be expressed in
+    that convention.
     """
     one = formats().get(target)
     if one is None or one.write is None:
@@ -75,7 +76,7 @@ def export_calibration(calibration: Calibration, target: str, options: ExportOpt
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration file of trihedron or of another program; its format is recognised by content.
 
-    Refused when the file is missing or its format is not supported.
+    Raises ``RefusedError`` when the file is missing or its format is not supported.
     """
     path = Path(path)
     text = _text(path)

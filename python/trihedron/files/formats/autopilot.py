@@ -46,7 +46,7 @@ Correction = Callable[[Onboard, str], AxisCorrection]
 def orientation(number: float) -> FloatArray:
     """(3, 3) rotation from the sensor's to the board's axes for one of MAVLink's orientations.
 
-    Refused when the number is none of the fixed orientations.
+    Raises ``RefusedError`` when the number is none of the fixed orientations.
     """
     if number != int(number) or not 0 <= number < len(_DEG_ROLL_PITCH_YAW):
         raise RefusedError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
@@ -79,7 +79,8 @@ def parameters_in(text: str) -> dict[str, float]:
 def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, prefix: str) -> Onboard:
     """The corrections that the board had applied to the calibrated readings.
 
-    Refused when neither the calibration nor a parameter file states them, or the log is of another autopilot.
+    Raises ``RefusedError`` when neither the calibration nor a parameter file states them, or the log is of another
+    autopilot.
     """
     name = {"ardupilot": "ArduPilot", "px4": "PX4"}[autopilot]
     stated = calibration.extensions.get("onboard")
@@ -135,7 +136,7 @@ def composed(
     With ``logged = R (s o (r - o))``, ``truth = S logged + b`` is ``S' r + b'`` with ``S' = Rᵀ S R diag(s)`` and
     ``b' = Rᵀ b - S' o``. The offset is the reading at zero input; the scale is along the sensitive axis.
 
-    Refused when an axis is mirrored, which a positive scale cannot represent.
+    Raises ``RefusedError`` when an axis is mirrored, which a positive scale cannot represent.
     """
     known = of_si_readings(calibration, target, options)
     made, out = {}, {}

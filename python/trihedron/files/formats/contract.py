@@ -94,7 +94,7 @@ class Format:
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
     """The calibration for readings that the target's driver converts to SI.
 
-    Refused when it is for counts and the LSB is not given.
+    Raises ``RefusedError`` when it is for counts and the LSB is not given.
     """
     made = {}
     for name, sensor in named_sensors(calibration):

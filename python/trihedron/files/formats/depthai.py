@@ -8,7 +8,7 @@ from trihedron.records import Calibration
 
 
 def from_depthai(text: str) -> Calibration | None:
-    """None for other files; depthai's file is refused, because it contains no correction of IMU readings.
+    """None for other files; depthai's file is rejected, because it contains no correction of IMU readings.
 
     Raises
     ------

@@ -103,7 +103,8 @@ TARGETS: dict[str, _Target] = {
 def filter_noise_text(found: FilterNoise, target: str) -> str:
     """The noise of both sensors in the format of ``target``.
 
-    Refused when the target is unknown, or a sensor was not estimated: the target reads a missing key as 0.
+    Raises ``RefusedError`` when the target is unknown, or a sensor was not estimated: the target reads a missing key
+    as 0.
     """
     one = TARGETS.get(target)
     if one is None:

@@ -26,7 +26,8 @@ LARGEST_GAIN, LARGEST_OFFSET = 8192, 32767
 def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     """Commands for INAV's command line, from a calibration of uncorrected readings.
 
-    Refused when the readings were not raw, the LSB is not given, or a value exceeds the range of a setting.
+    Raises ``RefusedError`` when the readings were not raw, the LSB is not given, or a value exceeds the range of a
+    setting.
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
         raise RefusedError(

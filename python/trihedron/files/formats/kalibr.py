@@ -29,7 +29,7 @@ from trihedron.sensor_model import other_form
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     """``imu.yaml`` with the six keys that its reader requires, and intrinsics named as in Kalibr's results.
 
-    Refused when noise or rate, which the reader requires, are not given.
+    Raises ``RefusedError`` when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
     figures = required(lower, options, "Kalibr")
@@ -53,7 +53,8 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
 def from_kalibr(text: str) -> Calibration | None:
     """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``).
 
-    Refused when it is the camera chain written beside those results, which contains only the pose of the IMU.
+    Raises ``RefusedError`` when it is the camera chain written beside those results, which contains only the pose of
+    the IMU.
     """
     document = yaml_of(text)
     if document is None or text.lstrip().startswith("%YAML:1.0"):

@@ -40,11 +40,14 @@ COVARIANCES = ("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov")
 
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
-    """The noise and rate that the target's reader requires. Refused when noise or rate are not given."""
+    """The noise and rate that the target's reader requires.
+
+    Raises ``RefusedError`` when noise or rate are not given.
+    """
     accel, gyro = options.accelerometer_noise, options.gyroscope_noise
     if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
         raise RefusedError(
-            f"{target} needs the noise and the rate of the samples: add --noise ALLAN.json (of `trihedron allan REST "
+            f"{target} needs the noise and the rate of the samples: add --noise ALLAN.json (of `trihedron allan LOG "
             "--json ALLAN.json`) and --rate HZ."
         )
     gyro = gyro or SensorNoise(NoiseFigure(0.0), NoiseFigure(0.0))

@@ -1,4 +1,4 @@
-"""RealSense: ``corrected = Mᵀ raw - bias`` per sensor, M the nine numbers of ``scale_and_alignment`` row by row.
+"""RealSense: ``corrected = Mᵀ raw - bias`` per sensor, M the nine elements of ``scale_and_alignment`` row by row.
 
 The manufacturer's script (tools/rs-imu-calibration of librealsense) solves ``raw · X - bias`` and writes X row by row;
 the camera stores its transpose.

@@ -22,7 +22,7 @@ def distortion(
 ) -> tuple[Calibration, dict[str, tuple[FloatArray, FloatArray]], Figures]:
     """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and the noise; an ideal gyro where there is none.
 
-    Refused when noise or rate are not given.
+    Raises ``RefusedError`` when noise or rate are not given.
     """
     known = of_si_readings(calibration, target, options)
     pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
@@ -105,7 +105,7 @@ def to_airsim(calibration: Calibration, options: ExportOptions) -> str:
     """
     known, _, figures = distortion(calibration, options, "AirSim")
     both = ("accelerometer", "gyroscope")
-    said = said_of(known, options, "reading = truth + walking bias + noise, SI.", lost_bias=both)
+    said = said_of(known, options, "reading = truth + bias random walk + noise, SI.", lost_bias=both)
     root = math.sqrt(TAU_S)
     imu = {
         "SensorType": 2,
@@ -129,7 +129,7 @@ def to_mvsim(calibration: Calibration, options: ExportOptions) -> str:
     known, _, figures = distortion(calibration, options, "mvsim")
     both = ("accelerometer", "gyroscope")
     lost = ("Of the rate only its part about the vertical is simulated: the program's vehicles move in a plane.",)
-    said = said_of(known, options, "reading = truth + walking bias + noise, SI.", lost_bias=both, lost=lost)
+    said = said_of(known, options, "reading = truth + bias random walk + noise, SI.", lost_bias=both, lost=lost)
     root = math.sqrt(figures.rate_hz)
     lines = ["<!--", *(line.replace("--", "- -") for line in said), "-->", '<sensor class="imu" name="imu1">']
     lines.append(f"  <sensor_period>{number(1.0 / figures.rate_hz)}</sensor_period>")

@@ -64,7 +64,7 @@ def audit_steps(
     usual = float(np.median(steps))
     return [
         Finding.of(
-            FindingCode.RAW_STEP,
+            FindingCode.RAW_LSB,
             sensor=short(sensor),
             unit=unit.value,
             steps=list(zip(AXES, steps, strict=True)),

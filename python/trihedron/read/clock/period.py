@@ -114,7 +114,7 @@ class _Spectrum:
 
 
 def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum) -> float:
-    """Lowest frequency (per mean distance of rows) of a grid on which all timestamps lie; 0 where there is none."""
+    """Lowest frequency (per mean distance of rows) whose multiples all timestamps are; 0 where there is none."""
     per_step = spectrum.per_step
     high = np.flatnonzero((spectrum.power > 0.9 * LINE) & (per_step >= 0.05) & (per_step <= GRID_HIGHEST))
     while len(high):

@@ -217,7 +217,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
             is_rounded=sampling.kind is TimestampKind.ROUNDED,
             grid_s=clock.grid_s,
             is_late=sampling.kind is TimestampKind.LATE,
-            motion_tells=sampling.sigma_followed < VAGUE,
+            motion_shows=sampling.sigma_followed < VAGUE,
             followed=sampling.followed,
             sigma_followed=sampling.sigma_followed,
             shared_fraction=shared,

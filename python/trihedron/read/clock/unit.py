@@ -39,8 +39,8 @@ _SHORTEST_S, _SHORT = 5.0, -2.5
 """Shortest usual duration of a log of more than 1000 rows; the log odds of a unit that makes it shorter."""
 _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
-"""Rotation by 20 degrees from rest to rest in the first time needs 1500 rad/s², more than a wrist or a table reaches;
-in the second 100 rad/s², a shock."""
+"""Rotation by 20 degrees between static poses in the first time needs 1500 rad/s², more than a wrist or a table
+reaches; in the second 100 rad/s², a shock."""
 USUAL_TURN_S, _TURN_SPREAD, _SLOWEST = 0.35, math.log(3.0), -3.0
 """Usual time of a session's fastest 20 degrees (90 degrees in 1.5 s), the spread of its logarithm, and the lowest log
 odds, because slow rotation in a chamber has no limit."""

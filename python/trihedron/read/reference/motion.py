@@ -194,7 +194,7 @@ def _triad(table: Table, roles: list[Role], what: str, rows: npt.NDArray[np.int6
     if not part:
         return None
     if set(part) != set("xyz"):
-        raise ReadError(f"{table.path}: the reference's {name} needs columns of x, y and z; found {', '.join(part)}.")
+        raise ReadError(f"{table.path}: the reference's {name} needs columns of X, Y and Z; found {', '.join(part)}.")
     if what == "w" and any(not role.unit for role in part.values()):
         raise ReadError(
             f"{table.path}: the unit of the reference's rate is not stated; name its columns 'wx [deg/s]' or "
@@ -232,7 +232,7 @@ def _settled(
     return replace(motion, findings=said)
 
 
-# Columns of attitude as rotation matrices, body → world; numbers that are not a rotation are refused.
+# Columns of attitude as rotation matrices, body → world; numbers that are not a rotation are rejected.
 
 ROUNDING = 0.02
 """Largest error of a quaternion's norm, and a third of that of a matrix's orthonormality: three digits err less."""

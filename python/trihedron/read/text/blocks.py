@@ -115,7 +115,7 @@ def blocks(
     except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
         raise ReadError(
             f"{path}: the {compression} data is damaged or ends too early, after about {lines} lines "
-            f"({error}); copy the file again or unpack what is left of it."
+            f"({error}); copy the file again or unpack its undamaged part."
         ) from None
     except OSError as error:
         if compression is not None and error.errno is None:
@@ -177,7 +177,7 @@ def with_hash_remarks(data: bytes) -> bytes:
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
     """Text with a byte order mark or in UTF-16 as plain UTF-8, with minus signs as ``-``; binary data, recognised by a
-    zero byte, is refused."""
+    zero byte, is rejected."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").encode().replace(_MINUS, b"-")
     data = data.removeprefix(b"\xef\xbb\xbf")

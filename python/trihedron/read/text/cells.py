@@ -98,10 +98,10 @@ def parse(
         )
 
 
-def refuse_words(
+def reject_words(
     path: Path, frame: pl.DataFrame, as_text: pl.DataFrame, lines: npt.NDArray[np.int64], layout: Layout
 ) -> None:
-    """Refuse cells that are neither numbers nor words for "missing", which are NaN.
+    """Reject cells that are neither numbers nor words for "missing", which are NaN.
 
     Raises
     ------

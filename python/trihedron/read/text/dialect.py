@@ -1,7 +1,7 @@
 """Converts texts to tables: lines with a serial monitor's timestamp before them, and labelled values.
 
 A dialect is recognised from the first lines, if nearly all of them follow it. Other lines are unchanged, so that the
-reader of tables refuses them with their line number.
+reader of tables rejects them with their line number.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
         known_labels = names if line.startswith(COMMENT_STARTS) else counts
         if not pairs or any(label not in known_labels for label, _ in pairs):
             # A start-up message above the first row is skipped, a separator line between rows becomes a remark; the
-            # reader refuses any other line with its number.
+            # reader rejects any other line with its number.
             end()
             if rows:
                 rows.append(line if any(map(str.isalnum, line)) else f"# {line}")

@@ -156,7 +156,7 @@ def _are_numbers(values: Iterable[Any]) -> bool:
 
 
 def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
-    """Values by their path; lists of three numbers become x, y, z."""
+    """Values by their path; lists of three numbers become ``x``, ``y``, ``z``."""
     out: Row = {}
     for key, leaf in value.items():
         name = f"{prefix}{key}"

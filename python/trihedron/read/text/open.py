@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from trihedron.read.errors import ReadError, refuse_after_fork
+from trihedron.read.errors import ReadError, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, as_utf8, beginning, blocks
@@ -38,7 +38,7 @@ def read_text(
     ReadError
         As :class:`TextReader`.
     """
-    refuse_after_fork(path)
+    reject_after_fork(path)
     # Twice the length, for UTF-16.
     first = beginning(path, compression, 2 * _SAMPLE_BYTES, content)
     # The reader reports a zero byte, with its line.

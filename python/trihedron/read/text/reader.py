@@ -25,7 +25,7 @@ from trihedron.read.text.cells import (
     find_text_columns,
     numbers,
     parse,
-    refuse_words,
+    reject_words,
     sparse_words,
 )
 from trihedron.read.text.dates import past_midnight
@@ -214,7 +214,7 @@ class TextReader:
         return is_read
 
     def _expected(self, n_new: int, n_bytes: int, layout: Layout) -> int:
-        """Expected number of rows of the whole log; refused if they do not fit into memory."""
+        """Expected number of rows of the whole log; rejected if they do not fit into memory."""
         rows = self.n_rows + n_new
         rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
         expected = int(self.size * rows_per_byte) if self.compression is None else rows
@@ -234,7 +234,7 @@ class TextReader:
     def _incomplete(
         self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
     ) -> tuple[npt.NDArray[np.int64], bytes]:
-        """The block without an incomplete last line of the file; any other irregular line is refused."""
+        """The block without an incomplete last line of the file; any other irregular line is rejected."""
         fields = int(found.fields[i])
         is_end = i == len(found.number) - 1 and self.cursor.is_last
         line = self.line(int(found.number[i]))
@@ -277,7 +277,7 @@ class TextReader:
                     self.text_columns[i] = column
                     suspects.remove(str(i))
                     frame = frame.with_columns(as_text[str(i)])
-            refuse_words(self.path, frame, as_text.select(suspects), lines, layout)
+            reject_words(self.path, frame, as_text.select(suspects), lines, layout)
         columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
         self._take(columns, lines, len(data), layout)
 

@@ -19,13 +19,13 @@ This page is made from the catalogue (`python/trihedron/report/effects/`).
 
 def page() -> str:
     """Markdown, by id in alphabetical order."""
-    return _HEAD + "".join(_told(*entry) for entry in sorted(CATALOGUE.items()))
+    return _HEAD + "".join(_entry(*entry) for entry in sorted(CATALOGUE.items()))
 
 
-def _told(effect_id: str, entry: EffectWords) -> str:
+def _entry(effect_id: str, entry: EffectWords) -> str:
     lines = [f"\n## {effect_id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
     lines += [f"*Said:* {shown(text)}" for text in entry.said.values()]
     lines.append(f"*Separating experiment:* {entry.experiment}.")
-    if entry.experiment_at_rest:
-        lines.append(f"*In a log of one or two orientations:* {entry.experiment_at_rest}.")
+    if entry.static_experiment:
+        lines.append(f"*In a log of one or two orientations:* {entry.static_experiment}.")
     return "<br>\n".join(lines) + "\n"

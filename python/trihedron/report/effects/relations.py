@@ -32,7 +32,7 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             ("play or slip in a mounting", "memory of the readout"),
         ),
         "temperature": FamilyWords(
-            "repeat a few poses while the temperature takes another course: up, down, and held",
+            "repeat a few poses while the temperature takes another course: up, down, and constant",
             ("a thermal bias of another shape",),
         ),
         "rate products": FamilyWords(

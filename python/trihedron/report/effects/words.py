@@ -11,7 +11,7 @@ class EffectWords:
     """Words of one effect.
 
     ``mechanism`` completes "the model lacks this: ..."; ``experiment`` is the recording that separates it from other
-    effects, ``experiment_at_rest`` the same for a log of one or two orientations. ``said`` are sentences about the
+    effects, ``static_experiment`` the same for a log of one or two orientations. ``said`` are sentences about the
     accepted effect by case, with placeholders for values (``report/findings/wording.py``); without one the sentence is
     the mechanism with its strongest term. ``lines`` are the parts of placeholders ``{name:each}``.
     """
@@ -19,7 +19,7 @@ class EffectWords:
     mechanism: str
     experiment: str = ""
     said: Mapping[str, str] = field(default_factory=dict)
-    experiment_at_rest: str = ""
+    static_experiment: str = ""
     lines: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -35,11 +35,11 @@ BOTH_SIDES_OF_LEVEL = (
 SHAKE = "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
 
 
-def drifts(sensor: str, unit: str, walk: str, at_rest: str = "") -> Mapping[str, str]:
-    """Bias drift from pose to pose, by its kind; in a log of one orientation ``at_rest`` is added."""
+def drifts(sensor: str, unit: str, walk: str, static: str = "") -> Mapping[str, str]:
+    """Bias drift from pose to pose, by its kind; in a log of one orientation ``static`` is added."""
     whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
     sizes = f"{{range:all .2g {unit}}}"
-    rest = {case: whole.format(how="smoothly", sizes=_at_rest("range", own)) + at_rest for case, own in _units(unit)}
+    rest = {case: whole.format(how="smoothly", sizes=_static_size("range", own)) + static for case, own in _units(unit)}
     return {"walk": whole.format(how=walk, sizes=sizes)} | rest
 
 
@@ -50,17 +50,17 @@ def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
 
 def _units(unit: str) -> tuple[tuple[str, str], ...]:
     """Cases of a static log, with their unit: readings of unknown scale stay counts."""
-    return (("at-rest", unit), ("at-rest-counts", "counts"))
+    return (("static", unit), ("static-counts", "counts"))
 
 
-def _at_rest(place: str, unit: str) -> str:
+def _static_size(place: str, unit: str) -> str:
     if unit == "counts":
         return f"{{{place}:all .3g}} counts"
     return f"{{{place}:all {'.2g' if unit == '°/s' else '.3g'} {unit}}}"
 
 
 def _thermal(sensor: str, unit: str) -> str:
-    swing, left, raw, gap = (_at_rest(place, unit) for place in ("swing", "left", "raw", "gap"))
+    swing, left, raw, gap = (_static_size(place, unit) for place in ("swing", "left", "raw", "gap"))
     return (
         f"The {sensor} bias follows the temperature from {{low_degc:.0f}} to {{high_degc:.0f}} °C by "
         "{is_straight:?a straight line|{is_parabola:?a parabola|a curve of third order}}"
@@ -88,7 +88,7 @@ def saturates(sensor: str) -> EffectWords:
 ACCELEROMETER = {
     "accel-cubic": EffectWords(
         "the accelerometers have a cubic nonlinearity, as a differential capacitive bridge does",
-        "add tilts between the faces (20° steps): an odd curve bends between level and 1 g",
+        "add tilts between the faces (every 20°): an odd curve bends between level and 1 g",
     ),
     "accel-quadratic": EffectWords("the accelerometers have a quadratic nonlinearity", BOTH_SIDES_OF_LEVEL),
     "accel-scale-asymmetry": EffectWords(
@@ -181,7 +181,7 @@ SESSION = {
             "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad: reversed "
             "is {is_one:?gyro {reversed:axes}, or both other gyro axes and that accelerometer axis|"
             "{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
-            "{is_three:?all accelerometer axes (the log holds gravity instead of specific force), or all gyro axes|"
+            "{is_three:?all accelerometer axes (the log contains gravity instead of specific force), or all gyro axes|"
             "the order of the axes}}}."
         },
     ),
@@ -195,7 +195,7 @@ SESSION = {
         "the resolution (LSB) is too coarse for the noise: means of poses are quantised",
         "choose a finer range, or add a little motion or noise (dither) while averaging",
         {
-            "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of zero|have "
+            "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of 0|have "
             "a resolution of {step:.4g} raw units (LSB), {times:.2g} times their noise}: averaging does not "
             "resolve less."
         },
@@ -222,11 +222,11 @@ SESSION = {
         },
     ),
     "disturbed-pose": EffectWords(
-        "a disturbed pose: it was not still, or was pushed",
+        "a disturbed pose: it was not static",
         "repeat that pose",
         {
-            "pushed": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it or exclude it.",
-            "not-still": "Disturbed poses ({is_bumped:?at {disturbed_s:each}|}{are_both:?; |}"
+            "moved": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it or exclude it.",
+            "not-still": "Disturbed poses ({is_timed:?at {disturbed_s:each}|}{are_both:?; |}"
             "{is_restless:?not still: {restless:&, }|}).",
         },
         lines={"disturbed_s": "{v0:.2f} s"},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_UNQUIET = "Poses not quite still, bias drift between poses, nonlinearity, or noise of the means underestimated."
+_UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated."
 _LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
 _ADD_POSES = "Add poses with {advice:numbered}."
 _FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
@@ -49,7 +49,7 @@ ENTRIES = {
     (Code.OUTLIER_POSE, "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
-        "The sensor was touched or not still in this pose, or a reading clipped.",
+        "The sensor was touched or not static in this pose, or a reading clipped.",
         "Exclude the pose, or use a robust loss (--loss).",
     ),
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
@@ -87,7 +87,7 @@ ENTRIES = {
     (Code.NOT_CONVERGED, "accelerometer", SERIOUS): Words(
         "The accelerometer fit did not converge ({stopped_because}).",
         "Poses contradict each other, or hardly differ.",
-        "Check that every pose was still; add poses.",
+        "Check that every pose was static; add poses.",
     ),
     (Code.POSE_NOT_A_FACE, "", NOTE): Words(
         "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
@@ -102,11 +102,11 @@ ENTRIES = {
         "Level the table, press the case flat, or use --method joint, which needs neither.",
         or_severity=SERIOUS,
     ),
-    (Code.RESIDUAL_ABOVE_NOISE, "verify-rest", WARNING): Words(
+    (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
         "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, most in pose "
         "{worst_pose} ({worst_m_s2:.3g mm/s²}); χ²/dof {chi2_per_dof:.2g}, each pose weighted by its uncertainty.",
-        "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
-        "Look at pose {worst_pose} first; if it was still, calibrate again near the conditions of use.",
+        "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not static.",
+        "Look at pose {worst_pose} first; if it was static, calibrate again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }

@@ -24,18 +24,18 @@ _CALIBRATE = {
     ),
     (Code.GYROSCOPE_LEFT_OUT, "not-calibrated", WARNING): Words(
         "The gyro was not calibrated: {why}.",
-        "The recording does not hold what the gyro needs.",
+        "The recording does not contain what the gyro needs.",
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
     ),
     (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
         "No calibration can be made from this log: {why}",
-        "The log does not hold what a calibration needs.",
-        "Hold the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
+        "The log does not contain what a calibration needs.",
+        "Keep the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
     ),
     (Code.NOT_FIT, "few-orientations", NOTE): Words(
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
-        "A static log, a chamber log or a table that stands still.",
-        "To test those too, hold 18 or more poses of 3 to 5 s in different directions.",
+        "A static log, a chamber log or a table that does not move.",
+        "To test those too, record 18 or more poses of 3 to 5 s in different directions.",
         numbers=("n_poses",),
     ),
 }
@@ -47,7 +47,7 @@ _VERIFIED = {
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters; calibrate several sessions together to learn how far each repeats.",
     ),
-    (Code.WORSE_THAN_UNCALIBRATED, "verify-rest", SERIOUS): Words(
+    (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
         "{rms_without:.3g mm/s²} without.",
         "A wrong file, unit, axis or sign, or a calibration of too few poses.",
@@ -69,7 +69,7 @@ _VERIFIED = {
 
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
-        "The gyro was excluded: the calibration holds none.",
+        "The gyro was excluded: the calibration contains no gyro.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
     ),
@@ -102,7 +102,7 @@ _USE = {
         "It was in the recording that was calibrated; S and b were fitted beside it.",
         "Log that channel, or update the program that applies the calibration.",
     ),
-    (Code.LIMIT_EXCEEDED, "rest", SERIOUS): Words(
+    (Code.LIMIT_EXCEEDED, "static", SERIOUS): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "
         "{limit_mg:g} mg.",
         "The calibration is less accurate here than required.",
@@ -169,7 +169,7 @@ _DIAGNOSE = {
     ),
     (Code.PROTOCOL_DIFFERS, "", NOTE): Words(
         "The simulated recording has {n_simulated} poses and the real one {n_real}.",
-        "They do not follow the same protocol, or a pose was not still.",
+        "They do not follow the same protocol, or a pose was not static.",
         "Parameters, noise and physics are compared all the same, each from its own poses; their uncertainties differ.",
     ),
 }

@@ -8,9 +8,9 @@ _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 
 _TIMESTAMPS = {
     (Code.TIME_JITTER, "", NOTE): Words(
-        "Steps between timestamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms}, mean {mean_step_s:.5g "
-        "ms}, {least_s:.3g !ms} to {largest_s:.3g ms}){is_irregular:?, and no even clock lies behind them|}; the rate "
-        "used is {rate_hz:.5g} Hz.",
+        "Intervals between timestamps are {least_s:.3g !ms} to {largest_s:.3g ms} (median {median_step_s:.5g ms}, mean "
+        "{mean_step_s:.5g ms}){is_irregular:?, {jitter_s:.3g ms} rms about their mean; no even clock lies behind "
+        "them|}; the rate used is {rate_hz:.5g} Hz.",
         "{is_irregular:?A program that samples in its own time: its timestamps were kept.|Timestamps taken when the "
         "data arrived, or rounded.}",
         "Take timestamps in the sensor's own interrupt if turns matter.",
@@ -18,13 +18,13 @@ _TIMESTAMPS = {
         or_severity=WARNING,
     ),
     (Code.TIME_DUPLICATE, "", WARNING): Words(
-        "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
+        "{count} samples ({fraction:.3g %}) have the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         "With samples timestamped in batches, read with --columns time=none and --rate.",
         numbers=("sample",),
     ),
     (Code.TIME_DUPLICATE, "mended", NOTE): Words(
-        "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
+        "{count} samples ({fraction:.3g %}) have the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         numbers=("sample",),
     ),
@@ -38,8 +38,7 @@ _TIMESTAMPS = {
         lines={"worst": "{v0:.4g} s before {v1}"},
     ),
     (Code.TIME_WRAPPED, "", NOTE): Words(
-        "The clock counter of {bits} bits starts again from zero {count} times (first: {where}); the time was "
-        "continued.",
+        "The clock counter of {bits} bits starts again from 0 {count} times (first: {where}); the time was continued.",
         numbers=("sample",),
     ),
     (Code.TIME_BACKWARD, "", WARNING): Words(
@@ -56,24 +55,24 @@ _TIMESTAMPS = {
         numbers=("row",),
     ),
     (Code.TIME_UNIT_DETECTED, "", NOTE): Words(
-        "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
+        "The time is in {unit}, by its intervals of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "unsure", WARNING): Words(
-        "The time is in {unit}, by its steps of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
-        "The step alone does not determine the unit; every rate and every noise density depends on it.",
+        "The time is in {unit}, by its intervals of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
+        "The interval alone does not determine the unit; every rate and every noise density depends on it.",
         "Give --time-unit s, ms, us or ns if this is wrong, or --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(
-        "SampleTimeFine steps by {step:.6g}, so it counts microseconds, as Movella DOT does."
+        "SampleTimeFine increases by {step:.6g}, so it counts microseconds, as Movella DOT does."
     ),
     (Code.TIME_UNIT_DETECTED, "sum-of-steps", NOTE): Words(
-        "Column {column} holds the time since the row before; the time is their sum.",
+        "Column {column} contains the time since the row before; the time is their sum.",
         action="If it is something else, read with --columns time=none and --rate.",
     ),
     (Code.TIME_UNIT_DETECTED, "sample-time-100us", NOTE): Words(
-        "SampleTimeFine steps by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
+        "SampleTimeFine increases by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
         action="Give --time-unit us if this is wrong.",
     ),
 }
@@ -113,7 +112,7 @@ _HOW = (
     "samples are timestamped on arrival|off by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_tells:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that error "
+    "{motion_shows:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that error "
     "(0 %: sampled evenly, 100 %: sampled as timestamped)|no motion shows when samples were taken}"
 )
 _WITH_THEM = (
@@ -138,13 +137,13 @@ _CLOCKS = {
         _LOG_COUNTER,
         numbers=_WITH_THEM,
     ),
-    (Code.CLOCKS_MERGED, "same-timestamps", NOTE): Words("Both sensors carry the same timestamps."),
+    (Code.CLOCKS_MERGED, "same-timestamps", NOTE): Words("Both sensors have the same timestamps."),
     (Code.CLOCKS_MERGED, "", NOTE): Words(
         "Two clocks merged: accelerometer {accelerometer_rate_hz:.5g} Hz, gyro {gyroscope_rate_hz:.5g} Hz, gyro starts "
         "{offset_s:+.3g ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
         "{same_tick_fraction:.3g %} of rows and interpolated between neighbours elsewhere, which leaves "
         "{variance_factor:.3g %} of its white-noise variance; {cut_rows} rows outside the overlap were cut, and "
-        "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} hold no reading.",
+        "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} have no reading.",
         "Each sensor was logged with its own timestamps.",
         "{is_coloured:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
         numbers=("rate_ratio", "rows_left_out"),

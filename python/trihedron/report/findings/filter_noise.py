@@ -5,7 +5,7 @@ from __future__ import annotations
 from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
 
 ENTRIES = {
-    (Code.FILTER_NOISE_AT_REST, "", WARNING): Words(
+    (Code.FILTER_NOISE_STATIC, "", WARNING): Words(
         "No reference: N and K are those of this log's static intervals, without what vibration and motion add.",
         "Static stretches and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
@@ -18,12 +18,12 @@ ENTRIES = {
     (Code.FILTER_NOISE_NOT_SEPARATED, "", NOTE): Words(
         "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
         "marked 'below' has an upper limit only.",
-        "Both grow slowly, and one recording holds few of their time constants.",
+        "Both grow slowly, and one recording contains few of their time constants.",
         "Use the limit in a filter that must not be too sure, or record longer beside a better reference.",
     ),
     (Code.FILTER_NOISE_FOLLOWED, "", WARNING): Words(
         "The reference follows the {sensor}'s own noise: the difference is less than static noise allows. N is the "
-        "static one; what motion adds to it is hidden.",
+        "static one; what motion adds to it is not visible.",
         "An attitude or path computed with this unit's own readings (a filter or smoother over camera, tracker and "
         "IMU).",
         "Take the tracker's own poses as reference.",
@@ -37,14 +37,14 @@ ENTRIES = {
     (Code.FILTER_NOISE_UNCALIBRATED, "", WARNING): Words(
         "A calibration would remove {share:.0f %} or more of the {sensor}'s error over {horizon_s:.3g} s "
         "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
-        "The log was not corrected, or by parameters that no longer hold. Such errors follow the motion: no noise of a "
+        "The log was not corrected, or by outdated parameters. Such errors follow the motion: no noise of a "
         "filter represents them.",
         "Calibrate first (trihedron calibrate LOG --reference MOTION -o FILE), correct the log with trihedron apply, "
         "and estimate N and K from that.",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
-        "The search for the {sensor}'s strengths did not settle: its intervals rest on a few draws.",
-        "The log holds too little motion, or noise that none of the causes describes.",
+        "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",
+        "The log contains too little motion, or noise that none of the causes describes.",
         "Do not rely on these intervals; give a longer log, or one without shocks.",
     ),
 }

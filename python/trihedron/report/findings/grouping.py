@@ -75,13 +75,13 @@ def _together(sentences: Sequence[str]) -> str:
             if rest is not None:
                 return name([part for part in parts if part is not None], rest)
     whole = ranged(sentences)
-    if whole is not None and not re.search(r"\b(hold|pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
+    if whole is not None and not re.search(r"\b(pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
         return whole
     return " ".join(map(capital, sentences))
 
 
 def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
-    """``Gyro x, y and z: above 0.8 to 1.1 Hz ...``"""
+    """``Gyro X, Y and Z: above 0.8 to 1.1 Hz ...``"""
     groups: dict[str, list[str]] = {}
     for part in parts:
         sensor, _, axis = part[1].partition(" ")

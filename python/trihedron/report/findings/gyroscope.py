@@ -60,7 +60,7 @@ _MOVES = {
     (Code.OUTLIER_MOVE, "", WARNING): Words(
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
         "times its noise, and is excluded.",
-        "one of its poses was not still, samples were lost, or the gyro was driven beyond its range limit.",
+        "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
         "Look at this move; repeat it.",
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
@@ -88,11 +88,11 @@ _MOVES = {
         Words("the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"),
     ),
     (Code.SAMPLES_LOST, "seen-in-motion", WARNING): Words(
-        "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} steps in motion are one "
+        "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} intervals in motion are one "
         "sample too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
         "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
         "by about that.",
-        "A link or a logger that drops samples and renumbers, or timestamps anew, what is left.",
+        "A link or a logger that drops samples and renumbers the others, or timestamps them anew.",
         "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
         "`trihedron diagnose` puts single losses back.",
         or_severity=SERIOUS,
@@ -101,7 +101,7 @@ _MOVES = {
         "The tilt error after rotations exceeds noise, and the timestamps are so even that they may have been "
         "regenerated: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
-        "A link or a logger that drops samples and renumbers, or timestamps anew, what is left; or another cause of "
+        "A link or a logger that drops samples and renumbers the others, or timestamps them anew; or another cause of "
         "the error.",
         "Log the sensor's own sample counter or time, and record again; `trihedron diagnose` looks for other causes.",
     ),
@@ -120,8 +120,8 @@ _MOVES = {
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations, {angle_rms_deg:.3g}° rms, exceeds noise and uncertainty, most in move "
         "{worst_move} ({worst_deg:.3g}°); χ²/dof {chi2_per_dof:.2g}, each move weighted by its uncertainty.",
-        "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
-        "Look at move {worst_move} first; if the poses around it were still, calibrate again near conditions of use.",
+        "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not static.",
+        "Look at move {worst_move} first; if the poses around it were static, calibrate again near conditions of use.",
         or_severity=SERIOUS,
     ),
 }
@@ -130,19 +130,19 @@ _TURNS = {
     (Code.TURN_NOT_A_MULTIPLE, "left-out", WARNING): Words(
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; it is excluded.",
-        "the case was not pushed home against the wall, or the turn was another one.",
+        "the case did not touch the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
     (Code.TURN_NOT_A_MULTIPLE, "contradicted", SERIOUS): Words(
         "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
         "others; no third turn shows which of them is wrong.",
-        "the case was not pushed home against the wall, or the turn was another one.",
+        "the case did not touch the wall, or the turn was another one.",
         "Repeat this turn.",
     ),
     (Code.TURN_NOT_A_MULTIPLE, "scatter", WARNING): Words(
         "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
         "turned by eye, without a wall.",
-        "Push the case against a wall before and after each turn.",
+        "Place the case against a wall before and after each turn.",
     ),
     **{
         (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(

@@ -25,7 +25,7 @@ _OF_AXES = {
             "The uncertainties are too wide; identify the noise anew if that matters.",
             numbers=("axis", "nis_high"),
         ),
-        (Code.INNOVATIONS_COLOURED, case, WARNING): Words(
+        (Code.INNOVATIONS_CORRELATED, case, WARNING): Words(
             f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {{whiteness_p:.1e}} over {{n_lags}} "
             "lags, first autocorrelation {autocorrelation_1:+.2f}).",
             f"Bias drift or temperature that the noise model lacks, or {error}.",
@@ -38,7 +38,7 @@ _OF_AXES = {
 ENTRIES = {
     **_OF_AXES,
     (Code.NOT_CONVERGED, "kalman", SERIOUS): Words(
-        "The constants still moved after {most_runs} runs over all poses.",
+        "The constants still changed after {most_runs} runs over all poses.",
         "The start is too far away, or the poses do not determine the constants.",
         "Give a start near the data sheet, and poses in more directions.",
     ),

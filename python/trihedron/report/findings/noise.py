@@ -7,25 +7,25 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 _WIDENED = "Intervals were widened to allow for it."
 
 _LOG = {
-    (Code.REPEATED_ROWS, "at-rest", WARNING): Words(
+    (Code.REPEATED_ROWS, "static", WARNING): Words(
         "{share:.2g %} of the rows repeat the row before in every channel.",
         "the log was written faster than the sensor measures, or resampled by holding the last value.",
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
-    (Code.LOG_STEP, "", WARNING): Words(
+    (Code.LOG_JUMP, "", WARNING): Words(
         "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit} at {time_s:.1f} s.",
         "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
-        "A step looks like K and R; each side is fitted with a level of its own, so that K holds what is left.",
+        "A jump of the mean looks like K and R; each side is fitted with a mean of its own, so that K excludes it.",
     ),
-    (Code.LOG_KNOCK, "", NOTE): Words(
-        "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
-        "a knock at the table, a door, a lost or damaged reading.",
+    (Code.LOG_IMPACT, "", NOTE): Words(
+        "{n_impacts:# short excursion} of up to {impact:abs .3g} {unit}, the largest at {time_s:.1f} s.",
+        "an impact on the table, a door, a lost or damaged reading.",
         "They raise N and Q; these stretches are excluded.",
     ),
     (Code.LOG_MOTION, "", WARNING): Words(
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
-        "motion, vibration or handling during a log that should be still.",
+        "motion, vibration or handling during a log that should be static.",
         "They raise N; these stretches are excluded.",
     ),
     (Code.LOG_MOTION, "throughout", SERIOUS): Words(
@@ -38,7 +38,7 @@ _LOG = {
         "",
         "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
     ),
-    (Code.CLIPPING, "at-rest", SERIOUS): Words(
+    (Code.CLIPPING, "static", SERIOUS): Words(
         "{share:.2g %} of the readings lie on the same extreme value.",
         "the sensor or the ADC is at its range limit.",
         "Every term comes out too small; use a wider range or another orientation.",
@@ -47,7 +47,8 @@ _LOG = {
         "One reading's noise ({sigma:.3g} {unit}) is below half the resolution (LSB {resolution:.3g} {unit}): "
         "{repeated:.0f %} of the readings repeat the one before.",
         "the resolution is coarser than the noise.",
-        "N is that of the rounding, and slow terms may hide inside one step; use a narrower range or a finer output.",
+        "N is that of the rounding, and slow terms may be smaller than the resolution; use a narrower range or a finer "
+        "output.",
     ),
 }
 
@@ -59,13 +60,13 @@ _SPECTRUM = {
         numbers=("frequency_hz", "amplitude"),
         lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"},
     ),
-    (Code.SPECTRUM_COLOURED, "throughout", SERIOUS): Words(
+    (Code.SPECTRUM_LOW_PASS, "throughout", SERIOUS): Words(
         "No part of the upper spectrum is a sum of noise terms.",
         "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
     **{
-        (Code.SPECTRUM_COLOURED, way, WARNING): Words(
+        (Code.SPECTRUM_LOW_PASS, way, WARNING): Words(
             f"Above {{highest_hz:.3g}} Hz the spectrum leaves the noise terms and {way} to {{ratio:.3g %}} of them at "
             "{nyquist_hz:.3g} Hz.",
             cause,
@@ -77,7 +78,7 @@ _SPECTRUM = {
             ("rises", "aliasing, resampling, a resonance or vibration."),
         )
     },
-    (Code.SPECTRUM_COLOURED, "curve", WARNING): Words(
+    (Code.SPECTRUM_LOW_PASS, "curve", WARNING): Words(
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
         "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
@@ -98,7 +99,8 @@ _TERMS = {
     (Code.CURVE_ALONE, "", NOTE): Words(
         "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
         "",
-        "Steps, knocks, lines and gaps cannot be separated from noise in a curve; use the log if there is one.",
+        "Jumps, impacts, spectral lines and gaps cannot be separated from noise in a curve; use the log if there "
+        "is one.",
     ),
     (Code.RAMP_OR_WALK, "", WARNING): Words(
         "R and K are hard to separate in a curve: a random walk that happened to go one way has the curve of a ramp.",
@@ -108,7 +110,7 @@ _TERMS = {
     (Code.SLOW_NOISE_UNRESOLVED, "", NOTE): Words(
         "Slow noise is there; B and K are not separable here: B at least "
         "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
-        "{walk_upper:.2g} {unit:unit}/√s, not both zero.",
+        "{walk_upper:.2g} {unit:unit}/√s, not both 0.",
         "the log is short compared with the times over which flicker and walk differ.",
         "Variances of means use the most likely sum of both; record longer to separate them.",
         numbers=("evidence",),
@@ -119,7 +121,7 @@ _TERMS = {
         "R describes this log, not the sensor; let it warm up, or log the temperature.",
     ),
     (Code.LOG_DRIFT, "warm-up", WARNING): Words(
-        "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was taken out.",
+        "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was subtracted.",
         "warming up.",
         "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
     ),

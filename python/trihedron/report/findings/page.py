@@ -31,11 +31,11 @@ def page() -> str:
     parts = [_HEAD]
     for code, entries in groupby(ordered, key=lambda entry: entry.code.value):
         parts.append(f"\n## {code}\n")
-        parts += [_told(entry) for entry in entries]
+        parts += [_entry(entry) for entry in entries]
     return "".join(parts)
 
 
-def _told(entry: Entry) -> str:
+def _entry(entry: Entry) -> str:
     severity = entry.severity.value + (f" or {entry.or_severity.value}" if entry.or_severity else "")
     lines = [f"\n**{severity}**: {shown(entry.seen)}"]
     if entry.cause:

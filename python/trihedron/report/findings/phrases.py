@@ -39,17 +39,17 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "turn-about": "lay the body's {axis:axis} axis level and turn the sensor about it by 90 to 120°, "
         "{start:?starting with {upright:axis} up|{is_twice:?twice, starting with each of the two other axes "
         "up once|and back}}, with a pose before and after",
-        "moves-about-all": "add moves about all three body axes held level, each with a pose before and after",
+        "moves-about-all": "add moves about all three body axes in level position, each with a pose before and after",
         # known attitudes
         "sensitivity-to": "sensitivity to {axis:axis}",
         "bias": "bias",
         "tilt-towards-vertical": "tilt {axis:axis} towards the vertical",
         "bias-both-ways": "place the axis of this bias up and down",
         # why a fit ended
-        "small-step": "converged: the Gauss-Newton step no longer moves the parameters",
+        "small-step": "converged: the Gauss-Newton step no longer changes the parameters",
         "small-gradient": "converged: the residual is orthogonal to every parameter",
         "zero-residual": "converged: the residual vanishes to rounding",
-        "no-descent": "stopped: no step lowers the cost any further",
+        "no-descent": "stopped: no change reduces the cost any further",
         "too-many-iterations": "stopped: iteration limit reached before convergence",
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
@@ -60,12 +60,12 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "gyro-scales-relative": "Scales of the gyro are relative to the mean of its three axes: the {side} is in "
         "counts ({per_deg_s:.4g} per °/s), whose nominal size is not known.",
         # residuals of a domain
-        "length-at-rest": "gravity error in static poses, |f| − |g|",
-        "rate-at-rest": "rate in static poses, minus its mean",
+        "static-length": "gravity error in static poses, |f| − |g|",
+        "static-rate": "rate in static poses, minus its mean",
         "gravity-missed": "tilt error after a rotation",
         "velocity-over-move": "velocity error over a rotation",
         # empirical relations of what stays unexplained
-        "relation-follows": "The {sensor}'s {is_at_rest:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
+        "relation-follows": "The {sensor}'s {is_static:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
         "{share:.0f %} of the cross-validated misfit.",
         "relation-follows-room": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",

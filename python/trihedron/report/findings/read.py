@@ -18,21 +18,21 @@ _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings 
 
 _UNITS = {
     (Code.UNIT_ASSUMED, "counts-or-mg", WARNING): Words(
-        "The accelerometer reads whole numbers of length {rest_norm:.4g} at rest: counts of about 1/1000 g, or mg; "
-        "taken as counts.",
+        "The accelerometer reads whole numbers of length {rest_norm:.4g} while static: counts of about 1/1000 g, or "
+        "mg; taken as counts.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
-        "The accelerometer reads {rest_norm:.4g} at rest: mg (1000) or cm/s^2 (981); taken as {unit}.",
+        "The accelerometer reads {rest_norm:.4g} while static: mg (1000) or cm/s^2 (981); taken as {unit}.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_DETECTED, "accelerometer-counts", NOTE): Words(
         "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("rest_norm",)
     ),
-    (Code.UNIT_DETECTED, "accelerometer-at-rest", NOTE): Words(
-        "The accelerometer reads {rest_norm:.4g} at rest, so its unit is {unit}."
+    (Code.UNIT_DETECTED, "accelerometer-static", NOTE): Words(
+        "The accelerometer reads {rest_norm:.4g} while static, so its unit is {unit}."
     ),
     (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
         "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
@@ -47,12 +47,12 @@ _UNITS = {
         _SAY_ACCEL_UNIT,
     ),
     (Code.GRAVITY_MISSING, "", SERIOUS): Words(
-        "The accelerometer reads only {rest_norm:.3g} at rest: gravity is missing from it.",
-        "'Linear' or 'user' acceleration of a phone, from which gravity was taken out, or wrong columns.",
+        "The accelerometer reads only {rest_norm:.3g} while static: gravity is missing from it.",
+        "'Linear' or 'user' acceleration of a phone, from which gravity was subtracted, or wrong columns.",
         "Log the accelerometer itself; nothing here can be calibrated without gravity.",
     ),
     (Code.UNIT_CONTRADICTED, "accelerometer", SERIOUS): Words(
-        f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
+        f"The accelerometer is in {{unit}} {_SOURCE}, but while static it reads {{rest_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
         "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
@@ -60,7 +60,7 @@ _UNITS = {
     (Code.UNIT_DETECTED, "stated", NOTE): Words(f"The {{sensor}} is in {{unit}} {_SOURCE}."),
     (Code.UNIT_CONTRADICTED, "gyro-by-turning", SERIOUS): Words(
         f"The gyro is in {{unit}} {_SOURCE}, but {_TURNING}.",
-        "A wrong unit; or, if the unit is right, each step of time lasts {factor:.3g} times as long as it was read.",
+        "A wrong unit; or, if the unit is right, each time interval lasts {factor:.3g} times as long as it was read.",
         "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
     ),
     (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
@@ -71,8 +71,8 @@ _UNITS = {
     (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
     (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit}}: {_TURNING}."),
     (Code.UNIT_ASSUMED, "gyro", WARNING): Words(
-        "Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, so it was taken as "
-        "{unit}.",
+        "Nothing states the gyro's unit; it reads {rest:.3g} while static and {largest:.4g} at most, so it was taken "
+        "as {unit}.",
         "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
     ),
@@ -87,8 +87,8 @@ _NAME_THEM = "If that is right, confirm it with --columns {mapping}; else give t
 _COLUMNS = {
     (Code.CORRECTED_ON_BOARD, "", NOTE): Words(
         "{autopilot} had corrected these readings (accelerometer {accel:.0f}, gyro {gyro:.0f}) by its own offsets and "
-        "scales{is_turned:? and turned them into the board's axes|} before it logged them: a calibration finds what "
-        "remains.",
+        "scales{is_turned:? and turned them into the board's axes|} before it logged them: a calibration finds the "
+        "remaining errors.",
         "{has_changed:?Parameters changed while readings were logged: {changed:&, }.|A flight controller logs what it "
         "flies by.}",
         "`trihedron export` composes the parameters that the log states with what the calibration finds; load its file "
@@ -111,7 +111,7 @@ _COLUMNS = {
     ),
     (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
-        "The log holds raw and corrected readings, or several devices.",
+        "The log contains raw and corrected readings, or several devices.",
         "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
     ),
     (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
@@ -125,7 +125,7 @@ _COLUMNS = {
         "Name the columns with --columns.",
     ),
     (Code.COLUMNS_ASSUMED, "commands", NOTE): Words(
-        "Its {n_rows} rows are seconds apart, so each rate was taken to hold until the next row.",
+        "Its {n_rows} rows are seconds apart, so each rate was taken as constant until the next row.",
         "Commands of a rate table.",
     ),
     **{
@@ -153,8 +153,15 @@ _COLUMNS = {
         )
         for why, words in _WHY_UNKNOWN.items()
     },
-    (Code.COLUMN_LEFT_OUT, "words", NOTE): Words("Column {column} holds words (such as {example!r}) and was excluded."),
-    (Code.COLUMN_LEFT_OUT, "type", NOTE): Words("Column '{column}' holds {kind}, not numbers, and was excluded."),
+    (Code.COLUMN_LEFT_OUT, "words", NOTE): Words(
+        "Column {column} contains words (such as {example!r}) and was excluded."
+    ),
+    (Code.COLUMN_LEFT_OUT, "axis", WARNING): Words(
+        "Column {column} contains no numbers (such as {example!r}), so the {sensor} was not read.",
+        "A damaged column, or a name that it does not belong to.",
+        "Correct the column, or name the sensor's columns with --columns.",
+    ),
+    (Code.COLUMN_LEFT_OUT, "type", NOTE): Words("Column '{column}' contains {kind}, not numbers, and was excluded."),
 }
 
 _ROWS = {
@@ -175,7 +182,7 @@ _ROWS = {
         or_severity=WARNING,
     ),
     (Code.ROWS_UNACCOUNTED, "", SERIOUS): Words(
-        "The file holds {in_file} rows, {read} were read and {reported} reported as excluded: {count} are not "
+        "The file contains {in_file} rows, {read} were read and {reported} reported as excluded: {count} are not "
         "accounted for.",
         "A fault of the reader.",
         "Report it with the file; until then convert the log to CSV with another program.",
@@ -219,7 +226,7 @@ _DEVICES = {
         lines={"kinds": "{v0} ({v1})"},
     ),
     (Code.DEVICE_CHOSEN, "in-turn", NOTE): Words(
-        "{accelerometer_rows} rows hold the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
+        "{accelerometer_rows} rows have the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
         "they were read as two logs and joined on their timestamps.",
         numbers=("rows_left_out",),
     ),

@@ -19,7 +19,7 @@ ENTRIES = {
         "Split the log there, and calibrate the parts one by one.",
     ),
     (Code.AXES_CHANGED, "leap", SERIOUS): Words(
-        "Gravity leaps from one sample to the next while the gyro is at rest (first: {where}; {count} in all).",
+        "Gravity leaps from one sample to the next while the gyro reads no rotation (first: {where}; {count} in all).",
         "The axes of both sensors were turned there, or rows were cut out without a gap in time.",
         "Split the log there, and calibrate the parts one by one.",
         numbers=("sample",),
@@ -51,7 +51,7 @@ ENTRIES = {
         "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
         "Few bits, or values rounded when they were written.",
         "Averaging longer does not help where the noise does not move the last digit; choose a smaller range.",
-        lines={"axes": "{v0:axis}: step {v1:.4g}, noise {v2:.2g}"},
+        lines={"axes": "{v0:axis}: LSB {v1:.4g}, noise {v2:.2g}"},
     ),
     (Code.CLIPPING, "", WARNING): Words(
         "The {sensor} is clipped: {limits:each}; first at {where}.",
@@ -60,8 +60,8 @@ ENTRIES = {
         numbers=("count", "sample"),
         lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"},
     ),
-    (Code.RAW_STEP, "", NOTE): Words(
-        "The {sensor} is in {unit} but steps like counts ({steps:each} {unit}; {per_unit:.5g} per "
+    (Code.RAW_LSB, "", NOTE): Words(
+        "The {sensor} is in {unit} with the resolution of counts (LSB {steps:each} {unit}; {per_unit:.5g} per "
         "{is_accelerometer:?g|°/s}).",
         "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
         lines={"steps": "{v0:axis} {v1:.5g}"},

@@ -31,7 +31,7 @@ ENTRIES = {
     ),
     (Code.REFERENCE_OUTLIERS, "", WARNING): Words(
         "{left_out} of {rows} rows of the reference were excluded as outliers.",
-        "Jumps of a tracker that lost its markers, or knocks.",
+        "Jumps of a tracker that lost its markers, or impacts.",
         "Look at the reference's own quality flags.",
     ),
     (Code.REFERENCE_UPSIDE_DOWN, "down", WARNING): Words(
@@ -60,7 +60,7 @@ ENTRIES = {
         numbers=("scale",),
     ),
     (Code.SHARED_MOTION, "", NOTE): Words(
-        "Both logs hold the same motion (correlation {correlation:.3f}, the other clock {offset_s:+.5g} s): compared "
+        "Both logs show the same motion (correlation {correlation:.3f}, the other clock {offset_s:+.5g} s): compared "
         "sample by sample they differ by {rate_rms:.3g °/s}{has_force:? and {force_rms:.3g mm/s²}|} rms.",
         "A motion that was replayed, or two units on one body.",
         numbers=("offset_std_s",),

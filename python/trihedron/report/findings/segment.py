@@ -9,7 +9,7 @@ ENTRIES = {
         "The mean drifts in {poses:# pose} (pose {which:first 8}): the second half differs from the first by up to "
         "{worst_sigmas:.1f} σ (at {worst_s:.1f} s).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
-        "Wait until the case has settled, hold for less time, or put it on a firmer support.",
+        "Wait until the case has settled, record shorter poses, or put it on a firmer support.",
         numbers=("worst_pose",),
         or_severity=SERIOUS,
     ),
@@ -37,13 +37,13 @@ ENTRIES = {
         numbers=("poses",),
     ),
     (Code.SLOW_TURN, "", NOTE): Words(
-        "{turning_s:.1f} s are still to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} s; "
-        "taken as moving.",
+        "{turning_s:.1f} s are static to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} "
+        "s; taken as moving.",
         "A slow steady turn about the vertical.",
         "Nothing needs to be done.",
     ),
     (Code.NO_INITIAL_POSE, "", NOTE): Words(
-        "The log does not begin at rest: the first pose starts at {first_pose_s:.1f} s.",
+        "The log begins in motion: the first pose starts at {first_pose_s:.1f} s.",
         "Logging was started with the case in hand.",
         "Nothing needs to be done: the noise was measured in the poses themselves.",
     ),

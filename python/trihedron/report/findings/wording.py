@@ -8,7 +8,7 @@ A placeholder is a name and, after the colon, the format of its value:
 ``# pose``               ``1 pose``, ``3 poses``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; placeholders are allowed
 ``<below|above``         the first words where the value is negative, else the second; placeholders are allowed
-``&, the ``              several words, joined by the text after the ``&``; ``and``: ``x, y and z``
+``&, the ``              several words, joined by the text after the ``&``; ``and``: ``X, Y and Z``
 ``together``             ``x, y + z``
 ``sentences``            ``X. Y.``
 ``clause``               a sentence without its full stop

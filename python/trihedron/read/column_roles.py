@@ -1,0 +1,48 @@
+"""The roles of a table's columns, as a finding and as the value of ``--columns``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from trihedron.read.columns import SENSORS, Columns, Triad
+from trihedron.read.names import parse_name
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode
+
+
+def columns_of_words(table: Table, columns: Columns) -> Iterator[Finding]:
+    """A finding for each column without numbers; a warning where a sensor was not read because of it."""
+    for column, example in table.words.items():
+        label, cell = table.label(column), example[:40]
+        sensor = parse_name(table.names[column]).role if table.names else ""
+        if sensor in SENSORS and getattr(columns, sensor) is None:
+            yield Finding.of(FindingCode.COLUMN_LEFT_OUT, "axis", column=label, example=cell, sensor=sensor)
+        else:
+            yield Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=label, example=cell)
+
+
+def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
+    """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
+    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
+    time = [] if columns.time is None else [f"time={columns.time + 1}"]
+    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
+    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+
+
+def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
+    """The finding that states the role of each column, and the columns without a role."""
+    roles = []
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+        value = getattr(columns, role)
+        if value is not None:
+            which = value if isinstance(value, tuple) else (value,)
+            roles.append((role, " ".join(table.label(c) for c in which)))
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    return Finding.of(
+        FindingCode.COLUMNS_RECOGNISED,
+        has_file=bool(file_name),
+        file=file_name,
+        roles=roles,
+        has_rest=bool(rest),
+        rest=rest[:24],
+    )
