@@ -19,7 +19,6 @@ def test_a_healthy_recording_is_consistent():
 
 CASES = {
     "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
-    "gyro-g-sensitivity": {"matrix": ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))},
     "timing-jitter": {"jitter_s": 1e-3},
 }
 

@@ -43,7 +43,7 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert Path("extended.json").is_file()
 
 
-SHORTER = "n_poses = 10\\npose_s = 4\\n"
+SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
 @pytest.fixture(scope="module")
