@@ -10,7 +10,8 @@ from trihedron.cli import main
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
 def test_a_converted_log_is_read_again_as_the_same(tmp_path, suffix, capsys):
-    log = write(tmp_path / "log.txt", readings(), HEADER.replace("gx,gy,gz", "gx [rad/s],gy [rad/s],gz [rad/s]"))
+    table = np.column_stack([readings(), np.round(20.0 + 0.01 * np.arange(200), 2)])
+    log = write(tmp_path / "log.txt", table, HEADER.replace("gx,gy,gz", "gx [rad/s],gy [rad/s],gz [rad/s],temp_C"))
     out = tmp_path / f"out{suffix}"
     assert main(["convert", str(log), "-o", str(out)]) == 0
     said = capsys.readouterr()
@@ -22,6 +23,7 @@ def test_a_converted_log_is_read_again_as_the_same(tmp_path, suffix, capsys):
     # Written to the nanosecond.
     np.testing.assert_allclose(first.time_s, second.time_s, rtol=0, atol=1e-9)
     assert first.gyroscope_unit is second.gyroscope_unit
+    np.testing.assert_allclose(second.temperature_degc, first.temperature_degc, rtol=0, atol=1e-9)
     assert main(["convert", str(log), "-o", str(out)]) == 1
     assert main(["convert", str(log), "-o", str(tmp_path / "out.xlsx")]) == 1
     assert "give it one of these endings" in capsys.readouterr().err

@@ -19,7 +19,6 @@ def test_a_healthy_recording_is_consistent():
 
 CASES = {
     "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
-    "gyro-g-sensitivity": {"matrix": ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))},
     "timing-jitter": {"jitter_s": 1e-3},
 }
 
@@ -29,16 +28,6 @@ def test_the_mechanism_is_named_first(effect_id):
     diagnosis = diagnosed(effect_id, **CASES[effect_id])
     assert diagnosis.verdict == "missing-physics"
     assert diagnosis.effects[0].id == effect_id
-
-
-def test_parameters_come_with_honest_errors_and_the_fit_improves_held_out():
-    truth = np.array([3e-4, -2e-4, 2e-4])
-    effect = diagnosed("accel-quadratic", k2=tuple(truth)).effects[0]
-    z = [(p.value - t) / p.std for p, t in zip(effect.parameters, truth, strict=True)]
-    # Three standard normal numbers: 4 sigma is passed by chance once in 5000 runs.
-    assert np.max(np.abs(z)) < 4.0
-    held = effect.held_out[0]
-    assert held.chi2_per_dof_after < 1.3 < held.chi2_per_dof_before
 
 
 def test_missing_codes_are_counted_and_lost_ones_by_chance_are_not():

@@ -149,23 +149,6 @@ def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp
 
 
 @pytest.mark.slow
-def test_a_density_scaled_by_the_rate_twice_is_named_with_its_ratio(unit):
-    profile, accel, gyro = unit
-    loud = replace(gyro.noise, N=tuple(10.0 * v for v in np.ones(3) * np.array(gyro.noise.N)))  # 100 Hz: ten times
-    simulated = log(profile, accel, replace(gyro, noise=loud), 8, 11)
-    found = trihedron.diagnose(log(profile, accel, gyro, 9, 12), against=simulated, gravity_m_s2=9.80665)
-    assert found.verdict == "parameters-differ"
-    assert not found.effects
-    white = [n for n in found.noise_compared if n.term == "N" and n.sensor == "gyroscope"]
-    assert all(n.significant for n in white)
-    # Ratios of two estimates of 1.5 % each.
-    assert all(abs(n.ratio - 10.0) < 0.6 for n in white)
-    assert "√100 times the recording's: the density was multiplied by the root of the rate" in " ".join(
-        str(found).split()
-    )
-
-
-@pytest.mark.slow
 def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):
     profile, accel, gyro = unit
     logs = []

@@ -21,7 +21,8 @@ G = 9.80665
 )  # fmt: skip
 def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver, is_relative):
     found = diagnosed(effect_id, n_poses=18, **size)
-    curves = next(effect for effect in found.effects if effect.id == effect_id).curves
+    effect = next(effect for effect in found.effects if effect.id == effect_id)
+    curves = effect.curves
     assert [(c.sensor, c.axis, c.driver, c.is_relative) for c in curves] == [
         ("accelerometer", j, driver, is_relative) for j in range(3)
     ]
@@ -37,3 +38,8 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
             assert np.all(np.abs(curve.value - k2 * curve.x**2) < 3.5 * curve.sigma + 0.01 * abs(k2) * G**2)
             # A pose shows 2 to 5 mm/s^2 beside the curve; it bends by 40 and more.
             assert np.std(left) < 0.2 * abs(k2) * G**2
+    if effect_id == "accel-quadratic":
+        z = [(p.value - k2) / p.std for p, k2 in zip(effect.parameters, size["k2"], strict=True)]
+        # Three standard normal numbers: 4 sigma is passed by chance once in 5000 runs.
+        assert np.max(np.abs(z)) < 4.0
+        assert effect.held_out[0].chi2_per_dof_after < 1.3 < effect.held_out[0].chi2_per_dof_before

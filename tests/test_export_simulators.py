@@ -16,13 +16,6 @@ from scipy.signal import lfilter
 import trihedron
 from test_export import calibration
 from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, export_files
-from trihedron.records import Calibration, SensorCalibration
-from trihedron.simulate import Scenario, hand_session, simulate
-from trihedron.simulate.accelerometer import Accelerometer
-from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.noise import NoiseTerms
-from trihedron.simulate.scenario import Clock
-from trihedron.units import RateUnit
 
 RATE, SECONDS, G = 100.0, 1000, 9.81
 WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
@@ -162,61 +155,3 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
         # One second of white noise, and a second of walk.
         tolerance = 6 * np.hypot(WHITE[name], WALK[name])
         np.testing.assert_allclose(reading, wanted, atol=tolerance)
-
-
-SLOW = {"accelerometer": 4e-5, "gyroscope": 2e-6}
-"""Walks [SI/√s] that stay below the noise of a pose over a session."""
-ALIGNED, BIASED = np.eye(3), {"accelerometer": np.array([0.3, -0.2, 0.1]), "gyroscope": np.array([0.01, -0.02, 0.03])}
-SCALED = {"accelerometer": np.diag([1.01, 0.99, 1.02]), "gyroscope": np.diag([1.02, 0.98, 1.01])}
-FULL = {s: SCALED[s] + 0.01 * np.array([[0, 0, 0], [0.4, 0, 0], [-0.6, 0.3, 0]]) for s in SCALED}
-PLAIN, UNBIASED = dict.fromkeys(SCALED, ALIGNED), dict.fromkeys(SCALED, np.zeros(3))
-SHAPE = {f"{s}-{what}" for s in ("accel", "gyro") for what in ("scale", "misalignment")} | {"triad-alignment"}
-
-
-def of_unit(S, b, layout, seed):
-    """A session of 18 poses of a unit whose noise is white with a walk."""
-    sensors = {}
-    for name, kind in (("accelerometer", Accelerometer), ("gyroscope", Gyroscope)):
-        noise = NoiseTerms(N=(WHITE[name],) * 3, K=(SLOW[name],) * 3)
-        matrix = tuple(tuple(float(v) for v in row) for row in S[name])
-        unit = {} if name == "accelerometer" else {"unit": RateUnit.RAD_S}
-        sensors[name] = kind(S=matrix, b=tuple(float(v) for v in b[name]), noise=noise, **unit)
-    motion = hand_session(18, pose_s=4.0, layout=layout)
-    return simulate(Scenario(motion, "unit", *sensors.values(), Clock(rate_hz=RATE)), seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("target", "S", "b", "lost"),
-    [
-        ("imusensor", FULL, BIASED, set()),
-        ("gazebo", PLAIN, BIASED, set()),
-        ("gazebo", FULL, UNBIASED, SHAPE),
-        ("gnss-ins-sim", PLAIN, BIASED, set()),
-        ("gnss-ins-sim", FULL, UNBIASED, SHAPE),
-        ("isaac", SCALED, BIASED, set()),
-        ("isaac", FULL, UNBIASED, {"accel-misalignment", "gyro-misalignment", "triad-alignment"}),
-        ("airsim", PLAIN, UNBIASED, set()),
-        ("airsim", PLAIN, BIASED, {"accel-bias", "gyro-bias"}),
-    ],
-)
-def test_a_simulators_log_is_consistent_with_the_units_or_differs_in_what_its_file_calls_lost(target, S, b, lost):
-    recording, _ = of_unit(S, b, 1, 1)
-    _, truth = of_unit(S, b, 2, 2)
-    units = {"accelerometer": "m/s^2", "gyroscope": "rad/s"}
-    sensors = [SensorCalibration(S[s], b[s], np.zeros((12, 12)), unit, unit, "given") for s, unit in units.items()]
-    noise = (SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(SLOW[s])) for s in units)
-    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.80665, "given", "log", "")
-    text = export_files(known, target, ExportOptions(*noise, rate_hz=RATE))[""]
-    motion = {"accelerometer": truth.specific_force_m_s2, "gyroscope": truth.angular_rate_rad_s}
-    made = LAWS[target](text, np.random.default_rng(3), motion)
-    log = {"t": np.arange(len(made["gyroscope"])) / RATE, "acc": made["accelerometer"], "gyr": made["gyroscope"]}
-    simulated = trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
-    found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=9.80665)
-    differs = {p.id for p in found.parameters if p.significant}
-    assert found.verdict == ("parameters-differ" if lost else "consistent")
-    assert not found.effects
-    assert differs <= lost
-    assert bool(differs) == bool(lost)
-    for word in {one.split("-")[1] for one in differs} - {"alignment"}:
-        assert re.search(f"{word}.* (cannot be held|is lost)", text, re.IGNORECASE), word

@@ -279,8 +279,3 @@ def test_no_public_name_is_a_retired_word():
         elif callable(public):
             names |= set(inspect.signature(public).parameters)
     assert {name for name in names if RETIRED_IN_NAMES.search(name)} == set()
-
-
-RETIRED_IN_NAMES = re.compile(
-    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|told|scatter|converters?|hidden|wander)(?![a-z])"
-)

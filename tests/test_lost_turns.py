@@ -5,11 +5,11 @@ import pytest
 
 from confidence.machine import robot
 from confidence.motion import G
-from confidence.sensor import lower
+from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.estimate.gyroscope.lost_turns import could_be_remade
-from trihedron.records import FindingCode, Recording
+from trihedron.records import FindingCode
 
 STEP_S = 0.01
 ROWS = np.arange(60_000)
@@ -40,9 +40,8 @@ def lossy(seed, time_of=None):
     """A session of slow moves, 18 poses, of which a link lost 0.1 %: about one sample in each."""
     f, w, rate, truth, _ = hand(seed, move_s=10.0)
     kept = np.random.default_rng([14, seed]).random(len(f)) >= 1e-3
-    t = np.arange(np.count_nonzero(kept)) / rate if time_of is None else time_of(np.flatnonzero(kept) / rate)
-    recording = Recording(t, f[kept], w[kept], rate, accelerometer_unit="counts", gyroscope_unit="counts")
-    return calibrate(recording, gravity_m_s2=G), lower(truth)
+    t = time_of(np.flatnonzero(kept) / rate) if time_of else None
+    return calibrate(recorded(f[kept], w[kept], rate, t), gravity_m_s2=G), lower(truth)
 
 
 @pytest.mark.parametrize("seed", [30000, 20018])
@@ -90,10 +89,7 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
         per_rad_s = 1.0 / np.abs(np.diag(truth.S_w)).mean()
         blow = knocked(w, motion.rests, rate, per_rad_s, np.random.default_rng([77, seed]))
         for part, is_lossy in (((f[kept], w[kept]), True), ((f, blow), False)):
-            recording = Recording(
-                np.arange(len(part[0])) / rate, *part, rate, accelerometer_unit="counts", gyroscope_unit="counts"
-            )
-            found = calibrate(recording, gravity_m_s2=G)
+            found = calibrate(recorded(*part, rate), gravity_m_s2=G)
             is_said = FindingCode.LOSSES_POSSIBLE in {one.code for one in found.findings}
             lossy += is_lossy and is_said
             false += not is_lossy and is_said

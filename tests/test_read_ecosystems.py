@@ -336,9 +336,9 @@ def test_damage_in_a_matlab_file_ends_no_process_of_ours(tmp_path):
         read_recording(tmp_path / "log.mat", topic="/")
     savemat(tmp_path / "log.mat", content)
     whole = (tmp_path / "log.mat").read_bytes()
-    for _ in range(12):
+    for _ in range(7):
         damaged = bytearray(whole)
-        # Sizes and types are in the first bytes of an array: SciPy alone ends the process over some such files.
+        # Sizes and types are in the first bytes of an array: SciPy alone ends the process over the third and the last.
         for at in rng.integers(128, 256, 3):
             damaged[at] = rng.integers(256)
         path = tmp_path / "damaged.mat"

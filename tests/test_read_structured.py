@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from makers.structured import documents, drive
 from test_read_in_silence import motion, table
 from trihedron.read import ReadError, read_recording
 from trihedron.units import AccelerationUnit, RateUnit
@@ -29,31 +30,8 @@ def test_labels_of_a_letter_name_the_sensor_where_all_labels_do(tmp_path, labels
 
 def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
     t, force, rate = motion(n_poses=3)
-    rows = [
-        {"t": round(float(x), 3), "acc": {"x": a[0], "y": a[1], "z": a[2]}, "gyro": [*w]}
-        for x, a, w in zip(t, force.tolist(), rate.tolist(), strict=True)
-    ]
-    columns = {"t": t.tolist(), "acc": {k: force[:, i].tolist() for i, k in enumerate("xyz")}}
-    columns |= {"gyro": {k: rate[:, i].tolist() for i, k in enumerate("xyz")}}
-    edge = {
-        "payload": {
-            "interval_ms": 10,
-            "sensors": [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"],
-            "values": np.hstack([force, rate]).tolist(),
-        }
-    }
-    packets = [
-        {"imu": {"Timestamp": int(1000 * t[k]) + 5, "ArrayAcc": [rows[k + j]["acc"] for j in range(4)],
-                 "ArrayGyro": [dict(zip("xyz", rate[k + j].tolist(), strict=True)) for j in range(4)]}}
-        for k in range(0, len(t) // 4 * 4, 4)
-    ]  # fmt: skip
-    texts = {
-        "lines": "\n".join(map(json.dumps, rows)),
-        "list": json.dumps(rows),
-        "columns": json.dumps(columns),
-        "edge": json.dumps(edge),
-        "movesense": json.dumps({"data": packets}),
-    }
+    made = documents(np.round(t, 3), force, rate)
+    texts = {"lines": "\n".join(map(json.dumps, made["rows"])), **{k: json.dumps(v) for k, v in made.items()}}
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
         recording = read_recording(tmp_path / name)
@@ -69,12 +47,12 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
 
 def test_whole_numbers_of_json_beyond_a_double_are_no_clock(tmp_path):
     _, force, rate = motion(n_poses=3)
-    rows = np.hstack([force, rate]).tolist()
-    sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
-    payload = {"interval_ms": int("9" * 400), "sensors": sensors, "values": [*rows[:9], None, *rows[9:]]}
-    (tmp_path / "edge").write_text(json.dumps({"payload": payload}))
+    edge = documents(np.arange(len(force)) / 100.0, force, rate)["edge"]
+    edge["payload"] |= {"interval_ms": int("9" * 400)}
+    edge["payload"]["values"].insert(9, None)
+    (tmp_path / "edge").write_text(json.dumps(edge))
     recording = read_recording(tmp_path / "edge", rate_hz=100.0)
-    assert recording.rows_in_file == len(rows) + 1
+    assert recording.rows_in_file == len(force) + 1
 
 
 def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
@@ -82,15 +60,14 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     lines, messages = [], []
     oxts = tmp_path / "drive" / "oxts"
     (oxts / "data").mkdir(parents=True)
+    for place, text in drive(t, force, rate).items():
+        (oxts / place).write_text(text)
     for k, (x, a, w) in enumerate(zip(t, force, rate, strict=True)):
         acc, gyr = (", ".join(f"{v:.4f}" for v in s) for s in (a, w))
         lines.append(f"{x:.3f}, 3, {acc}, 4, {gyr}" + (", 5, 1.0, 2.0, 3.0" if k % 2 else ""))
         c = np.rint(np.r_[a / 1e-3, w / 1e-4]).astype(int)
         counts = f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}"
         messages.append(f"%RAWIMUSA,2105,{x:.3f};2105,{366000 + x:.9f},00000077,{counts}*b5c3d6f8")
-        (oxts / "data" / f"{k:010d}.txt").write_text(" ".join(map(str, [*range(11), *a, *a, *w, *w, *range(7)])))
-    timestamps = [f"2011-09-26 13:02:{int(x):02d}.{round(1e9 * (x % 1)):09d}" for x in t]
-    (oxts / "timestamps.txt").write_text("\n".join(timestamps) + "\n")
     (tmp_path / "stream.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "rawimu.txt").write_text("\n".join([*messages[:50], "#BESTPOSA,COM1;x,y", *messages[50:]]) + "\n")
     stream = read_recording(tmp_path / "stream.csv")
@@ -98,11 +75,11 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     raw = read_recording(tmp_path / "rawimu.txt")
     np.testing.assert_allclose(raw.accelerometer * 1e-3, force, atol=1e-3)
     assert raw.rows_in_file == len(t) + 1
-    drive = read_recording(tmp_path / "drive")
-    np.testing.assert_allclose(drive.accelerometer, force)
-    assert drive.rate_hz == pytest.approx(100.0)
-    np.testing.assert_allclose(drive.time_s - drive.time_s[0], t - t[0], atol=1e-6)
-    assert read_recording(oxts / "data").rows_read == drive.rows_read
+    folder = read_recording(tmp_path / "drive")
+    np.testing.assert_allclose(folder.accelerometer, force)
+    assert folder.rate_hz == pytest.approx(100.0)
+    np.testing.assert_allclose(folder.time_s - folder.time_s[0], t - t[0], atol=1e-6)
+    assert read_recording(oxts / "data").rows_read == folder.rows_read
 
 
 def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):

@@ -28,7 +28,7 @@ def test_a_sound_truth_is_not_refused_for_the_filters_rounding():
 
 def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
     # It leans into its acceleration: its accelerometer's parameters are not stated, and what its gyro feels still is.
-    trial = truth(4, "drone", seconds=60, has_g_sensitivity=True, size_deg=0.1)
+    trial = truth(4, "drone", seconds=40, has_g_sensitivity=True, size_deg=0.1)
     found = fit_reference(trial.log, trial.motion, G)
     one = found.effects["gyro-g-sensitivity"]
     assert one.score > NAMED_FROM
@@ -39,7 +39,7 @@ def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has(
 def test_what_a_reference_is_too_poor_to_show_is_said_with_the_size_from_which_it_would():
     fine, poor = (
         fit_reference(trial.log, trial.motion, G).effects["gyro-g-sensitivity"]
-        for trial in (truth(2, "robot", seconds=30, size_deg=size, lasting_s=6.0) for size in (0.03, 2.0))
+        for trial in (truth(2, "robot", seconds=20, size_deg=size, lasting_s=6.0) for size in (0.03, 2.0))
     )
     # Λ of the numbers falls with the square of the truth's error, which is seventy times as large.
     assert 3.0 * fine.shown_from < poor.shown_from

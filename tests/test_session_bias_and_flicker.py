@@ -3,6 +3,7 @@
 import numpy as np
 
 from confidence.motion import G
+from confidence.sensor import recorded
 from confidence.sessions import hand
 from trihedron import _core, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
@@ -91,5 +92,4 @@ def test_white_noise_and_a_hand_that_shakes_single_poses_let_expect_nothing():
 
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
     f, w, rate, _, _ = hand(9002, move_s=1.5, gyro_flicker=np.radians(20.0 / 3600.0), accel_flicker=0.3e-3 * G)
-    recording = Recording(np.arange(len(f)) / rate, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
-    assert diagnose(recording, gravity_m_s2=G).verdict == "consistent"
+    assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"

@@ -7,16 +7,11 @@ import pytest
 
 import trihedron.estimate.session.solved as solved_session
 from confidence.motion import G
-from confidence.sensor import lower
+from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT, far_moves
-from trihedron.records import Recording
 from trihedron.session.aliasing import unresolved_variance
-
-
-def recording_of(f, w, t, rate):
-    return Recording(t, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
 
 
 @pytest.fixture
@@ -36,7 +31,7 @@ def solved(monkeypatch):
 def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, solved):
     # Ten readings a second of a hand that trembles: moves and velocities miss by tens of standard errors.
     f, w, rate, truth, _ = hand(seed, rate_hz=10.0)
-    result = calibrate(recording_of(f, w, np.arange(len(f)) / rate, rate), gravity_m_s2=G)
+    result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
     solution = solved[-1]
     assert solution.inflation[0] > 10.0
     assert solution.inflation[1] == pytest.approx(NO_WEIGHT)
@@ -57,8 +52,8 @@ def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
         f, w, rate, truth, _ = hand(seed + 840100)
         t = np.arange(len(f)) / rate
         kept = np.random.default_rng([14, seed]).random(len(t)) >= 0.03
-        whole = calibrate(recording_of(f, w, t, rate), gravity_m_s2=G)
-        part = calibrate(recording_of(f[kept], w[kept], t[kept], rate), gravity_m_s2=G)
+        whole = calibrate(recorded(f, w, rate), gravity_m_s2=G)
+        part = calibrate(recorded(f[kept], w[kept], rate, t[kept]), gravity_m_s2=G)
         wider.append(np.median(part.gyroscope.sigma_S / whole.gyroscope.sigma_S))
         scores.append((part.gyroscope.S - lower(truth).S_w) / part.gyroscope.sigma_S)
     # A cubic through four samples crosses one of a smooth move nearly without error: a rate that might be anywhere
@@ -108,7 +103,7 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     scores = []
     for seed in range(6):
         f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)
-        result = calibrate(recording_of(f, w, np.arange(len(f)) / rate, rate), gravity_m_s2=G)
+        result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
         low = np.tril_indices(3)
         of_S = (result.accelerometer.S - lower(truth).S_f)[low] / result.accelerometer.sigma_S[low]
         scores.append([*of_S, *((result.accelerometer.b - lower(truth).b_f) / result.accelerometer.sigma_b)])

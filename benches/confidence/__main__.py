@@ -17,10 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from confidence import design
 from confidence.motion import G
-from confidence.sensor import lower
+from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
-from trihedron.records import Recording
 
 STRONG = {"gyro_flicker": np.radians(20.0 / 3600.0), "accel_flicker": 0.3e-3 * G}
 NORMAL_95 = 1.96
@@ -65,8 +64,7 @@ def answer(make, options, seed):
         f, w, t = f[kept], w[kept], t[kept]
         if is_remade:
             t = np.arange(len(f)) / rate
-    recording = Recording(t, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
-    return calibrate(recording, gravity_m_s2=G), lower(truth)
+    return calibrate(recorded(f, w, rate, t), gravity_m_s2=G), lower(truth)
 
 
 def session(make, options, seed):

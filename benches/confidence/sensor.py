@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from confidence.motion import G, matrix
+from trihedron.records import Recording
 
 DEG = np.pi / 180.0
 
@@ -83,3 +84,9 @@ def lower(truth):
     signs = np.diag(np.sign(np.diag(L)))
     U = signs @ U
     return Truth(U @ truth.S_f, U @ truth.b_f, U @ truth.S_w, U @ truth.b_w)
+
+
+def recorded(f, w, rate_hz, time_s=None):
+    """Counts (n, 3) as a log; an even clock where no timestamps are given."""
+    t = np.arange(len(f)) / rate_hz if time_s is None else time_s
+    return Recording(t, f, w, rate_hz, accelerometer_unit="counts", gyroscope_unit="counts")

@@ -18,7 +18,7 @@ import test_read_ecosystems as ecosystems
 from attacks.cases import Attack
 from attacks.inputs import answered, read_whole
 from attacks.mutations import of_bytes, of_json
-from makers import LAYOUTS
+from makers import LAYOUTS, structured
 from test_read import readings
 
 TABLE = readings(120)
@@ -87,13 +87,15 @@ def _made_elsewhere() -> tuple[dict[str, Log], dict[str, Log]]:
 
 def _logs() -> Iterator[tuple[str, Log]]:
     """A good log of every format that a library reads, of JSON, and of folders."""
-    for name, document in _documents().items():
-        yield name, Log({"": json.dumps(document).encode()})
-    yield "lines.jsonl", Log({"": b"\n".join(json.dumps(row).encode() for row in _documents()["rows.json"])})
+    read = structured.documents(TABLE[:, 0], TABLE[:, 1:4], TABLE[:, 4:])
+    for name, document in read.items():
+        yield f"{name}.json", Log({"": json.dumps(document).encode()})
+    yield "lines.jsonl", Log({"": b"\n".join(json.dumps(row).encode() for row in read["rows"])})
     yield "log.ulg", Log({"": ecosystems.ulog(ecosystems.raw_topics(0, TABLE))})
     yield "fifo.ulg", Log({"": ecosystems.ulog_of_batches(ecosystems.batches(0, TABLE))})
     yield "flash.bin", Log({"": ecosystems.dataflash(1, TABLE)})
-    yield "drive", Log(_kitti())
+    oxts = structured.drive(TABLE[:40, 0], TABLE[:40, 1:4], TABLE[:40, 4:])
+    yield "drive", Log({f"oxts/{place}": text.encode() for place, text in oxts.items()})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for kind in ("ros1", "sqlite", "mcap"):
@@ -113,34 +115,6 @@ def _of_makers() -> Iterator[tuple[str, Log]]:
         made = make()
         files = {k: v if v[:2] == b"PK" else b"\n".join(v.split(b"\n")[:500]) for k, v in made.files.items()}
         yield name, Log(files, made.options, made.per_sensor)
-
-
-def _documents() -> dict[str, Any]:
-    """JSON as boards and programs write it: rows, columns, packets (Movesense), a payload (Edge Impulse)."""
-    acc, gyr = TABLE[:, 1:4].tolist(), TABLE[:, 4:].tolist()
-    triads = [[dict(zip("xyz", row, strict=True)) for row in sensor] for sensor in (acc, gyr)]
-    columns = {"acc": TABLE[:, 1:4].T.tolist(), "gyro": TABLE[:, 4:].T.tolist()}
-    sensors = [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"]
-    return {
-        "rows.json": [{"t": t, "acc": a, "gyro": w} for t, a, w in zip(TABLE[:, 0].tolist(), *triads, strict=True)],
-        "columns.json": {"t": TABLE[:, 0].tolist()} | {k: dict(zip("xyz", v, strict=True)) for k, v in columns.items()},
-        "edge.json": {"payload": {"interval_ms": 10, "sensors": sensors, "values": TABLE[:, 1:].tolist()}},
-        "movesense.json": {
-            "data": [
-                {"imu": {"Timestamp": 10 * k, "ArrayAcc": triads[0][k : k + 4], "ArrayGyro": triads[1][k : k + 4]}}
-                for k in range(0, len(TABLE), 4)
-            ]
-        },
-    }
-
-
-def _kitti() -> dict[str, bytes]:
-    stamps = "".join(f"2011-09-26 13:02:{t:012.9f}\n" for t in TABLE[:40, 0])
-    files = {"oxts/timestamps.txt": stamps.encode()}
-    for k, row in enumerate(TABLE[:40]):
-        numbers = [*range(11), *row[1:4], *row[1:4], *row[4:], *row[4:], *range(7)]
-        files[f"oxts/data/{k:010d}.txt"] = " ".join(map(str, numbers)).encode()
-    return files
 
 
 def _matlab(folder: Path) -> None:
