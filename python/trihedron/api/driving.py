@@ -19,7 +19,7 @@ from trihedron.estimate.verification import verify_calibration
 from trihedron.files.log import write_recording
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.segment import resegment
-from trihedron.simulate import Scenario, simulate, twin_scenario
+from trihedron.simulate import Scenario, simulate, twin_motion
 from trihedron.units import radians_from_degrees
 
 FEWEST_MOVES = 6
@@ -45,7 +45,7 @@ def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Ca
     Raises ``RefusedError`` when the recording lacks a sensor or has no static pose.
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
-    motion = twin_scenario(recording, resegment(recording, segments), own).motion
+    motion = twin_motion(recording, resegment(recording, segments), own)
     simulated = _sensed(replace(scenario, motion=motion), SEED)
     return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
 
@@ -70,7 +70,7 @@ class MovedAlike:
 
     def __init__(self, recording: Recording, segments: Segments, own: Calibration) -> None:
         cut = resegment(recording, segments)
-        self._motion = twin_scenario(recording, cut, own).motion
+        self._motion = twin_motion(recording, cut, own)
         self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
         angle_rad, duration_s = tilt_errors_of(own, recording, cut)
         self.poses = _of_poses(own)

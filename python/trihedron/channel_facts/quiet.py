@@ -53,29 +53,19 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
     first = np.linspace(0, max(n_windows - in_a_row, 0), -(-min(n_windows, MAX_WINDOWS) // in_a_row)).astype(np.int64)
     picked = np.unique(first[:, None] + np.arange(in_a_row)) if n_windows > MAX_WINDOWS else np.arange(n_windows)
     start = picked * length
-    mean: dict[str, FloatArray] = {}
-    noise: dict[str, FloatArray] = {}
-    spread: dict[str, FloatArray] = {}
     found = {name: _core.window_statistics(array, start, length) for name, array in sensors.items()}
-    if any(whole is None for whole in found.values()):
+    whole = {name: one for name, one in found.items() if one is not None}
+    if len(whole) < len(sensors):
         # Half of a window may be missing; fewer readings do not determine its noise.
-        enough = np.ones(len(start), dtype=bool)
-        for array in sensors.values():
-            pairs = np.isfinite(np.diff(array[start[:, None] + np.arange(length)], axis=1)).all(axis=2)
-            enough &= pairs.sum(axis=1) >= max(1, length // 2 if length > 2 else 1)
+        least = max(1, length // 2 if length > 2 else 1)
+        blocks = {name: array[start[:, None] + np.arange(length)] for name, array in sensors.items()}
+        pairs = [np.isfinite(np.diff(block, axis=1)).all(axis=2).sum(axis=1) for block in blocks.values()]
+        enough = np.min(pairs, axis=0) >= least
         if not enough.any():
             return None
         start = start[enough]
-        found = {name: _core.window_statistics(array, start, length) for name, array in sensors.items()}
-    for name, array in sensors.items():
-        whole = found[name]
-        if whole is not None:
-            mean[name], noise[name], spread[name] = whole
-            continue
-        block = array[start[:, None] + np.arange(length)]
-        mean[name] = np.nanmean(block, axis=1)
-        noise[name] = np.nanstd(np.diff(block, axis=1), axis=1) / np.sqrt(2.0)
-        spread[name] = np.linalg.norm(np.nanstd(block, axis=1), axis=1)
+        whole = {name: _beside_gaps(block[enough]) for name, block in blocks.items()}
+    mean, noise, spread = ({name: one[k] for name, one in whole.items()} for k in range(3))
     quiet = np.ones(len(start), dtype=bool)
     for value in spread.values():
         # The quietest tenth has the sensor's own noise; up to three times that is no hand motion.
@@ -86,6 +76,12 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
     if not quiet.any():
         quiet[:] = True
     return Windows(start, length, mean, noise, quiet)
+
+
+def _beside_gaps(block: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean and noise (m, 3) and spread (m,) of windows (m, n, 3) without their missing readings."""
+    noise = np.nanstd(np.diff(block, axis=1), axis=1) / np.sqrt(2.0)
+    return np.nanmean(block, axis=1), noise, np.linalg.norm(np.nanstd(block, axis=1), axis=1)
 
 
 def is_integer(array: FloatArray) -> bool:

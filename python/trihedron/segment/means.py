@@ -83,35 +83,26 @@ def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_
 
 
 def _sample_means(triads: list[FloatArray], poses: tuple[Pose, ...]) -> tuple[FloatArray, IntArray]:
-    """(h, c) means over the samples of each pose, and (h,) number of samples that are finite in every sensor."""
-    parts = [(k, a, b) for k, pose in enumerate(poses) for a, b in pose.undisturbed()]
-    owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
-    spans = np.column_stack([begins, ends])
-    n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(poses)).astype(np.int64)
-    # A log on disk acts like its arrays, and is read in parts.
-    if all(isinstance(a, np.ndarray) and a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
-        found = [_core.means_by_owner(a, spans, owner, len(poses)) for a in triads]
-        if all(np.array_equal(count, n_rows) for _, count in found):
-            return np.hstack([means for means, _ in found]), n_rows
-    mean = np.empty((len(poses), 3 * len(triads)))
-    n_averaged = np.zeros(len(poses), dtype=np.int64)
-    for k, pose in enumerate(poses):
-        # Relative to a first row, so that a large offset costs no digits.
-        about = np.full((len(triads), 3), np.nan)
-        total, count = np.zeros((len(triads), 3)), np.zeros((len(triads), 1))
-        for first, last in pose.undisturbed():
-            # In pieces, so that a pose of hours is not copied as a whole.
-            for start in range(first, last, PIECE):
-                readings = [triad[start : min(start + PIECE, last)] for triad in triads]
-                finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
-                n_averaged[k] += int(np.logical_and.reduce(finite).sum())
-                for j, rows in enumerate(r[f] for r, f in zip(readings, finite, strict=True)):
-                    if len(rows) and not count[j]:
-                        about[j] = rows[0]
-                    total[j] += (rows - about[j]).sum(axis=0)
-                    count[j] += len(rows)
-        mean[k] = (about + total / np.maximum(count, 1.0)).ravel()
-    return mean, n_averaged
+    """(h, c) means over the samples of each pose, and (h,) finite samples of the sensor that has the fewest."""
+    mean = np.zeros((len(poses), len(triads), 3))
+    count = np.zeros((len(poses), len(triads)), dtype=np.int64)
+    # In pieces, so that a pose of hours is not copied as a whole; a log on disk acts like its arrays.
+    pieces = [
+        (k, start, min(start + PIECE, last))
+        for k, pose in enumerate(poses)
+        for first, last in pose.undisturbed()
+        for start in range(first, last, PIECE)
+    ]
+    owner = np.zeros(1, dtype=np.int64)
+    for k, start, stop in pieces:
+        for j, triad in enumerate(triads):
+            rows = np.ascontiguousarray(triad[start:stop], dtype=np.float64)
+            found, n = _core.means_by_owner(rows, np.array([[0, stop - start]]), owner, 1)
+            if n[0] > 0:
+                count[k, j] += n[0]
+                mean[k, j] += (found[0] - mean[k, j]) * (n[0] / count[k, j])
+    mean[count == 0] = np.nan
+    return mean.reshape(len(poses), 3 * len(triads)), count.min(axis=1)
 
 
 def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:

@@ -81,8 +81,11 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
         alive = [c for c, variance in seen.items() if np.any(variance > 0.0)]
         if not alive:
             continue
-        fits = [[_fit(design, seen[c], n, chosen) for c in alive] for chosen in TERMS]
-        cost = len(alive) * math.log(max(len(ranges), 2)) * np.array([len(chosen) for chosen in TERMS])
+        # Fewer durations than terms do not determine these.
+        tried = [chosen for chosen in TERMS if len(chosen) <= len(n)]
+        fits = [[_core.mean_noise_terms(design, seen[c], n, chosen) for c in alive] for chosen in tried]
+        cost = len(alive) * math.log(max(len(ranges), 2)) * np.array([len(chosen) for chosen in tried])
+        # A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
         criterion = np.array([sum(fit[0] for fit in axes) for axes in fits]) + cost
         weight = np.exp(-0.5 * (criterion - criterion.min()))
         terms[alive] = np.average([[fit[1] for fit in axes] for axes in fits], axis=0, weights=weight)
@@ -94,30 +97,3 @@ TERMS = ([0], [0, 1], [0, 2], [0, 1, 2])
 term costs the logarithm of the number of ranges, because a slow term shows once in each: a term without support would
 inflate every error, and none is dropped for good in too short a log. Terms are chosen for the three axes of a sensor
 together, which are alike: a few coarse differences of one axis determine little, and would be extrapolated far."""
-
-
-def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
-    """Deviance and the non-negative terms of one choice.
-
-    A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
-    """
-    if len(seen) < len(chosen):
-        # Too few durations leave the terms undetermined; which of them are zero then depends on the method.
-        return _fit_open(design, seen, n, chosen)
-    deviance, terms = _core.mean_noise_terms(design, seen, n, chosen)
-    return deviance, np.array(terms)
-
-
-def _fit_open(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
-    """As :func:`_fit`, by the active-set method of Lawson and Hanson."""
-    from scipy import optimize
-
-    terms = np.zeros(3)
-    least = 1e-3 * seen.max() * design[:, 0] / design[0, 0]
-    model = np.maximum(seen, 100.0 * least)
-    for _ in range(5):
-        weight = np.sqrt(n) / model
-        terms[chosen], _ = optimize.nnls(design[:, chosen] * weight[:, None], seen * weight)
-        model = np.maximum(design @ terms, least)
-    ratio = np.maximum(seen, 1e-3 * least) / model
-    return float((n * (ratio - 1.0 - np.log(ratio))).sum()), terms

@@ -85,20 +85,10 @@ def find_vibrating(
     seen_calm = [run for run in seen_calm if not _turns(channels, run, settled)]
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
-    # Where a line beats, a part of the pose is calm enough to be an unsteady pose of its own.
-    parts = [run for run in taken if any(_is_part(run, whole) for whole in lines)]
-    kept = [run for run in taken if run not in parts]
-    lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in kept)]
-    still = _poses(channels, seen, quiet & free, [*kept, *lines], SEEN_S)
+    lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in taken)]
+    still = _poses(channels, seen, quiet & free, [*taken, *lines], SEEN_S)
     shaken = (run for run in still if _shakes(channels, activity, run) and not _turns(channels, run, settled))
-    return [*kept, *lines, *shaken]
-
-
-def _is_part(run: Run, whole: Run) -> bool:
-    """Whether an unsteady ``run`` lies, up to a window at its ends, inside another that is longer by a window."""
-    inside = min(run.last, whole.last) - max(run.first, whole.first)
-    length = run.last - run.first
-    return run.is_unsteady and inside >= length - WINDOW_BLOCKS and length + WINDOW_BLOCKS <= whole.last - whole.first
+    return [*taken, *lines, *shaken]
 
 
 def is_shaken_by_a_support(recording: Recording, stretch: Range, white_variance: tuple[FloatArray, FloatArray]) -> bool:

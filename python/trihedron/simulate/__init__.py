@@ -21,7 +21,7 @@ from trihedron.simulate.sessions import (
     six_faces,
     table_turns,
 )
-from trihedron.simulate.twin import twin_scenario
+from trihedron.simulate.twin import twin_motion, twin_scenario
 from trihedron.simulate.twin_noise import low_pass_like, noise_of_octaves
 
 __all__ = [
@@ -73,6 +73,7 @@ __all__ = [
     "simulate",
     "six_faces",
     "table_turns",
+    "twin_motion",
     "twin_scenario",
     "with_diagnosed_effects",
     "with_effect",

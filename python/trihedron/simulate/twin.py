@@ -7,7 +7,7 @@ digital twin therefore differ by what the calibration does not explain.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import RefusedError
-from trihedron.records import Calibration, Recording, Segments
+from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
@@ -33,8 +33,8 @@ from trihedron.simulate.twin_noise import noise_of_poses
 _KNOT_S = 0.01
 
 
-def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
-    """A scenario whose simulation repeats a recording.
+def twin_motion(recording: Recording, segments: Segments, calibration: Calibration) -> Motion:
+    """The poses and moves of a recording.
 
     Raises ``RefusedError`` when the recording lacks a sensor or has no pose, or the calibration has no gyro.
     """
@@ -42,39 +42,33 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         raise RefusedError("a digital twin needs both sensors in the recording and in the calibration")
     if not segments.poses:
         raise RefusedError("a digital twin needs at least one pose; the recording has none")
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
-    time_s = recording.time_s
-    readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))
     facts = recording.facts
     # Motion that exceeded a sensor's range must exceed it again.
-    beyond = (unclipped(readings[0], facts.of("accelerometer")), unclipped(readings[1], facts.of("gyroscope")))
-    motion = _motion(time_s, beyond, segments, calibration)
+    force = unclipped(_filled(recording.accelerometer), facts.of("accelerometer"))
+    rate = unclipped(_filled(recording.gyroscope), facts.of("gyroscope"))
+    return _motion(recording.time_s, (force, rate), segments, calibration)
+
+
+def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
+    """A scenario whose simulation repeats a recording; raises ``RefusedError`` as :func:`twin_motion`."""
+    motion = twin_motion(recording, segments, calibration)
+    assert calibration.gyroscope is not None  # twin_motion checks it
     poses = [(pose.start, pose.stop) for pose in segments.poses]
-    dt = 1.0 / recording.rate_hz
-    parts: list[dict[str, object]] = []
-    for sensor, raw, known, name in (
-        (accel, readings[0], facts.of("accelerometer"), "accelerometer"),
-        (gyro, readings[1], facts.of("gyroscope"), "gyroscope"),
-    ):
-        step = known.common_step
-        S, b = matrix3(sensor.S), triple(sensor.b)
+
+    def sensed(sensor: SensorCalibration, name: str) -> dict[str, Any]:
+        raw, step, S = _filled(getattr(recording, name)), recording.facts.of(name).common_step, matrix3(sensor.S)
         _, gain = sense_axes(S, name)
-        noise, low_pass = noise_of_poses(raw / gain, poses, dt, step / gain)
-        parts.append(
-            {
-                "S": S,
-                "b": b,
-                "noise": noise,
-                "noise_filter": low_pass,
-                "adc": Adc(step, float(raw.min()), float(raw.max())),
-            }
-        )
+        noise, low_pass = noise_of_poses(raw / gain, poses, 1.0 / recording.rate_hz, step / gain)
+        adc = Adc(step, float(raw.min()), float(raw.max()))
+        unit = getattr(recording, f"{name}_unit")
+        return {"S": S, "b": triple(sensor.b), "unit": unit, "noise": noise, "noise_filter": low_pass, "adc": adc}
+
     return Scenario(
         motion=motion,
         name=f"digital twin of {recording.source}",
-        accelerometer=replace(Accelerometer(unit=recording.accelerometer_unit), **parts[0]),  # type: ignore[arg-type]
-        gyroscope=replace(Gyroscope(unit=recording.gyroscope_unit), **parts[1]),  # type: ignore[arg-type]
-        clock=Clock(recording.rate_hz, instants_s=tuple(float(t) for t in time_s)),
+        accelerometer=Accelerometer(**sensed(calibration.accelerometer, "accelerometer")),
+        gyroscope=Gyroscope(**sensed(calibration.gyroscope, "gyroscope")),
+        clock=Clock(recording.rate_hz, instants_s=tuple(recording.time_s.tolist())),
         environment=Environment(gravity_m_s2=calibration.gravity_m_s2),
     )
 
@@ -83,7 +77,7 @@ def _motion(
     time_s: FloatArray, readings: tuple[FloatArray, FloatArray], segments: Segments, calibration: Calibration
 ) -> Motion:
     gyro = calibration.gyroscope
-    assert gyro is not None  # twin_scenario checks it
+    assert gyro is not None  # twin_motion checks it
     force = correct(readings[0], calibration.accelerometer.S, calibration.accelerometer.b)
     rate = correct(readings[1], gyro.S, gyro.b)
     poses = segments.poses

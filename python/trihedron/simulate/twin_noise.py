@@ -118,12 +118,10 @@ def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoo
 
     Gains below ``HIDDEN`` are set to ``HIDDEN``.
     """
-    turns = np.exp(-2j * np.pi * frequency_hz * dt)
     wanted = np.log(np.maximum(gain, HIDDEN))
 
     def misfit(log_corner: float, order: int) -> float:
-        a = Smoother(float(np.exp(log_corner)), order).feedback(dt)
-        made = np.abs(a.sum() / np.polyval(a[::-1], turns)) ** 2
+        made = _power(Smoother(float(np.exp(log_corner)), order), dt, 2.0 * np.pi * frequency_hz * dt)
         return float(np.mean((np.log(np.maximum(made, HIDDEN)) - wanted) ** 2))
 
     tried = np.log(np.geomspace(LOWEST / dt, HIGHEST / dt, 40))
@@ -215,9 +213,9 @@ def _windows(size: FloatArray) -> FloatArray:
     return np.array([2.0 / m**2 * np.sin(half * m) ** 4 / np.sin(half) ** 2 / len(half) for m in size])
 
 
-def _power(low_pass: Smoother, dt: float) -> FloatArray:
-    """(8192,) power gain of the low-pass."""
+def _power(low_pass: Smoother, dt: float, turns: FloatArray = _FREQUENCIES) -> FloatArray:
+    """(m,) power gain of the low-pass at ``turns`` (m,) [rad/sample]."""
     if low_pass.corner_hz == 0.0:
-        return np.ones(len(_FREQUENCIES))
+        return np.ones(len(turns))
     a = low_pass.feedback(dt)
-    return np.asarray(np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * _FREQUENCIES))) ** 2)
+    return np.asarray(np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * turns))) ** 2)

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp, ndtr, ndtri, stdtrit
+from scipy.stats import multivariate_t
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
@@ -37,7 +38,7 @@ ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
 LEAST_DRAWS, ENOUGH_DRAWS = 3, 15
 """Effective draws per strength: below the first their covariance is too narrow, or singular, for proposals; above the
 second sampling may end."""
-TAILS = 5.0
+TAILS = 5
 """Degrees of freedom of a proposal: heavier tails than the posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
 """Correlation times of a Gauss-Markov bias that are compared with the random walk."""
@@ -214,12 +215,7 @@ def _effective(weights: FloatArray) -> float:
 
 def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
     """(k,) log density of points (k, f) under the equal mixture of Student's distributions (mean, Cholesky root)."""
-    n = x.shape[1]
-    norm = gammaln(0.5 * (TAILS + n)) - gammaln(0.5 * TAILS) - 0.5 * n * np.log(TAILS * np.pi)
-    each = []
-    for middle, root in proposals:
-        far = np.sum(solve_triangular(root, (x - middle).T, lower=True) ** 2, axis=0)
-        each.append(norm - np.sum(np.log(np.diag(root))) - 0.5 * (TAILS + n) * np.log1p(far / TAILS))
+    each = [multivariate_t(middle, root @ root.T, TAILS).logpdf(x) for middle, root in proposals]
     return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
 
 

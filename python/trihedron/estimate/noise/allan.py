@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import isotonic_regression
 from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import RefusedError
-from trihedron.estimate.noise.gaps import never_falling, true_share
+from trihedron.estimate.noise.gaps import true_share
 from trihedron.records.noise import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
@@ -264,7 +265,7 @@ def slopes_along(n: int, clusters: IntArray, variance: FloatArray) -> FloatArray
     slope = np.diff(ys) / np.where(step > 0, step, 1.0)
     # Variance of a slope over one step: two neighbouring values of about n/m degrees of freedom, largely the same.
     weight = step**2 * n / 2.0 ** (0.5 * (xs[1:] + xs[:-1]))
-    rising = never_falling(slope, np.maximum(weight, 1e-12))
+    rising = isotonic_regression(slope, weights=np.maximum(weight, 1e-12)).x
     middle = 0.5 * (xs[1:] + xs[:-1])
     return np.interp(x, middle, _held_at_the_end(rising, middle, n))
 

@@ -12,7 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
-from trihedron.estimate.noise.lines import find_lines, misfit_groups, white_limit
+from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
@@ -221,18 +221,24 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
 
     Also the largest factor on a variance, and the worst deviation with its frequency where it exceeds 10 %.
     """
-    groups = misfit_groups(selection)
-    bad = [g for g in groups if abs(g.z) > 4.0]
-    if not bad:
+    spectrum = selection.spectrum
+    ratio = spectrum.without_line(selection.fit.slope) / spectrum.expectation(selection.fit.strength)
+    octaves = np.log2(spectrum.frequency_hz / spectrum.frequency_hz[0])
+    group = np.unique(np.floor(2.0 * octaves), return_inverse=True)[1]
+    n = np.bincount(group, spectrum.count)
+    mean = np.bincount(group, spectrum.count * ratio) / n
+    # Cube root: nearly normal for few degrees of freedom (Wilson-Hilferty).
+    z = (np.maximum(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n))
+    bad = np.abs(z) > 4.0
+    if not bad.any():
         return selection, 1.0, None
-    count = selection.spectrum.count.copy()
-    for group in bad:
-        count[group.inside] /= group.z**2
-    spectrum = replace(selection.spectrum, count=count)
+    factor = np.where(bad, z**2, 1.0)
+    spectrum = replace(spectrum, count=spectrum.count / factor[group])
     fit = spectrum.likelihood().fit(selection.active, selection.has_ramp)
-    worst = max(bad, key=lambda g: abs(g.deviation))
-    large = (worst.deviation, worst.frequency_hz) if abs(worst.deviation) > 0.1 else None
-    return replace(selection, fit=fit, spectrum=spectrum), max(g.z**2 for g in bad), large
+    worst = int(np.argmax(np.where(bad, np.abs(mean - 1.0), 0.0)))
+    deviation, frequency_hz = float(mean[worst]) - 1.0, float(np.mean(spectrum.frequency_hz[group == worst]))
+    large = (deviation, frequency_hz) if abs(deviation) > 0.1 else None
+    return replace(selection, fit=fit, spectrum=spectrum), float(factor[bad].max()), large
 
 
 # White noise through a coarse ADC: the measured noise depends on the position of the mean inside the LSB.

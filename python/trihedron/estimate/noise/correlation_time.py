@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
@@ -97,10 +98,6 @@ class _Octaves:
             weight = 1.0 / (self.sigma * predicted)
             A = np.column_stack([np.ones_like(shape), shape]) * weight[:, None]
             y = self.density * weight
-            found = np.linalg.solve(A.T @ A + 1e-12 * np.diag((A**2).sum(axis=0)), A.T @ y)
-            if found.min() < 0.0:
-                alone = int(np.argmax(found))
-                found = np.zeros(2)
-                found[alone] = max(float(A[:, alone] @ y / (A[:, alone] @ A[:, alone])), 0.0)
+            found, _ = nnls(A, y)
             predicted = np.maximum(found[0] + found[1] * shape, SMALLEST * self.density)
         return float(found[0]), float(found[1])

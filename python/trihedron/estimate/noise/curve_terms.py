@@ -281,23 +281,11 @@ def tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovaria
 
 def _crossing(excess: Callable[[float], float], first: float) -> float:
     """Log ratio, on the side of ``first``, at which ``excess`` crosses zero; accurate to 1 %."""
-    inside, below = 0.0, excess(0.0)
-    outside, above = first, excess(first)
-    while above < 0.0:
-        inside, below = outside, above
+    from scipy.optimize import brentq
+
+    outside = first
+    while excess(outside) < 0.0:
         outside *= 2.0
         if abs(outside) > 60.0:
             return outside
-        above = excess(outside)
-    for _ in range(30):
-        # Regula falsi, limited to 0.1 to 0.9 of the interval.
-        share = min(0.9, max(0.1, below / (below - above))) if below < 0.0 else 0.5
-        middle = inside + share * (outside - inside)
-        value = excess(middle)
-        if value < 0.0:
-            inside, below = middle, value
-        else:
-            outside, above = middle, value
-        if abs(outside - inside) < 0.01 * abs(outside) or abs(value) < 0.02:
-            return middle
-    return outside
+    return float(brentq(excess, 0.0, outside, xtol=0.01 * abs(first))) if excess(0.0) < 0.0 else 0.0

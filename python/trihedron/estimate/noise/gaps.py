@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import isotonic_regression
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.ranges import edges_of, ranges_of
@@ -168,22 +169,5 @@ def true_share(x: FloatArray, clusters: IntArray, variance: FloatArray, order: i
     known = np.isfinite(slow)
     if not known.any():
         return np.ones(len(clusters))
-    slow[known] = never_falling(slow[known], len(x) / clusters[known].astype(np.float64))
+    slow[known] = isotonic_regression(slow[known], weights=len(x) / clusters[known]).x
     return np.asarray(np.where(known, least + (1.0 - least) * np.where(known, slow, 0.0), 1.0))
-
-
-def never_falling(values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Isotonic regression by pooling adjacent violators."""
-    level: list[float] = []
-    mass: list[float] = []
-    size: list[int] = []
-    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
-        level.append(value)
-        mass.append(weight)
-        size.append(1)
-        while len(level) > 1 and level[-2] > level[-1]:
-            last, last_mass, last_size = level.pop(), mass.pop(), size.pop()
-            level[-1] = (level[-1] * mass[-1] + last * last_mass) / (mass[-1] + last_mass)
-            mass[-1] += last_mass
-            size[-1] += last_size
-    return np.repeat(level, size)

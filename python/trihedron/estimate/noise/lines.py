@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -175,39 +175,8 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
 
 def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, highest_hz: float) -> bool:
     upper = spectrum.frequency_hz > highest_hz / 4.0
-    key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9)
-    ratio = (spectrum.without_line(slope) / expected)[upper]
-    count = spectrum.count[upper]
-    for group in np.unique(key):
-        inside = key == group
-        n = count[inside].sum()
-        mean = float(np.sum(ratio[inside] * count[inside]) / n)
-        if n >= 8 and abs(mean - 1.0) > max(TOLERANCE, 4.5 * np.sqrt(2.0 / n)):
-            return True
-    return False
-
-
-@dataclass(frozen=True, eq=False)
-class MisfitGroup:
-    """Half an octave of the spectrum: bins ``inside``, its power over the terms' minus 1, and that in sigmas."""
-
-    inside: BoolArray
-    deviation: float
-    z: float
-    frequency_hz: float
-
-
-def misfit_groups(selection: Selection) -> list[MisfitGroup]:
-    """Deviation of the spectrum from the selected terms by half octaves."""
-    spectrum = selection.spectrum
-    ratio = spectrum.without_line(selection.fit.slope) / spectrum.expectation(selection.fit.strength)
-    key = np.floor(2.0 * np.log2(spectrum.frequency_hz / spectrum.frequency_hz[0]))
-    groups = []
-    for group in np.unique(key):
-        inside = key == group
-        n = spectrum.count[inside].sum()
-        mean = float(np.sum(ratio[inside] * spectrum.count[inside]) / n)
-        # Cube root: nearly normal for few degrees of freedom (Wilson-Hilferty).
-        z = float((max(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n)))
-        groups.append(MisfitGroup(inside, mean - 1.0, z, float(np.mean(spectrum.frequency_hz[inside]))))
-    return groups
+    key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9).astype(np.int64)
+    count, ratio = spectrum.count[upper], (spectrum.without_line(slope) / expected)[upper]
+    n = np.maximum(np.bincount(key, count), 1e-300)
+    mean = np.bincount(key, count * ratio) / n
+    return bool(np.any((n >= 8) & (np.abs(mean - 1.0) > np.maximum(TOLERANCE, 4.5 * np.sqrt(2.0 / n)))))

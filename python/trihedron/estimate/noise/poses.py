@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import lsq_linear
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.at_rest import AxisAtRest
@@ -43,27 +44,13 @@ class _Below:
     rounding: float
 
 
-def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray, n_levels: int) -> tuple[FloatArray, FloatArray]:
-    """Inverse information and a Gauss-Newton step bounded below by ``lowest``; steps at the bound are held there."""
-    held = np.zeros(J.shape[1], dtype=bool)
-    step = np.zeros(J.shape[1])
+def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Inverse information of the steps that are free, and the Gauss-Newton step, at least ``lowest``."""
+    found = lsq_linear(J, r, (lowest, np.inf), method="bvls")
+    free = np.flatnonzero(found.active_mask == 0)
     inverse = np.zeros((J.shape[1], J.shape[1]))
-    while True:
-        free = np.flatnonzero(~held)
-        part = np.linalg.pinv(J[:, free].T @ J[:, free], rcond=1e-12)
-        step[:] = 0.0
-        bounded = np.flatnonzero(held)
-        step[bounded] = lowest[bounded]
-        step[free] = part @ (J[:, free].T @ (r - J[:, bounded] @ step[bounded]))
-        below = np.zeros_like(held)
-        below[n_levels : len(lowest)] = step[n_levels : len(lowest)] < lowest[n_levels:]
-        below &= ~held
-        if not below.any():
-            break
-        held |= below
-    inverse[np.ix_(free, free)] = part
-    step[:n_levels] = np.clip(step[:n_levels], -1.0, 1.0)
-    return inverse, step
+    inverse[np.ix_(free, free)] = np.linalg.pinv(J[:, free].T @ J[:, free], rcond=1e-12)
+    return inverse, found.x
 
 
 def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: float) -> list[tuple[float, float]]:
@@ -106,8 +93,9 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
             blocks.append(design * root[:, np.newaxis])
             rests.append((axis.power - mean) * root)
         J, r = np.vstack(blocks), np.concatenate(rests)
-        inverse, step = _bounded_step(J, r, np.concatenate([np.full(n, -1.0), *(-b for b in beneath)]), n)
-        level = level + step[:n]
+        lowest = np.concatenate([np.full(n, -np.inf), *(-b for b in beneath), np.full(SHAPE_TERMS, -np.inf)])
+        inverse, step = _bounded_step(J, r, lowest)
+        level = level + np.clip(step[:n], -1.0, 1.0)
         beneath = [b + step[first[k] : first[k + 1]] for k, b in enumerate(beneath)]
         bend = bend + step[first[-1] :]
         covariance = inverse[:n, :n]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from trihedron.errors import RefusedError
 
@@ -138,6 +138,3 @@ def spoil(frame: bytes, number: int, faults: Faults, rng: random.Random, sent: S
         out = bytearray(rng.randrange(256) for _ in range(rng.randrange(1, 41))) + out
     sent.bytes += len(out)
     return bytes(out)
-
-
-assert set(KINDS) <= {f.name for f in fields(Faults)}

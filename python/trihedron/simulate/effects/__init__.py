@@ -6,52 +6,59 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from functools import partial
+from typing import Any, Literal
 
 from trihedron.errors import RefusedError
 from trihedron.sanitise import meant
-from trihedron.simulate.effects import experiment, sensor
+from trihedron.simulate.effects import experiment, found, sensor
+from trihedron.simulate.effects.found import Found
 from trihedron.simulate.effects.sizes import Change
 from trihedron.simulate.effects.truth import effects_of
 from trihedron.simulate.scenario import Scenario
 
 __all__ = ["EFFECT_IDS", "effects_of", "with_effect"]
 
-_EFFECTS: dict[str, Change] = {
-    "accel-quadratic": sensor.accel_quadratic,
-    "accel-cubic": sensor.accel_cubic,
-    "accel-scale-asymmetry": sensor.accel_asymmetry,
-    "accel-hysteresis": sensor.accel_hysteresis,
-    "accel-thermal-bias": sensor.thermal("accelerometer", "bias"),
-    "accel-thermal-scale": sensor.thermal("accelerometer", "scale"),
-    "gyro-thermal-bias": sensor.thermal("gyroscope", "bias"),
-    "gyro-thermal-scale": sensor.thermal("gyroscope", "scale"),
-    "accel-bias-drift": sensor.drift("accelerometer"),
-    "gyro-bias-drift": sensor.drift("gyroscope"),
-    "accel-bias-repeatability": sensor.bias_repeatability("accelerometer"),
-    "gyro-bias-repeatability": sensor.bias_repeatability("gyroscope"),
-    "gyro-g-sensitivity": sensor.g_sensitivity,
-    "gyro-scale-nonlinearity": sensor.gyro_nonlinearity,
-    "gyro-saturation": sensor.saturation("gyroscope"),
-    "accel-saturation": sensor.saturation("accelerometer"),
-    "lever-arm": sensor.lever_arm,
-    "accel-size-effect": sensor.size_effect,
-    "accel-gyro-time-offset": experiment.time_offset,
-    "sensor-lag": sensor.lag,
-    "dropped-samples": experiment.dropped,
-    "timing-jitter": experiment.jitter,
-    "earth-rate": experiment.earth_rate,
-    "vibration-rectification": experiment.rectification,
-    "periodic-interference": sensor.interference,
-    "quantisation": sensor.quantisation,
-    "supply-sensitivity": sensor.supply,
-    "disturbed-pose": experiment.disturbed,
-    "turn-angle-error": experiment.turn_errors,
-    "table-tilt": experiment.table_tilt,
-    "axis-handedness": sensor.handedness,
+A: Literal["accelerometer"]
+G: Literal["gyroscope"]
+A, G = "accelerometer", "gyroscope"
+EFFECTS: dict[str, tuple[Change, Found]] = {
+    "accel-quadratic": (sensor.accel_quadratic, found.axes(k2="K2")),
+    "accel-cubic": (sensor.accel_cubic, found.axes(k3="K3")),
+    "accel-scale-asymmetry": (sensor.accel_asymmetry, found.axes(asymmetry="half_difference")),
+    "accel-hysteresis": (sensor.accel_hysteresis, found.hysteresis),
+    "accel-thermal-bias": (partial(sensor.thermal, A, "bias"), found.thermal_bias),
+    "accel-thermal-scale": (partial(sensor.thermal, A, "scale"), found.thermal_scale),
+    "gyro-thermal-bias": (partial(sensor.thermal, G, "bias"), found.thermal_bias),
+    "gyro-thermal-scale": (partial(sensor.thermal, G, "scale"), found.thermal_scale),
+    "accel-bias-drift": (partial(sensor.drift, A), found.drift),
+    "gyro-bias-drift": (partial(sensor.drift, G), found.drift),
+    "accel-bias-repeatability": (partial(sensor.bias_repeatability, A), found.one_sigma),
+    "gyro-bias-repeatability": (partial(sensor.bias_repeatability, G), found.axes(sigma="sigma")),
+    "gyro-g-sensitivity": (sensor.g_sensitivity, found.g_sensitivity),
+    "gyro-scale-nonlinearity": (sensor.gyro_nonlinearity, found.axes(c2="quadratic", c3="cubic")),
+    "gyro-saturation": (partial(sensor.saturation, G), found.limit),
+    "accel-saturation": (partial(sensor.saturation, A), found.limit),
+    "lever-arm": (sensor.lever_arm, found.axes(arm_m="r")),
+    "accel-size-effect": (sensor.size_effect, found.places),
+    # The gyro sampling later under the same timestamp is equivalent to the accelerometer being delayed.
+    "accel-gyro-time-offset": (experiment.time_offset, found.number("offset_s", "accelerometer_delay")),
+    "sensor-lag": (sensor.lag, found.lag),
+    "dropped-samples": (experiment.dropped, found.losses),
+    "timing-jitter": (experiment.jitter, found.number("jitter_s", "jitter")),
+    "earth-rate": (experiment.earth_rate, found.earth_rate),
+    "vibration-rectification": (experiment.rectification, found.rectification),
+    "periodic-interference": (sensor.interference, found.interference),
+    "quantisation": (sensor.quantisation, found.nothing),
+    "supply-sensitivity": (sensor.supply, found.nothing),
+    "disturbed-pose": (experiment.disturbed, found.nothing),
+    "turn-angle-error": (experiment.turn_errors, found.nothing),
+    "table-tilt": (experiment.table_tilt, found.nothing),
+    "axis-handedness": (sensor.handedness, found.nothing),
 }
+"""How each effect of the catalogue is added to a scenario, and its size from the parameters of a diagnosis."""
 
-EFFECT_IDS: tuple[str, ...] = tuple(_EFFECTS)
+EFFECT_IDS: tuple[str, ...] = tuple(EFFECTS)
 """Ids of the diagnosis catalogue that can be simulated: all of them."""
 
 
@@ -60,17 +67,18 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
 
     Raises ``RefusedError`` when the id is unknown, or a parameter is unknown, missing or invalid.
     """
-    if effect_id not in _EFFECTS:
+    if effect_id not in EFFECTS:
         raise RefusedError(
-            f"no effect is called {effect_id!r}{meant(effect_id, _EFFECTS)}; there are {', '.join(_EFFECTS)}"
+            f"no effect is called {effect_id!r}{meant(effect_id, EFFECTS)}; there are {', '.join(EFFECTS)}"
         )
-    takes = dict(list(inspect.signature(_EFFECTS[effect_id]).parameters.items())[1:])
+    change, _ = EFFECTS[effect_id]
+    takes = dict(list(inspect.signature(change).parameters.items())[1:])
     words = ", ".join(name if p.default is p.empty else f"{name} (may be left out)" for name, p in takes.items())
     if unknown := [name for name in size if name not in takes]:
         raise RefusedError(f"effect {effect_id} has no {unknown[0]!r}{meant(unknown[0], takes)}; it takes {words}")
     if missing := [name for name, p in takes.items() if p.default is p.empty and name not in size]:
         raise RefusedError(f"effect {effect_id} needs {', '.join(missing)}; it takes {words}")
     try:
-        return _EFFECTS[effect_id](scenario, **size)
+        return change(scenario, **size)
     except TypeError as error:
         raise RefusedError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None

@@ -11,7 +11,6 @@ import numpy as np
 
 from trihedron.errors import RefusedError
 from trihedron.simulate.effects.sizes import (
-    Change,
     Sensor,
     checked,
     electronics,
@@ -65,48 +64,43 @@ def _warmed(scenario: Scenario, warm_up_k: float, warm_up_tau_s: float, logged: 
     return replace(scenario, environment=replace(scenario.environment, temperature=temperature))
 
 
-def bias_repeatability(sensor: Sensor) -> Change:
-    def change(scenario: Scenario, sigma: Values) -> Scenario:
-        return electronics(scenario, sensor, bias_repeatability=triple(sigma))
-
-    return change
+def bias_repeatability(sensor: Sensor, scenario: Scenario, sigma: Values) -> Scenario:
+    return electronics(scenario, sensor, bias_repeatability=triple(sigma))
 
 
-def thermal(sensor: Sensor, kind: Literal["bias", "scale"]) -> Change:
-    def change(
-        scenario: Scenario,
-        per_k: Values,
-        per_k2: Values = 0.0,
-        warm_up_k: float = 12.0,
-        warm_up_tau_s: float = 120.0,
-        logged: bool = True,
-    ) -> Scenario:
-        thermal = getattr(scenario, sensor).electronics.thermal
-        thermal = replace(thermal, **{f"{kind}_per_k": triple(per_k), f"{kind}_per_k2": triple(per_k2)})
-        return _warmed(electronics(scenario, sensor, thermal=thermal), warm_up_k, warm_up_tau_s, logged)
-
-    return change
-
-
-def drift(sensor: Sensor) -> Change:
-    def drifting(
-        scenario: Scenario, amplitude: Values = 0.0, tau_s: float = 120.0, change: Values = 0.0, length_s: float = 300.0
-    ) -> Scenario:
-        if not (tau_s > 0.0 and length_s > 0.0):
-            raise RefusedError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
-        drift = Drift(triple(amplitude), tau_s, triple(change), length_s)
-        if not (any(drift.amplitude) or any(drift.change)):
-            raise RefusedError("a drift needs an amplitude that dies away, or a change over length_s")
-        return electronics(scenario, sensor, drift=drift)
-
-    return drifting
+def thermal(
+    sensor: Sensor,
+    kind: Literal["bias", "scale"],
+    scenario: Scenario,
+    per_k: Values,
+    per_k2: Values = 0.0,
+    warm_up_k: float = 12.0,
+    warm_up_tau_s: float = 120.0,
+    logged: bool = True,
+) -> Scenario:
+    thermal = getattr(scenario, sensor).electronics.thermal
+    thermal = replace(thermal, **{f"{kind}_per_k": triple(per_k), f"{kind}_per_k2": triple(per_k2)})
+    return _warmed(electronics(scenario, sensor, thermal=thermal), warm_up_k, warm_up_tau_s, logged)
 
 
-def saturation(sensor: Sensor) -> Change:
-    def change(scenario: Scenario, limit: Values) -> Scenario:
-        return electronics(scenario, sensor, saturation=triple(limit))
+def drift(
+    sensor: Sensor,
+    scenario: Scenario,
+    amplitude: Values = 0.0,
+    tau_s: float = 120.0,
+    change: Values = 0.0,
+    length_s: float = 300.0,
+) -> Scenario:
+    if not (tau_s > 0.0 and length_s > 0.0):
+        raise RefusedError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
+    drift = Drift(triple(amplitude), tau_s, triple(change), length_s)
+    if not (any(drift.amplitude) or any(drift.change)):
+        raise RefusedError("a drift needs an amplitude that dies away, or a change over length_s")
+    return electronics(scenario, sensor, drift=drift)
 
-    return change
+
+def saturation(sensor: Sensor, scenario: Scenario, limit: Values) -> Scenario:
+    return electronics(scenario, sensor, saturation=triple(limit))
 
 
 def g_sensitivity(scenario: Scenario, matrix: Sequence[Values]) -> Scenario:
