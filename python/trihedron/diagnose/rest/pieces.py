@@ -62,14 +62,13 @@ class RestPieces:
         level = np.array([values[self.pose == p].mean(axis=0) for p in range(self.n_poses)])
         return np.asarray(values - level[self.pose])
 
-    def readings(self, sensor: int, axes: Sequence[int], columns: Sequence[FloatArray] = ()) -> BiasReadings:
-        """Readings of some axes for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
+    def readings(self, sensor: int, columns: Sequence[FloatArray] = ()) -> BiasReadings:
+        """Readings of a sensor for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
         levels = [np.ones(len(self.time_s))]
         levels += [(self.pose == k).astype(np.float64) for k in range(1, self.n_poses)]
         return BiasReadings(
-            np.ascontiguousarray(self.means[sensor].T[axes]), self.sigma[sensor][axes][:, None] / np.sqrt(self.count),
+            np.ascontiguousarray(self.means[sensor].T), self.sigma[sensor][:, None] / np.sqrt(self.count),
             self.time_s, self.length_s, self.piece, np.column_stack([*levels, *columns]),
-            np.ones((len(self.time_s), 1)),
         )  # fmt: skip
 
 
