@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import percentile_filter
@@ -15,6 +16,7 @@ from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import move_residuals, wrt_lost_time
 from trihedron.diagnose.session.state import SessionState
+from trihedron.records import Recording, Segments
 
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
@@ -31,9 +33,9 @@ NARROW = 3
 """Samples on either side that a join uses in quick motion."""
 PLACE_S = 0.01
 """Spacing of the places tried, s."""
+CUBIC, QUINTIC = 4, 6
+"""Coefficients."""
 MOST_IN_A_MOVE = 3
-FEWEST_OF_PARABOLA = 6
-"""Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,6 @@ class Loss:
     move: int
     count: int
     gain: float
-    per_sensor: tuple[float, ...]
 
 
 def most_lost(obs: Observations) -> int:
@@ -100,9 +101,9 @@ def _losses_of(obs: Observations, m: int) -> list[Loss]:
     k = k[~clipped_samples(obs)[k]]
     if len(k) == 0:
         return []
-    stack = _joints(w, 4, most)
+    stack = _joints(w, CUBIC, most)
     windows = _windows(obs, k, w)
-    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - 4)
+    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - CUBIC)
     # Usual chi-square of joins in motion as quick as here: jitter and curvature are no losses.
     near = [percentile_filter(one, 75, size=8 * w + 1, mode="nearest") for one in zero.T]
     usual = np.maximum(np.stack(near, axis=1), dof)
@@ -114,12 +115,12 @@ def _losses_of(obs: Observations, m: int) -> list[Loss]:
     # Quick motion over a wide gap is no cubic: a quintic is used where the cubic leaves too much.
     quick = (trial.min(axis=1) > 3.0 * usual[suspect]).any(axis=1)
     if quick.any():
-        trial[quick] = _trials(_joints(w, 6, most), [v[:, suspect[quick]] for v in windows])
+        trial[quick] = _trials(_joints(w, QUINTIC, most), [v[:, suspect[quick]] for v in windows])
     total = trial.sum(axis=2)
     # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
     best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
     return [
-        Loss(int(k[s]), m, n, float(gains.sum()), tuple(gains.tolist()))
+        Loss(int(k[s]), m, n, float(gains.sum()))
         for s, n, costs in zip(suspect, best.tolist(), trial, strict=True)
         if 0 < n < most and (gains := _gains(costs, n, zero[s], usual[s])) is not None
     ]
@@ -162,7 +163,7 @@ def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, 
         score = gain + (misfit - (left**2).sum(axis=2)) / usual
         score[~free] = -np.inf
         at, n = np.unravel_index(int(score.argmax()), score.shape)
-        loss = Loss(int(places[at]), m, int(n), float(score[at, n]), (float(score[at, n]),))
+        loss = Loss(int(places[at]), m, int(n), float(score[at, n]))
         without = residual_after(obs, state, m, held | {loss.sample: loss.count})
         if gain[at, n] < LEAST_GAIN or float(without @ without) > MUST_HALVE * misfit:
             break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
@@ -178,8 +179,8 @@ def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, IntArray]:
     k = k[~clipped_samples(obs)[k]]
     if not len(k):
         return np.zeros((0, 1)), k
-    costs = _trials(_joints(NARROW, 4, most_lost(obs)), _windows(obs, k, NARROW))
-    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - 4)), 1.0)
+    costs = _trials(_joints(NARROW, CUBIC, most_lost(obs)), _windows(obs, k, NARROW))
+    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - CUBIC)), 1.0)
     return ((costs[:, :1] - costs) / ordinary).sum(axis=2), k
 
 
@@ -192,38 +193,73 @@ def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observat
     """One move alone, with ``losses`` (counts after samples) inserted."""
     a, b = obs.move_ranges[m]
     assert obs.raw_rate is not None
-    force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
-    step = 1.0 / obs.recording.rate_hz
-    for k, n in sorted(losses.items(), reverse=True):
-        i = k - a
-        force = np.concatenate([force[: i + 1], bridge(force, i, n), force[i + 1 :]])
-        rate = np.concatenate([rate[: i + 1], bridge(rate, i, n), rate[i + 1 :]])
-        put = time[i] + step * np.arange(1, n + 1)
-        time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
+    own = {k - a: n for k, n in losses.items()}
+    time = with_time(obs.time_s[a:b], own, 1.0 / obs.recording.rate_hz)
+    force, rate = (with_bridges(one[a:b], own) for one in (obs.raw_force, obs.raw_rate))
     ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
     return replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
 
 
-def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side."""
-    if k < 1 or k + 2 >= len(values):
-        return np.repeat(values[k : k + 1], n, axis=0)
-    a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])
-    b, db = _edge(values[k + 1 : k + 2 + max(n // 2, 1)])
-    da = -da
-    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-    width = n + 1
-    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
+    """Recording and segments with ``n`` samples inserted behind sample ``k`` for every ``k: n``."""
+    place = moved(recording.n_samples, losses)
+    time_s = with_time(recording.time_s, losses, 1.0 / recording.rate_hz)
+    channels = ("accelerometer", "gyroscope", "temperature_degc", "supply_v")
+    logged = {name: value for name in channels if (value := getattr(recording, name)) is not None}
+    values: dict[str, Any] = {name: with_bridges(value, losses) for name, value in logged.items()}
+    mended = replace(recording, time_s=time_s, auxiliary=type(recording.auxiliary)({}), **values)
+    mended = mended.with_facts(recording.facts.moved(place))
+
+    def at(index: int) -> int:
+        return int(place[index]) if index < len(place) else len(time_s)
+
+    poses = tuple(
+        replace(
+            pose, start=at(pose.start), stop=at(pose.stop - 1) + 1, outer_start=at(pose.outer_start),
+            outer_stop=at(pose.outer_stop - 1) + 1,
+            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
+        )
+        for pose in segments.poses
+    )  # fmt: skip
+    moves = tuple(
+        replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
+    )
+    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses])
+    return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)
+
+
+def moved(n: int, losses: dict[int, int]) -> IntArray:
+    """(n,) places of samples once ``losses`` (counts after samples) are inserted."""
+    extra = np.zeros(n, dtype=np.intp)
+    extra[[k + 1 for k in losses]] = list(losses.values())
+    return np.arange(n) + np.cumsum(extra)
+
+
+def with_time(time_s: FloatArray, losses: dict[int, int], step_s: float) -> FloatArray:
+    """Timestamps with those of the losses; behind a gap they move by the time lost."""
+    place = moved(len(time_s), losses)
+    return np.interp(np.arange(place[-1] + 1), place, time_s + (place - np.arange(len(place))) * step_s)
+
+
+def with_bridges(values: FloatArray, losses: dict[int, int]) -> FloatArray:
+    """Values (n, ...) with samples on a cubic across every loss."""
+    place = moved(len(values), losses)
+    out = np.empty((place[-1] + 1, *values.shape[1:]))
+    out[place] = values
+    for k, n in losses.items():
+        out[place[k] + 1 : place[k + 1]] = bridge(values, k, n)
     return out
 
 
-def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Value and slope at the first of the samples (m, ...), from a parabola where there are enough: the noise of a
-    single step would be multiplied by the length of the gap."""
-    if len(values) < FEWEST_OF_PARABOLA:
-        return values[0], values[1] - values[0]
-    x = np.arange(len(values))
-    slope, value = np.polynomial.polynomial.polyfit(x, values.reshape(len(values), -1), 2)[1::-1]
-    return value.reshape(values.shape[1:]), slope.reshape(values.shape[1:])
+def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
+    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic through those on either side, as many as half the gap.
+
+    The error of the rotation integrated across the gap is of fifth order in its length.
+    """
+    w = max(NARROW, n // 2)
+    before, after = values[max(k + 1 - w, 0) : k + 1], values[k + 1 : k + 1 + w]
+    # In gaps from its middle: powers of large numbers lose digits.
+    at = np.concatenate([np.arange(1 - len(before), 1), np.arange(len(after)) + n + 1]) / (n + 1.0) - 0.5
+    inside = np.arange(1, n + 1) / (n + 1.0) - 0.5
+    weights = np.vander(inside, CUBIC) @ np.linalg.pinv(np.vander(at, CUBIC))
+    return np.tensordot(weights, np.concatenate([before, after]), axes=1)
