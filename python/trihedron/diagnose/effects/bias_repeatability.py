@@ -1,10 +1,10 @@
-"""Gyro bias that differs from pose to pose."""
+"""Bias that differs from pose to pose."""
 
 from __future__ import annotations
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
-from trihedron.diagnose.effects.contract import GYRO
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
@@ -17,3 +17,14 @@ class GyroBiasRepeatability(BiasProcess):
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         return per_axis_parameters("sigma", size, std, self.unit), self.told("scatter", sigma=size)
+
+
+class AccelBiasRepeatability(BiasProcess):
+    """Bias drawn anew in every pose, one sigma for all axes: the norm of gravity does not separate the axes."""
+
+    is_spread = True
+    id, sensor, walks = "accel-bias-repeatability", ACCELEROMETER, False
+
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        sigma, error = float((size**2).mean() ** 0.5), float((std**2).mean() ** 0.5)
+        return (EffectParameter("sigma", sigma, error, self.unit),), self.told("scatter", sigma=sigma)
