@@ -21,14 +21,12 @@ from trihedron.records import Recording, Segments
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 AGREEMENT = 30.0
-"""Chi-square by which the common count may fit one sensor worse than its own best count."""
-AGREEMENT_SHARE = 0.01
-"""The same as a share of the chi-square without samples inserted: a large gap is no exact cubic."""
+"""Chi-square by which a smaller count may fit worse than the best: a large gap is no exact cubic."""
 LEAST_GAIN = 40.0
-"""Chi-square that a count must gain: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts."""
+"""Chi-square that a count of a hidden loss must gain: by chance once in 4·10⁹, once in 650 sessions."""
 OVER_USUAL, LEFT_SHARE = 5.0, 0.1
-"""The gain must also be five times the usual chi-square of joins nearby, and the remainder small: no loss is found
-in 48 healthy sessions."""
+"""The gain must be five times the usual chi-square of joins nearby (120 or more), and the remainder small: no loss is
+found in 48 healthy sessions."""
 NARROW = 3
 """Samples on either side that a join uses in quick motion."""
 PLACE_S = 0.01
@@ -119,24 +117,12 @@ def _losses_of(obs: Observations, m: int) -> list[Loss]:
     total = trial.sum(axis=2)
     # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
     best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
-    return [
-        Loss(int(k[s]), m, n, float(gains.sum()))
-        for s, n, costs in zip(suspect, best.tolist(), trial, strict=True)
-        if 0 < n < most and (gains := _gains(costs, n, zero[s], usual[s])) is not None
-    ]
-
-
-def _gains(costs: FloatArray, n: int, zero: FloatArray, usual: FloatArray) -> FloatArray | None:
-    """(sensors,) chi-square that the count ``n`` gains, from the ``costs`` (counts, sensors); ``None`` where a sensor
-    contradicts it."""
-    left = costs[n]
+    left, usual, zero = trial[np.arange(len(best)), best], usual[suspect], zero[suspect]
     gains = zero - left
-    # The gain must also exceed that of a count where the signal is merely rough (vibration, jitter).
-    clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero + 3.0 * usual)
-    # A sensor that does not show the loss must not contradict it; one that shows it must give the same count.
-    silent = ~clear & (left < 2.0 * usual)
-    agree = left - costs.min(axis=0) <= np.maximum(AGREEMENT, AGREEMENT_SHARE * zero)
-    return gains if clear.any() and (clear | silent).all() and agree[clear].all() else None
+    # More than a count gains where the signal is merely rough (vibration, jitter), and no sensor contradicts it.
+    clear = (gains > OVER_USUAL * usual).any(axis=1) & (left < LEFT_SHARE * zero + 3.0 * usual).all(axis=1)
+    found = np.flatnonzero(clear & (best > 0) & (best < most))
+    return [Loss(int(k[suspect[i]]), m, int(best[i]), float(gains[i].sum())) for i in found]
 
 
 def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
