@@ -21,15 +21,13 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_r
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
-from trihedron.probability import NORMAL_95
+from trihedron.probability import LEAST_P, NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, HeldOut
 
 HEADLINE = 0.5
 """Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
 after the effects that explain poses and moves."""
-LEAST_P = 1e-300
-"""Smallest p-value that a double holds with full precision."""
 
 
 @dataclass(frozen=True, eq=False)

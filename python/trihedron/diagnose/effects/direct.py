@@ -10,6 +10,7 @@ from typing import ClassVar
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
 
@@ -44,6 +45,10 @@ class Evidence:
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
     share: float | None = None
     touched: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Keep the p-value where its logarithm exists."""
+        object.__setattr__(self, "p_value", min(max(float(self.p_value), LEAST_P), 1.0))
 
 
 class DirectEffect(Effect):

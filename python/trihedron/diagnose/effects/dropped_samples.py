@@ -179,7 +179,7 @@ class DroppedSamples(DirectEffect):
         )
         gain, weakest = sum(loss.gain for loss in losses), min(loss.gain for loss in losses)
         # A chi-square with one degree of freedom, corrected for all intervals and counts.
-        p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * most_lost(obs), 1e-300, 1.0))
+        p = float(np.exp(-0.5 * weakest)) * n_intervals * most_lost(obs)
         return Evidence(
             p, gain, parameters, told, "timing", where,
             reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),

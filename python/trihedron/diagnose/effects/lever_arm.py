@@ -86,9 +86,7 @@ class LeverArm(DirectEffect):
         )
         told = self.told("arm", arm_m=float(np.linalg.norm(arm)), share=share)
         strength = float(len(moves.target) * np.log(before / after))
-        return Evidence(
-            max(p_value, 1e-300), strength, parameters, told, "dynamics", Where(("ax", "ay", "az")), (held,)
-        )
+        return Evidence(p_value, strength, parameters, told, "dynamics", Where(("ax", "ay", "az")), (held,))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,8 @@ PLACE_S = 0.01
 CUBIC, QUINTIC = 4, 6
 """Coefficients."""
 MOST_IN_A_MOVE = 3
+FEWEST_OF_PARABOLA = 6
+"""Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
 
 @dataclass(frozen=True)
@@ -238,14 +240,28 @@ def with_bridges(values: FloatArray, losses: dict[int, int]) -> FloatArray:
 
 
 def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic through those on either side, as many as half the gap.
+    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side.
 
     The error of the rotation integrated across the gap is of fifth order in its length.
     """
-    w = max(NARROW, n // 2)
-    before, after = values[max(k + 1 - w, 0) : k + 1], values[k + 1 : k + 1 + w]
-    # In gaps from its middle: powers of large numbers lose digits.
-    at = np.concatenate([np.arange(1 - len(before), 1), np.arange(len(after)) + n + 1]) / (n + 1.0) - 0.5
-    inside = np.arange(1, n + 1) / (n + 1.0) - 0.5
-    weights = np.vander(inside, CUBIC) @ np.linalg.pinv(np.vander(at, CUBIC))
-    return np.tensordot(weights, np.concatenate([before, after]), axes=1)
+    if k < 1 or k + 2 >= len(values):
+        return np.repeat(values[k : k + 1], n, axis=0)
+    a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])
+    b, db = _edge(values[k + 1 : k + 2 + max(n // 2, 1)])
+    da = -da
+    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
+    width = n + 1
+    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
+    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
+    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+    return out
+
+
+def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Value and slope at the first of the samples (m, ...), from a parabola where there are enough: the noise of a
+    single step would be multiplied by the length of the gap."""
+    if len(values) < FEWEST_OF_PARABOLA:
+        return values[0], values[1] - values[0]
+    x = np.arange(len(values))
+    slope, value = np.polynomial.polynomial.polyfit(x, values.reshape(len(values), -1), 2)[1::-1]
+    return value.reshape(values.shape[1:]), slope.reshape(values.shape[1:])

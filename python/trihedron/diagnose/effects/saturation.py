@@ -15,7 +15,7 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
 from trihedron.diagnose.session.state import DYNAMICS, MOVES
-from trihedron.probability import MEDIAN_CHI2
+from trihedron.probability import LEAST_P, MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
@@ -27,6 +27,8 @@ CONTRADICTION = 4.0
 """Chi-square per row of the moves at a limit above which their readings are false."""
 FEWEST_OTHERS = 10
 """Rows of other moves from which their median is used: its relative error is then 75 %, against ``CLEARLY`` of 5."""
+ONE_CODE = 1e-30
+"""Chance that a part without a limit repeats one code at the end of its range."""
 ABOVE_REST = 1.2
 """Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
@@ -60,8 +62,8 @@ class _Saturation(DirectEffect):
         # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
         # undisturbed moves disagree so much more than the others.
         p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
-        p = float(np.clip(p * float(chdtrc(n_rows, misfit * n_rows / max(usual, 1.0))), 1e-300, 1.0))
-        p = min(p, 1e-30) if is_rail else p
+        p = max(min(p, 1.0) * float(chdtrc(n_rows, misfit * n_rows / max(usual, 1.0))), LEAST_P)
+        p = min(p, ONE_CODE) if is_rail else p
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), times), reweigh=lambda old: old.without_moves(touched),

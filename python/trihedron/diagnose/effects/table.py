@@ -123,7 +123,7 @@ class TableTilt(TableEffect):
         if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * scatter:
             return None
         return Evidence(
-            max(p, 1e-300), chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
+            p, chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
             self.told("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip
 
@@ -155,7 +155,7 @@ class TurnAngleError(TableEffect):
         t = context.obs.time_s
         spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
         return Evidence(
-            max(p, 1e-300), chi2, parameters,
+            p, chi2, parameters,
             self.told(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),

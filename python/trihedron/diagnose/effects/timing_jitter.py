@@ -101,7 +101,7 @@ class TimingJitter(DirectEffect):
         if z < SURE or jitter < ORDINARY * step_s:
             return None
         return Evidence(
-            float(max(ndtr(-z), 1e-300)), float(z**2),
+            float(ndtr(-z)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
             self.told("samples", jitter_s=jitter), "timing", reweigh=lambda obs: replace(obs, jitter_s=jitter),
         )  # fmt: skip

@@ -14,6 +14,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import LEAST_P
 from trihedron.records.domains import DomainTest, Where
 
 MIN_LINE_SHARE = 0.03
@@ -60,7 +61,7 @@ class Line:
     @property
     def share(self) -> float:
         """Variance of the line over that of the static readings."""
-        return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
+        return 0.5 * self.amplitude**2 / self.rms_before**2 if self.rms_before > 0.0 else 0.0
 
     @property
     def has_size(self) -> bool:
@@ -196,8 +197,8 @@ def _refine(
     rest = ~early
     left = x[rest] - _basis(t[rest], best_f) @ _sinusoid(t[early], x[early], best_f)
     before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean(left**2)))
-    frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / max(amplitude, 1e-300) / np.sqrt(2.0))
-    return Line(c, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300), noise, before, after)
+    frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / amplitude / np.sqrt(2.0))
+    return Line(c, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, LEAST_P), noise, before, after)
 
 
 def _wandering(
@@ -229,7 +230,7 @@ def _wandering(
     before, after = np.sqrt(sums / max(n, 1))
     sigma = noise * float(np.sqrt(2.0 / lengths.sum()))
     of_frequency = float(resolution / max(np.sqrt(lengths.sum() / lengths.mean()), 1.0))
-    found = (amplitude, sigma, max(p, 1e-300), noise, float(before), float(after))
+    found = (amplitude, sigma, max(p, LEAST_P), noise, float(before), float(after))
     return Line(c, f, of_frequency, resolution, *found)
 
 

@@ -20,6 +20,7 @@ from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, slow_change,
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.probability import LEAST_P
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
@@ -223,7 +224,7 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
               "pose": side.pieces.pose.tolist(), "unit": unit, "temperature_degc": heat.tolist()}  # fmt: skip
     return AcceptedEffect(
         id=effect_id, statement=statement, parameters=tuple(parameters),
-        p_adjusted=float(min(1.0, max(curve.p_value, 1e-300) * n_effects)), delta_bic=curve.score,
+        p_adjusted=float(min(1.0, max(curve.p_value, LEAST_P) * n_effects)), delta_bic=curve.score,
         held_out=(held,), confounded_with=("accel-thermal-scale",) if is_accelerometer else (),
         separating_experiment=experiment_for(effect_id, at_rest=True) if is_accelerometer else "",
         model=_model("rest-curve", series),
@@ -246,13 +247,13 @@ def _drift(side: _Side) -> tuple[DriftCurve | None, float, bool]:
     if not found.is_slow:
         return None, found.p_value, False
     curve = found.curve(range(side.pieces.n_poses), side.pieces.time_s[::2])
-    return curve, max(found.p_value, 1e-300), found.is_smooth
+    return curve, max(found.p_value, LEAST_P), found.is_smooth
 
 
 def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> AcceptedEffect:
     size, spans = side.size, curve.range * side.size
     errors = [float(np.hypot(s[v.argmax()], s[v.argmin()])) for v, s in zip(curve.values, curve.sigma, strict=True)]
-    whole = max(float(side.biases.var(axis=0).sum()), 1e-300)
+    whole = float(side.biases.var(axis=0).sum())
     series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
               "sigma": (curve.sigma * size[:, None]).tolist(), "unit": side.unit}  # fmt: skip
     parameters = [
@@ -291,6 +292,6 @@ def _lines(
         return test, None
     return test, AcceptedEffect(
         id=effect.id, statement=found.statement, parameters=found.parameters,
-        p_adjusted=float(min(1.0, max(found.p_value, 1e-300) * len(catalogue()))), delta_bic=found.strength,
+        p_adjusted=float(min(1.0, found.p_value * len(catalogue()))), delta_bic=found.strength,
         held_out=found.held_out, model=_model("", {}), share=found.share,
     )  # fmt: skip

@@ -88,8 +88,7 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
         rough = np.array([np.nanvar(np.diff(values[a : a + 2 * half], axis=0), axis=0) / 2.0 for a in starts])
         step = _at_least(np.zeros(3), known) ** 2
         quiet = np.maximum(np.nanquantile(rough, QUIET_QUANTILE, axis=0), step)
-        limit = LOUD * np.maximum(quiet, 1e-300)
-        loud |= ~(rough <= limit).all(axis=1)
+        loud |= ~(rough <= LOUD * quiet).all(axis=1)
         noise.append(np.sqrt(np.maximum(np.nanmedian(rough[~loud], axis=0), quiet) if (~loud).any() else quiet))
     means = [np.array([[np.nanmean(v[a + k * half : a + (k + 1) * half], axis=0) for k in (0, 1)] for a in starts])
              for v in sides]  # fmt: skip
