@@ -141,11 +141,10 @@ def _orientations(force: FloatArray) -> IntArray:
     found = 0
     while (out < 0).any():
         free = np.flatnonzero(out < 0)
-        near = np.arccos(np.clip(up[free] @ up[free].T, -1.0, 1.0)) < SAME_POSE_RAD
-        members = free[near[near.sum(axis=1).argmax()]]
-        # A drifting bias widens an orientation: select once more about the mean of the members found.
-        centre = up[members].mean(axis=0)
-        members = free[np.arccos(np.clip(up[free] @ (centre / np.linalg.norm(centre)), -1.0, 1.0)) < SAME_POSE_RAD]
+        near = up[free] @ up[free].T > np.cos(SAME_POSE_RAD)
+        # A drifting bias widens an orientation: it is selected about the mean of the largest group.
+        centre = up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)
+        members = free[up[free] @ (centre / np.linalg.norm(centre)) > np.cos(SAME_POSE_RAD)]
         if len(members) < max(LEAST_SHARE * len(up), FEWEST_OF_POSE):
             break
         out[members] = found
