@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
@@ -62,7 +62,3 @@ class DirectEffect(Effect):
     @abstractmethod
     def find(self, context: Context) -> Evidence | None:
         """The evidence for the effect in this recording, or ``None``."""
-
-    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        """No columns: a direct effect takes no part in the search unless it overrides this."""
-        return []

@@ -183,8 +183,8 @@ def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
         root = np.sqrt(weight)[:, None, None]
         columns, target = (root * (white @ one.reshape(m, n_shapes, -1)) for one in (moves.columns, moves.target))
         # Rotations about the vertical alone do not determine the delay; the shortest solution has none then.
-        value = np.linalg.lstsq(columns.reshape(-1, N_ARM + 1), target.ravel(), rcond=None)[0]
-        by = _Weighed(value, white, weight / weight.mean())
+        value, *_ = np.linalg.lstsq(columns.reshape(-1, N_ARM + 1), target.ravel(), rcond=None)
+        by = _Weighed(np.asarray(value, np.float64), white, weight / weight.mean())
     return by
 
 

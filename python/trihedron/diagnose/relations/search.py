@@ -27,9 +27,6 @@ class Empirical(Effect):
 
     id = ""
 
-    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        return []
-
 
 EMPIRICAL = Empirical()
 

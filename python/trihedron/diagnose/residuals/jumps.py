@@ -64,8 +64,9 @@ def _of_several(p_values: FloatArray) -> float:
 def _steps(poses: list[FloatArray]) -> FloatArray:
     """(poses, places, axes) size of a step at every place of a pose beside a smooth curve, in the noise of steps."""
     blocks = []
-    for values in poses:
-        parts = [np.nanmean(part, axis=0) for part in np.array_split(values, N_BLOCKS)]
+    for readings in poses:
+        values = readings[np.isfinite(readings).all(axis=1)]
+        parts = [part.mean(axis=0) for part in np.array_split(values, N_BLOCKS)]
         blocks.append(np.sqrt(len(values)) * np.array(parts))  # white noise is alike in poses of any length
     curve, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, N_BLOCKS), SMOOTH + 1))
     x = (np.eye(N_BLOCKS) - curve @ curve.T) @ np.array(blocks)

@@ -170,5 +170,5 @@ def _table(of: _Directions, tau: float) -> _Table:
     a = np.hstack([np.ones(fades.shape) / of.error, np.zeros((len(fades), len(CONTRASTS)))])
     b = np.hstack([fades / of.error, tau * (1.0 - fades) @ CONTRASTS.T / of.tilt])
     pairs = ((a, a), (a, b), (b, b), (a, of.y), (b, of.y), (of.y, of.y))
-    unit = float(np.median(of.error)) / math.sqrt(N_BLOCKS)
-    return _Table(*((one * other).sum(axis=1) for one, other in pairs), of.axes, unit)
+    aa, ab, bb, ay, by, yy = ((one * other).sum(axis=1) for one, other in pairs)
+    return _Table(aa, ab, bb, ay, by, yy, of.axes, float(np.median(of.error)) / math.sqrt(N_BLOCKS))

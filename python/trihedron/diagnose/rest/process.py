@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -188,7 +189,7 @@ def maximum(
     bounds = [(0.0, np.inf) if k == NOISE else (-np.inf, most) for k in live]
     start = np.log(best[live])
     corners = np.vstack([start, start + FIRST_STEP * np.eye(len(start))])
-    options = {"initial_simplex": corners, "fatol": ENOUGH, "xatol": ENOUGH}
+    options: Any = {"initial_simplex": corners, "fatol": ENOUGH, "xatol": ENOUGH}
     found = minimize(loss, start, method="Nelder-Mead", bounds=bounds, options=options)
     best[live] = np.exp(found.x)
     return -float(found.fun), best
