@@ -8,7 +8,7 @@ import numpy.typing as npt
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
+from trihedron.diagnose.residuals.within_poses import loud_poses
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.state import STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
@@ -59,10 +59,7 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
 
 def _restless(obs: Observations) -> list[int]:
     """Poses that vibrate."""
-    scatter = pose_scatter(obs)
-    own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
-    found: list[int] = np.flatnonzero(loud.any(axis=1)).tolist()
+    found: list[int] = np.flatnonzero((loud_poses(obs) < SHAKES_P).any(axis=1)).tolist()
     return found if len(found) <= MOST * obs.n_poses else []
 
 

@@ -272,14 +272,22 @@ def pose_scatter(obs: Observations) -> PoseScatter:
     return PoseScatter(relative, freedom, np.asarray(chdtrc(freedom[:, None], freedom[:, None] * relative)))
 
 
+def loud_poses(obs: Observations) -> FloatArray:
+    """(poses, channels) p-values of poses that are louder than usual, times the number of looks; 1 for the others.
+
+    A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
+    """
+    scatter = pose_scatter(obs)
+    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
+    is_loud = steady[:, None] & (scatter.ratio > LOUD)
+    return np.where(is_loud, np.minimum(scatter.p_value * scatter.p_value.size, 1.0), 1.0)
+
+
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, corrected for the number of tests."""
-    scatter = pose_scatter(obs)
-    n_looks = scatter.p_value.size
-    # A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
+    scatter, loud = pose_scatter(obs), loud_poses(obs)
+    p_scatter = float(loud.min(initial=1.0))
     steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
-    p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
@@ -289,11 +297,11 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
-        poses = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
+        poses = np.flatnonzero(loud.min(axis=1) < alpha)[:8]
         t = obs.time_s
         spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in poses)
         strong = [line for line in lines if line.p_value < alpha]
-        loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
+        loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
         where = Where(channels, obs.pose_names(poses), spans, tuple(line.frequency_hz for line in strong))
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")
