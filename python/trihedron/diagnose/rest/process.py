@@ -24,6 +24,8 @@ SCATTER, WALK, DRIFT, NOISE = range(4)
 STRENGTHS = (SCATTER, WALK, DRIFT)
 LEVELS = 6
 """Levels of each σ on the grid besides 0, a factor of 2.5 to 4 apart; the best is refined."""
+LEAST_LEVEL = 1e-3
+"""Least σ over the largest: what a strength adds to the scatter of the readings is then a millionth of it."""
 NOISE_LEVELS = (1.0, 2.0, 4.0, 8.0)
 """φ on the grid: a low-pass filter of an eighth of the bandwidth hides as much from the differences of neighbours."""
 AROUND = np.array([0.4, 0.65, 1.0, 1.5, 2.5])
@@ -55,7 +57,8 @@ class BiasReadings:
     def levels(self) -> FloatArray:
         """(LEVELS,) σ of the grid besides 0: from a fifth of the means' error to twice the total scatter."""
         own, spread = float(np.median(self.sigma)), float(np.mean(self.values.std(axis=1)))
-        return np.geomspace(0.2 * own, max(2.0 * spread, 3.0 * own), LEVELS)
+        most = max(2.0 * spread, 3.0 * own)
+        return np.geomspace(max(0.2 * own, LEAST_LEVEL * most), most, LEVELS)
 
 
 @dataclass(frozen=True, eq=False)
