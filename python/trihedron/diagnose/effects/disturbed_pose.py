@@ -40,8 +40,9 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     rate = obs.recording.rate_hz
     a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
     block = max(int(BLOCK_S * rate), 2)
-    beside = max(int(0.5 * rate) // block, 2)
-    first, last = max(a - beside * block, 0), min(b + beside * block, len(obs.time_s))
+    side = max(int(0.5 * rate), 5)
+    beside = max(side // block, 2)
+    first, last = max(a - side, 0), min(b + side, len(obs.time_s))
     n = (last - first) // block
     if n < FEWEST_BLOCKS:
         return None

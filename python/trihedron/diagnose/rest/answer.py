@@ -16,7 +16,7 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, slow_change, thermal_curve
+from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
@@ -204,16 +204,20 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         for k, axis in enumerate(AXES)
     ]
     raw, rest = side.biases, curve.rest * size
-    half_gap = dict(zip(curve.names, curve.value.T, strict=True)).get("half_gap")
+    gap = branch_gap(side.pieces, rest)
+    if gap is not None:
+        parameters += [
+            EffectParameter(f"branch_difference_{axis}", float(g), float(s), unit)
+            for axis, g, s in zip(AXES, *gap, strict=True)
+        ]
     effect_id, is_accelerometer = side.id("thermal-bias"), side.sensor == ACCELEROMETER
     order, heat = sum(name in POWERS for name in curve.names), side.pieces.temperature
     assert heat is not None
     statement = effect_words(
         effect_id, side.case, low_degc=float(heat.min()), high_degc=float(heat.max()), is_straight=order == 1,
-        is_parabola=order == 2, has_rate="bias_per_kelvin_per_s" in curve.names, has_branches=half_gap is not None,
-        swing=curve.swing * size, left=rest.std(axis=0), raw=raw.std(axis=0),
-        gap=() if half_gap is None else 2.0 * half_gap * size,
-        is_one_pose=is_accelerometer and side.pieces.n_poses == 1,
+        is_parabola=order == 2, has_rate="bias_per_kelvin_per_s" in curve.names, has_branches="half_gap" in curve.names,
+        swing=curve.swing * size, left=rest.std(axis=0), raw=raw.std(axis=0), has_gap=gap is not None,
+        gap=() if gap is None else gap[0], is_one_pose=is_accelerometer and side.pieces.n_poses == 1,
     )  # fmt: skip
     mean_size = float(np.sqrt(np.mean(size**2)))
     before, after = curve.held_out

@@ -93,6 +93,8 @@ LEAST_SWING_K = 0.5
 MIN_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence, as among poses."""
 FOLDS = 12
+TEMPERATURE_BINS, FEWEST_BINS = 12, 3
+"""Bins of temperature, and the least number passed both while heating and cooling for a difference of branches."""
 POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
 """Terms that are powers of the temperature."""
 
@@ -177,3 +179,23 @@ def _held_out(values: FloatArray, X: FloatArray) -> tuple[float, float]:
         out = fold == f
         missed[out] -= X[out] @ np.linalg.lstsq(X[~out], values[~out], rcond=None)[0]
     return float(np.sqrt(np.mean(values**2))), float(np.sqrt(np.mean(missed**2)))
+
+
+def branch_gap(pieces: RestPieces, rest: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """(3,) mean difference of the residuals between heating and cooling at one temperature, and its standard error.
+
+    ``rest`` (n, 3); the error is that of a mean over temperature bins. ``None`` where too few bins were passed both
+    ways. Hysteresis and drift in time both cause it.
+    """
+    heat, speed = pieces.temperature, pieces.temperature_rate
+    assert heat is not None
+    assert speed is not None
+    place = np.digitize(heat, np.linspace(heat.min(), heat.max(), TEMPERATURE_BINS + 1)[1:-1])
+    gaps = []
+    for k in range(TEMPERATURE_BINS):
+        up, down = (place == k) & (speed > BRANCH_K_S), (place == k) & (speed < -BRANCH_K_S)
+        if up.sum() >= 2 and down.sum() >= 2:
+            gaps.append(rest[up].mean(axis=0) - rest[down].mean(axis=0))
+    if len(gaps) < FEWEST_BINS:
+        return None
+    return np.mean(gaps, axis=0), np.std(gaps, axis=0, ddof=1) / np.sqrt(len(gaps))

@@ -55,9 +55,9 @@ class BiasReadings:
 
     @cached_property
     def levels(self) -> FloatArray:
-        """(LEVELS,) σ of the grid besides 0: from a fifth of the means' error to twice the total scatter."""
+        """(LEVELS,) σ of the grid besides 0: from a fifth of the means' error to six times the total scatter."""
         own, spread = float(np.median(self.sigma)), float(np.mean(self.values.std(axis=1)))
-        most = max(2.0 * spread, 3.0 * own)
+        most = max(6.0 * spread, 3.0 * own)
         return np.geomspace(max(0.2 * own, LEAST_LEVEL * most), most, LEVELS)
 
 

@@ -66,7 +66,7 @@ def _thermal(sensor: str, unit: str) -> str:
         "{is_straight:?a straight line|{is_parabola:?a parabola|a curve of third order}}"
         "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it changes by "
         f"{swing} (X, Y, Z); {left} rms remain of {raw}."
-        f"{{has_branches:? At one temperature heating and cooling differ by {gap}: hysteresis or drift in time; "
+        f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis or drift in time; "
         "one cycle does not separate them.|}{is_one_pose:? One orientation does not separate bias, scale and a tilt of "
         "the fixture.|}"
     )
