@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_poses import loud_poses
-from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import STATIC_ACCEL
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
+from trihedron.diagnose.session.state import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
+
+
+MIN_GAIN = 15.0
+"""Held-out chi-square that cutting the disturbances must gain in one domain; the largest share that may remain."""
+MUST_FALL = 0.9
 OWN_SIGMA = 4.0
 """Deviation of a pose's own readings, in sigma, from which a disturbance of it is considered."""
 BUMP_SIGMA = 7.0
 """Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
-BLOCK_S, FEWEST_BLOCKS = 0.1, 4
-"""s: a touch takes as long; blocks that a pose must have: two on either side determine the line."""
+FEWEST_BLOCKS = 4
+"""Blocks of 0.1 s that a pose must have: two on either side determine the line."""
 SHAKES_P = 1e-6
 """p-value of a pose's variance, corrected for the number of poses and channels, below which the pose vibrates: 48
 healthy sessions stay above 0.02, and real noise is not as white."""
+IN_EITHER_HALF = 0.5
+"""Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
 MOST_NAMED = 4
 """Poses of each kind that the sentence names."""
 LEAST_DOF = 0.1
@@ -35,33 +46,80 @@ LEAST_DOF = 0.1
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     """Deviation of the readings in ``span`` [s] from the straight line through the readings before and after it.
 
-    Chi-square per block and channel inside and outside the span; ``None`` below 7 sigma or with too few blocks.
+    Chi-square per 0.1 s block and channel inside and outside the span; ``None`` below 7 sigma or with too few blocks.
     """
     rate = obs.recording.rate_hz
     a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
-    block = max(int(BLOCK_S * rate), 2)
     side = max(int(0.5 * rate), 5)
-    beside = max(side // block, 2)
+    block = max(int(0.1 * rate), 2)
     first, last = max(a - side, 0), min(b + side, len(obs.time_s))
     n = (last - first) // block
     if n < FEWEST_BLOCKS:
         return None
     k = np.arange(n)
-    outer = (k < beside) | (k >= n - beside)
-    values = np.hstack(obs.whitened)[first : first + n * block]
-    means = values.reshape(n, block, -1).mean(axis=1)
-    line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
-    away = (means - (line[0] + np.outer(k, line[1]))) * np.sqrt(block)
-    inside, outside = (float(np.mean(away[rows] ** 2)) for rows in ((k if outer.all() else ~outer), outer))
-    if inside <= outside or np.abs(away).max() <= BUMP_SIGMA:
+    outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
+    inside, outside = [], []
+    for values in obs.whitened:
+        means = values[first : first + n * block].reshape(n, block, 3).mean(axis=1)
+        line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
+        away = (means - (line[0] + np.outer(k, line[1]))) * np.sqrt(block)
+        inside.append(away)
+        outside.append(away[outer])
+    worst = np.sort(np.abs(np.hstack(inside)).max(axis=1))[::-1]
+    if worst[0] <= BUMP_SIGMA:
         return None
-    return HeldOut("within-static", inside, outside, float(np.sqrt(inside)), float(np.sqrt(outside)), "sigma")
+    middle = np.hstack(inside)[~outer] if (~outer).any() else np.hstack(inside)
+    before, after = float(np.mean(middle**2)), float(np.mean(np.hstack(outside) ** 2))
+    return HeldOut("within-static", before, after, float(np.sqrt(before)), float(np.sqrt(after)), "sigma")
 
 
-def _restless(obs: Observations) -> list[int]:
-    """Poses that vibrate."""
-    found: list[int] = np.flatnonzero((loud_poses(obs) < SHAKES_P).any(axis=1)).tolist()
-    return found if len(found) <= MOST * obs.n_poses else []
+def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
+    """Held-out prediction with whole poses against poses cut at their disturbances; empty if cutting does not help."""
+    obs, state = context.obs, context.fitted.state
+    if len(state.effect):
+        return ()
+    whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
+    force = whole.pose_force @ state.accel_S.T + state.accel_b
+    n = whole.n_poses
+    start = replace(
+        state,
+        up=force / np.linalg.norm(force, axis=1, keepdims=True),
+        gyro_bias=np.zeros((n, 3)) if whole.pose_rate is None else whole.pose_rate @ state.gyro_S.T,
+        accel_bias=np.zeros((n, 3)),
+    )
+    fits = (fit(whole, start, NO_DISTORTION, context.fitted.prior), context.fitted)
+    before, after = (predict_held_out(one, folds_of(one)) for one in fits)
+    gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
+    if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
+        return ()
+    rms_before, unit = physical_rms(fits[0], before.residual)
+    rms_after, _ = physical_rms(fits[1], after.residual)
+    return tuple(
+        HeldOut(ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), rms_before[d], rms_after[d], unit[d])
+        for d in np.argsort(-gain)
+        if d in rms_before and d in rms_after
+    )
+
+
+def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
+    """Poses that vibrate throughout, and how the level of one half predicts the other half, against the usual level."""
+    scatter = pose_scatter(obs)
+    own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
+    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
+    x = obs.readings
+    found, before, after = [], [], []
+    for i in np.flatnonzero(loud.any(axis=1)):
+        pose = obs.segments.poses[i]
+        steps = np.diff(x[pose.start : pose.stop][:, loud[i]], axis=0)
+        early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
+        usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
+        if (np.minimum(early, late) > IN_EITHER_HALF * LOUD * usual).any():
+            found.append(int(i))
+            before.append(float(np.mean(late / usual)))
+            after.append(float(np.mean(late / early)))
+    if not found:
+        return [], None
+    return found, HeldOut("within-static", float(np.mean(before)), float(np.mean(after)), 0.0, 0.0, "")
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
@@ -92,12 +150,20 @@ class DisturbedPose(DirectEffect):
     is_local = True
 
     def find(self, context: Context) -> Evidence | None:
-        obs, restless = context.obs, _restless(context.obs)
-        bumps = {span: bump for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None}
+        obs = context.obs
+        seen = [(span, bump) for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None]
+        bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
         bumped = list(bumps)
+        held = _gained_by_cutting(context) if bumped else ()
+        if bumped:
+            held = (*held, max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before))
+        restless, predicted = _restless(obs)
+        if len(restless) > MOST * obs.n_poses:
+            restless = []
+        if restless and predicted is not None:
+            held = (*held, predicted)
         if not bumped and not restless:
             return None
-        held = (max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before),) if bumps else ()
         t = obs.time_s
         poses = obs.segments.poses
         spans = tuple(bumped) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
