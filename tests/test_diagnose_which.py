@@ -6,7 +6,7 @@ import pytest
 
 import trihedron
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.effects.quantisation import before_adc
+from trihedron.diagnose.effects.quantisation import before_adc, missing_codes
 
 MISSING = (1.0, False)
 """Samples lost without a trace in the timestamps, in motion too quick for a smooth join across the gap."""
@@ -38,8 +38,11 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     step, noise, zero = 0.02, 0.2, 0.31
     poses = [step * np.round(zero + noise * rng.normal(size=400)) for _ in range(20)]
     assert len(np.unique(np.concatenate(poses))) == 2
+    assert missing_codes(poses, float(np.concatenate(poses).std()), step) == 0
     sigma, _, _ = before_adc(poses, step)
     assert sigma == pytest.approx(noise, rel=0.15)  # one level of its grid is 12 %
+    # One code shows no grid.
+    assert missing_codes([np.zeros(100)] * 5, 0.0, 0.02) is None
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp, ndtr, softmax
+from scipy.special import ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import ACCELEROMETER, SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
@@ -18,14 +17,26 @@ from trihedron.records.domains import Where
 
 COARSE = 0.45
 """Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
+MISSED = 25.0
+"""Expected readings of an empty code from which it counts as missing: by chance once in 10¹¹."""
 SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
-"""Noise tried, in LSB: below it one code is read, above it the scatter is the noise; 13 % apart."""
-OFFSETS = np.linspace(-0.75, 0.75, 61)
-"""Mean before the ADC about that of the codes, in LSB: rounding moves it by half of one."""
-LEAST_SHARE = 1e-15
-"""Least share of a code: rounding errors of the normal distribution."""
-LEAST_LEFT = 0.01
-"""Least share of a mean's variance that remains once its codes are resolved."""
+"""Values tried for the noise before the ADC, in LSB."""
+MOST_CODES = 0.2
+"""Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
+FEWEST_CODES = 2
+"""Codes that show an LSB: static readings of a coarse ADC may take only two."""
+REACHES = 0.5
+"""Noise, in LSB, at which a third of the readings leave their code, so that neighbouring codes are expected."""
+MOSTLY = 0.5
+"""Share of the static readings on one code from which a dead zone around it is tested."""
+ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
+"""A dead zone is wider, in LSB, than the gap that two missing codes leave; readings required in the outer half of twice
+its width: evenly spread readings would all lie there by chance once in 2²⁰."""
+FEWEST_READINGS = 4
+"""Readings of a pose from which its codes determine a scatter."""
+NOISE_ENOUGH = 0.75
+"""Scatter, in LSB, at which averaging resolves the LSB: without the rounding variance of 1/12 it is a noise of 0.69,
+and the staircase of the mean is exp(-2π²·0.69²)/π = 3·10⁻⁵ LSB. Around a missing code steps are twice as wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +44,8 @@ class Lattice:
     """The LSB of one channel: ``step`` in raw units, noise before the ADC, and corrections of the pose means.
 
     ``sigma`` that noise and ``scatter`` the scatter of the readings, raw units; ``mean_shift`` (poses,) posterior mean
-    minus plain mean and ``mean_sigma`` (poses,) its uncertainty, raw units.
+    minus plain mean and ``mean_sigma`` (poses,) its uncertainty, raw units; ``missing`` number of codes skipped between
+    visited ones; ``dead`` half-width of the zone around one code without any reading, raw units.
     """
 
     channel: int
@@ -42,6 +54,29 @@ class Lattice:
     scatter: float
     mean_shift: FloatArray
     mean_sigma: FloatArray
+    missing: int
+    dead: float
+
+
+def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | None:
+    """Number of codes skipped between visited ones, or ``None`` where the poses show no LSB."""
+    values = np.concatenate(poses)
+    codes = np.unique(values)
+    if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
+        return None
+    # A code is missing where a pose's own readings lie on both sides of it: noise is unimodal, so at least the
+    # geometric mean of its neighbours' counts is expected there.
+    expected: dict[int, float] = {}
+    # Gap by gap: over hundreds of codes a relative error of 0.1 % of the step would add up to a whole code.
+    place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(int)
+    visited = set(place.tolist())
+    for one in poses if sigma > REACHES * step else []:
+        own, seen = np.unique(place[np.searchsorted(codes, one)], return_counts=True)
+        count = dict(zip(own.tolist(), seen.tolist(), strict=True))
+        for k in own.tolist():
+            if k + 1 not in visited and k + 2 in count:
+                expected[k + 1] = expected.get(k + 1, 0.0) + float(np.sqrt(count[k] * count[k + 2]))
+    return sum(value > MISSED for value in expected.values())
 
 
 def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
@@ -52,17 +87,46 @@ def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray,
 
     Returns sigma in LSB, and per pose the posterior mean minus the plain mean and the posterior sigma, in LSB.
     """
-    logs, sigma = [], SIGMA_GRID[:, None, None]
+    offsets = np.linspace(-0.75, 0.75, 61)
+    tables = []
     for values in poses:
-        codes, counts = np.unique(np.round((values - values.min()) / step), return_counts=True)
-        mean = np.average(codes, weights=counts) + OFFSETS[:, None]
-        share = ndtr((codes + 0.5 - mean) / sigma) - ndtr((codes - 0.5 - mean) / sigma)
-        logs.append(np.log(np.maximum(share, LEAST_SHARE)) @ counts)
-    likelihood = np.array(logs)  # (poses, sigmas, offsets)
-    best = int(logsumexp(likelihood, axis=2).sum(axis=0).argmax())
-    weight = softmax(likelihood[:, best], axis=1)
-    shift = weight @ OFFSETS
-    return float(SIGMA_GRID[best]), shift, np.sqrt(np.maximum(weight @ OFFSETS**2 - shift**2, 0.0))
+        k = np.round((values - values.min()) / step)
+        codes, counts = np.unique(k, return_counts=True)
+        tables.append((codes, counts, float(k.mean())))
+    evidence = np.zeros(len(SIGMA_GRID))
+    logs = []
+    for j, sigma in enumerate(SIGMA_GRID):
+        rows = []
+        for codes, counts, mean in tables:
+            m = mean + offsets
+            upper = ndtr((codes + 0.5 - m[:, None]) / sigma)
+            lower = ndtr((codes - 0.5 - m[:, None]) / sigma)
+            rows.append(np.log(np.maximum(upper - lower, 1e-15)) @ counts)
+        log_likelihood = np.array(rows)
+        top = log_likelihood.max(axis=1, keepdims=True)
+        evidence[j] = float((top[:, 0] + np.log(np.exp(log_likelihood - top).mean(axis=1))).sum())
+        logs.append(log_likelihood - top)
+    best = int(evidence.argmax())
+    weight = np.exp(logs[best])
+    weight /= weight.sum(axis=1, keepdims=True)
+    shift = weight @ offsets
+    spread = np.sqrt(np.maximum(weight @ offsets**2 - shift**2, 0.0))
+    return float(SIGMA_GRID[best]), shift, spread
+
+
+def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
+    """Half-width of a zone around the commonest static code that no reading of the recording enters, or 0."""
+    codes, counts = np.unique(values, return_counts=True)
+    zero = float(codes[counts.argmax()])
+    if counts.max() < MOSTLY * len(values):
+        return 0.0
+    away = np.abs(everything[everything != zero] - zero)
+    if len(np.unique(away)) < 3:
+        return 0.0
+    nearest = float(away.min())
+    # Readings just outside must be common: few readings may miss a zone by chance.
+    beyond = int((away < 2.0 * nearest).sum())
+    return nearest if nearest > ZONE_STEPS * step and beyond >= JUST_OUTSIDE else 0.0
 
 
 class Quantisation(DirectEffect):
@@ -86,7 +150,10 @@ class Quantisation(DirectEffect):
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
         grid = worst.step**2 / 12.0  # variance of the staircase; that of the noise before the ADC is added below
         names = tuple(CHANNELS[one.channel] for one in found)
-        told = self.told("steps", channels=names, step=worst.step, times=worst.step / worst.sigma)
+        told = self.told(
+            "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
+            times=worst.step / worst.sigma,
+        )  # fmt: skip
         return Evidence(
             0.0, strength, _parameters(context, found), told, "within-static", Where(names),
             reweigh=reweigh, share=grid / (grid + worst.sigma**2),
@@ -99,27 +166,59 @@ class Quantisation(DirectEffect):
         x = np.round(raw[:, c % 3], 9)
         poses = [x[pose.samples()] for pose in obs.segments.poses]
         poses = [values[np.isfinite(values)] for values in poses]
-        if not all(map(len, poses)):
+        if min(len(values) for values in poses) < FEWEST_READINGS:
             return None
+        still = np.concatenate(poses)
         scatter = float(np.sqrt(np.median([np.var(values) for values in poses])))
+        moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
         step = float(obs.recording.facts.steps[c])
-        if scatter >= step:  # averaging resolves the LSB
+        missing = missing_codes(poses, scatter, step)
+        if missing is None:
+            dead = dead_zone(still, moving[np.isfinite(moving)], step)
+            if not dead:
+                return None
+            size = np.full(len(poses), dead / np.sqrt(3.0))  # anywhere inside the zone
+            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, 0, dead)
+        if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
             return None
         sigma, shift, spread = before_adc(poses, step)
-        return Lattice(c, step, sigma * step, scatter, shift * step, spread * step) if sigma <= COARSE else None
+        if missing and scatter < 2.0 * NOISE_ENOUGH * step:
+            return Lattice(
+                c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(poses), 0.25 * step), missing, 0.0
+            )
+        if sigma > COARSE:
+            return None
+        return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)
 
 
 def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter, ...]:
-    """LSB of every channel in SI: exact in raw units, it has the relative uncertainty of the scale factor."""
-    state, variance, out = context.fitted.state, np.diag(context.fitted.covariance()), []
+    """LSB in SI, number of missing codes, half-width of dead zones."""
+    parameters = []
     for one in found:
-        sensor, k = divmod(one.channel, 3)
-        # S is lower triangular for the accelerometer.
-        place, S = ((0, 2, 5)[k], state.accel_S) if sensor == ACCELEROMETER else (9 + 4 * k, state.gyro_S)
-        lsb = one.step * float(context.si_per_raw(sensor)[k])
-        sigma = lsb * float(np.sqrt(max(variance[place], 0.0)) / abs(S[k, k]))
-        out.append(EffectParameter(f"lsb_{CHANNELS[one.channel]}", lsb, sigma, SENSORS[sensor].unit))
-    return tuple(out)
+        scale, relative = _scale_of(context, one.channel)
+        unit = "m/s^2" if one.channel < 3 else "rad/s"
+        name = CHANNELS[one.channel]
+        # The LSB is exact in raw units; in SI it has the relative uncertainty of the scale factor.
+        sigma = max(relative, 1e-6) * one.step * scale
+        parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, sigma, unit))
+        if one.missing:
+            parameters.append(EffectParameter(f"missing_codes_{name}", float(one.missing), 0.0, "1"))
+        if one.dead:
+            parameters.append(EffectParameter(f"dead_band_{name}", one.dead * scale, one.step * scale, unit))
+    return tuple(parameters)
+
+
+def _scale_of(context: Context, channel: int) -> tuple[float, float]:
+    """SI per raw unit along one channel's axis, and its relative standard uncertainty."""
+    is_accel, k = channel < 3, channel % 3
+    S = context.fitted.state.accel_S if is_accel else context.fitted.state.gyro_S
+    place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
+    sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
+    return float(context.si_per_raw(channel // 3)[k]), sigma / abs(float(S[k, k]))
+
+
+LEAST_LEFT = 0.01
+"""Least share of a mean's variance that remains once its codes are resolved."""
 
 
 def _resolved(obs: Observations, one: Lattice) -> Observations:

@@ -195,8 +195,9 @@ SESSION = {
         "the resolution (LSB) is too coarse for the noise: means of poses are quantised",
         "choose a finer range, or add a little motion or noise (dither) while averaging",
         {
-            "steps": "Readings of {channels:&, } have a resolution of {step:.4g} raw units (LSB), {times:.2g} times "
-            "their noise: averaging does not resolve less."
+            "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of zero|have "
+            "a resolution of {step:.4g} raw units (LSB), {times:.2g} times their noise}: averaging does not "
+            "resolve less."
         },
     ),
     "periodic-interference": EffectWords(
@@ -214,6 +215,8 @@ SESSION = {
         "samples were not taken at their timestamps",
         "let the sensor's own clock trigger the sampling, or log its data-ready times",
         {
+            "timestamps": "The timestamps scatter by {rms_s:.2g ms} about an even clock, the readings do not "
+            "(share that follows {followed:.2f} ± {sigma:.1g}): the samples were taken evenly.",
             "samples": "Samples are off their timestamps by {jitter_s:.2g ms} rms: both sensors scatter together, "
             "in proportion to the slope of the signal.",
         },
