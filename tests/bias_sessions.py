@@ -93,4 +93,4 @@ def readings_of(session: Session, seed: int) -> BiasReadings:
     """What the tests on biases are given of a session."""
     z = draw(session, seed)
     design = np.column_stack([np.ones(len(z.time_s)), z.up, z.temperature])
-    return BiasReadings(z.values, z.sigma, z.time_s, z.length_s, z.pose, design, np.ones((len(z.time_s), 1)))
+    return BiasReadings(z.values, z.sigma, z.time_s, z.length_s, z.pose, design)

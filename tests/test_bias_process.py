@@ -5,10 +5,7 @@ import pytest
 
 from bias_sessions import Session, draw, readings_of
 from trihedron import _core
-from trihedron.diagnose.rest.heat import slow_change, smooth_curve
-from trihedron.diagnose.rest.process import BiasProcess
-
-ALL = [0, 1, 2, 3, 4]
+from trihedron.diagnose.rest.heat import slow_change
 
 
 def dense_covariance(t, length, pose, variance, direction, strengths):
@@ -70,11 +67,9 @@ def test_what_only_scatters_does_not_change_slowly(session):
 def test_the_curve_of_a_hidden_swing_is_drawn_within_its_band():
     session = Session(scatter=0.005, swing=0.1, n_poses=30)
     zeros = draw(session, 5)
-    process = BiasProcess.of(readings_of(session, 5))
-    _, sigma = process.maximum((0, 1, 2), ALL, restricted=True)
     t = zeros.time_s
-    curve = smooth_curve(process, [0], sigma, t)
-    # The truth is not that of the session's numbers but that of averages free of noise.
+    curve = slow_change(readings_of(session, 5)).curve([0], t)
+    # The truth is not told by the session's numbers but by averages free of noise.
     quiet = draw(Session(swing=0.1, n_poses=30, noise=1e-9), 5)
     truth = quiet.values - quiet.values.mean(axis=1, keepdims=True)
     away = (curve.values - truth) / curve.sigma

@@ -8,12 +8,9 @@ import pytest
 
 from trihedron import calibrate, diagnose
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.effects.timing_jitter import timestamp_errors
-from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
-from trihedron.records import FindingCode
 from trihedron.records.published import published_figures
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.aliasing import unresolved_variance
@@ -63,21 +60,6 @@ def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(re
     assert [e.id for e in d.effects] == ["gyro-saturation"]
     agree = {t.domain: t.chi2_per_dof for t in d.remaining if not t.disagrees}
     assert {"static-accel", "static-gyro", "moves", "dynamics"} <= set(agree)
-
-
-def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
-    recording = read_recording(real_data / "kim/kim_imu_good1.txt")
-    # Reading has taken the even clock behind them already; here the timestamps are put back as they were logged.
-    assert FindingCode.EVEN_CLOCK in {finding.code for finding in recording.findings}
-    logged = np.loadtxt(real_data / "kim/kim_imu_good1.txt", usecols=0)
-    recording = replace(recording, time_s=logged - logged[0])
-    observed = observe(recording, resegment(recording, segment_recording(recording)))
-    found = timestamp_errors(observed)
-    assert found is not None
-    # Timestamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
-    assert found.rms_s == pytest.approx(5.12e-3 / np.sqrt(12.0), rel=0.05)
-    assert abs(found.followed) < 0.1
-    assert timestamp_errors(replace(observed, time_s=found.even_s)) is None
 
 
 def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> None:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import trihedron
-from trihedron.diagnose.effects.table_tilt import _error_of_mean
+from trihedron.diagnose.effects.table import _error_of_mean
 from trihedron.diagnose.residuals import goodness_of_fit
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.records import Pose

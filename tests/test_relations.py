@@ -1,7 +1,5 @@
-"""Relations outside the catalogue: found where they are, silent where they are not, written out as an effect."""
+"""Relations outside the catalogue: found where they are, silent where they are not."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,8 +7,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trihedron.api.diagnosing import diagnose
-from trihedron.diagnose.relations.written import effect_file
-from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.text import to_text
 from trihedron.simulate import Scenario, hand_session, simulate
@@ -68,29 +64,3 @@ def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():
     assert "the misfit follows sign of the last rotation about y." in said
     (size,) = (c for c in relation.coefficients if c.name.startswith("y"))
     assert abs(size.value - 0.03 * DEG) < 4.0 * size.std
-
-
-def test_a_relation_is_written_out_as_an_effect_that_runs(tmp_path):
-    law = Relation(
-        "gyroscope", ("u_x u_y", "u_z^2"), "reading of x grows by c1·(u_x u_y) + c2·(u_z^2)",
-        (EffectParameter("x: u_x u_y", 1e-3, 1e-4, "(rad/s)/(g^2)"),
-         EffectParameter("z: u_z^2", 2e-3, 1e-4, "(rad/s)/(g^2)")),
-        0.5, None, (), "hold edges", "The gyro's zero (x, z) follows u_x u_y and u_z^2: 50 %.",
-    )  # fmt: skip
-    source = effect_file(law, "gyro-named-law")
-    assert source is not None
-    (tmp_path / "gyro_named_law.py").write_text(source)
-    program = (
-        "import numpy as np\nfrom types import SimpleNamespace as N\nimport gyro_named_law\n"
-        "from trihedron.diagnose.effects import catalogue\n"
-        "effect = next(e for e in catalogue() if e.id == 'gyro-named-law')\n"
-        "f = np.array([[9.8, 0, 0], [6.0, 7.75, 0], [0, 0, 9.8]])\n"
-        "c = N(force=f, rate=0 * f, n_points=3, gyro_axes=np.eye(3))\n"
-        "columns = effect.variants(c)[0].distortion.rate\n"
-        "print(columns[1, 0, 0] > 0.4, columns[2, 2, 1])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["True", "1.0"]
-    past = Relation("gyroscope", ("previous u_x",), "", (EffectParameter("x: previous u_x", 1.0, 0.1, ""),), 0.5, None)
-    assert effect_file(past) is None

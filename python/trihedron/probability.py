@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from trihedron import _core
 
+LEAST_P = 1e-300
+"""Smallest p-value stated: a double holds it with full precision, and its logarithm exists."""
 NORMAL_95 = 1.96
 """Half-width of a 95 % interval of a normal variate, in standard deviations."""
 

@@ -12,6 +12,8 @@ from trihedron.records.domains import Where
 
 SIGN_SIGMA = 5.0
 """Standard errors between a scale and zero from which its sign counts: wrong by chance in one of 3.5 million axes."""
+CERTAIN = 1e6
+"""Gain that ranks it before every effect: with a mirrored axis nothing else can be judged."""
 
 
 class AxisHandedness(DirectEffect):
@@ -43,4 +45,4 @@ class AxisHandedness(DirectEffect):
         )  # fmt: skip
         signed = zip(AXES, signs, strict=True)
         parameters = tuple(EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in signed)
-        return Evidence(1e-300, 1e6, parameters, statement, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))
+        return Evidence(0.0, CERTAIN, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))

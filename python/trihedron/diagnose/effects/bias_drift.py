@@ -1,4 +1,4 @@
-"""A bias that drifts in time and that no logged channel explains: the part common to both sensors."""
+"""Bias that drifts in time and that no logged channel explains."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
-from trihedron.diagnose.effects.contract import Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Variant, on_axes, per_axis
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 
 MOST_M_S2, MOST_RAD_S = 0.6, 0.09
 """Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
 indicates a disturbed pose."""
-STILL_THERE, FEWEST_POSES_OF_A_DRIFT = 0.1, 3
-"""Share of a drift that must remain at the third pose: a faster decay concerns one or two poses, not the session."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
-"""Time constants tried, as fractions of the recording: faster ones end before the first moves, slower are a line."""
+"""Time constants tried, as fractions of the recording: faster ones concern one or two poses, slower are a line."""
+COSINES = (1, 2, 3, 4)
+"""Half periods of a slow curve in the session: as many bends as a fit of S and b leaves to twenty poses."""
 
 
 class BiasDrift(BiasProcess):
@@ -33,18 +33,14 @@ class BiasDrift(BiasProcess):
         """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
         x = context.elapsed[:, None]
         out = [self._along(context, [x - 0.5], per_axis("drift"), "line")]
-        duration = float(context.obs.time_s[-1] - context.obs.time_s[0])
-        taus = [fraction * duration for fraction in WARM_UP_FRACTIONS]
-        out += [self._warm_up(context, tau) for tau in taus if tau >= _shortest_time_constant(context)]
-        orders = range(1, self.n_waves(context.obs.n_poses) + 1)
-        if orders:
-            names = tuple(name for k in orders for name in per_axis(f"cosine{k}"))
-            out.append(self._along(context, [np.cos(np.pi * x * k) for k in orders], names, "curve"))
+        out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
+        names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
+        out.append(self._along(context, [np.cos(np.pi * x * k) for k in COSINES], names, "curve"))
         return out
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
         """An exponential with one time constant; its parameters are the bias per axis at the first sample."""
-        tau_s = max(tau_s, _shortest_time_constant(context))
+        tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * _duration_s(context))
         fades = np.exp(-(context.time_s - context.obs.time_s[0]) / tau_s)[:, None]
         return self._along(context, [fades], per_axis("warm_up"), "warm-up", {"time_constant": (tau_s, "s")})
 
@@ -57,10 +53,6 @@ class BiasDrift(BiasProcess):
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
         return np.full(variant.distortion.n_parameters, self.typical)
-
-    def n_waves(self, n_poses: int) -> int:  # noqa: ARG002
-        """Number of cosines per axis that this many poses can determine."""
-        return 4
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
         return self._warm_up(context, value) if variant.label == "warm-up" else None
@@ -79,9 +71,21 @@ class BiasDrift(BiasProcess):
         return per_axis_parameters("range", size, std, self.unit), self.reported("walk", range=size)
 
 
-def _shortest_time_constant(context: Context) -> float:
-    """Shortest time constant, s: a faster exponential is over before the third pose."""
-    middles = context.obs.pose_time_s
-    if len(middles) < FEWEST_POSES_OF_A_DRIFT:
-        return 0.0
-    return float(middles[FEWEST_POSES_OF_A_DRIFT - 1] - middles[0]) / float(-np.log(STILL_THERE))
+class AccelBiasDrift(BiasDrift):
+    """Accelerometer bias drift: seen in the norm of gravity from pose to pose."""
+
+    id, sensor = "accel-bias-drift", ACCELEROMETER
+    confounded_with = ("accel-bias",)
+    typical = 0.05
+
+
+class GyroBiasDrift(BiasDrift):
+    """Gyro bias drift: seen in the static rates from pose to pose."""
+
+    id, sensor = "gyro-bias-drift", GYRO
+    confounded_with = ("gyro-bias",)
+    typical = 4e-3
+
+
+def _duration_s(context: Context) -> float:
+    return float(context.obs.time_s[-1] - context.obs.time_s[0])

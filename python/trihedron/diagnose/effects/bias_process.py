@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import GYRO, SENSORS, Effect, Variant
+from trihedron.diagnose.effects.contract import GYRO, SENSORS, Effect
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words, why_not
 
@@ -32,9 +32,6 @@ class BiasProcess(Effect):
         if self.sensor == GYRO and context.obs.raw_rate is None:
             return why_not("no-gyro")
         return why_not("six-poses") if context.obs.n_poses < FEWEST_POSES else None
-
-    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        return []
 
     @abstractmethod
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:

@@ -5,7 +5,6 @@ To add one: write a file in this folder with a subclass of :class:`Effect` and n
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -58,7 +57,7 @@ class Variant:
     is_family: bool = False
 
 
-class Effect(ABC):
+class Effect:
     """One physical mechanism."""
 
     id: ClassVar[str]
@@ -112,9 +111,9 @@ class Effect(ABC):
         """Why this recording cannot show the effect, or ``None``."""
         return why_not("no-moves") if self.needs_moves and not context.moves else None
 
-    @abstractmethod
-    def variants(self, context: Context) -> list[Variant]:
-        """Forward models that compete, simplest first; SI, at the context's points."""
+    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
+        """Forward models that compete, simplest first; SI, at the context's points. None where it shows otherwise."""
+        return []
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
         """The same variant at another value of its one shape parameter; ``None`` where the shape is not continuous."""
@@ -145,8 +144,8 @@ class Effect(ABC):
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
         linear = [p for p in parameters if p.name not in SHAPE_NAMES]
-        strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, 1e-300))
-        return self.reported(
+        strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, LEAST_RMS))
+        return self.told(
             "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
             unit=strongest.unit,
         )  # fmt: skip

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
 
@@ -45,6 +46,10 @@ class Evidence:
     share: float | None = None
     touched: tuple[int, ...] | None = None
 
+    def __post_init__(self) -> None:
+        """Keep the p-value where its logarithm exists."""
+        object.__setattr__(self, "p_value", min(max(float(self.p_value), LEAST_P), 1.0))
+
 
 class DirectEffect(Effect):
     """An effect with its own test on the samples."""
@@ -57,7 +62,3 @@ class DirectEffect(Effect):
     @abstractmethod
     def find(self, context: Context) -> Evidence | None:
         """The evidence for the effect in this recording, or ``None``."""
-
-    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        """No columns: a direct effect takes no part in the search unless it overrides this."""
-        return []

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import MIN_FALL, DirectEffect, Evidence
-from trihedron.diagnose.effects.lost_samples import Loss, bridge, find_losses, hidden_losses, most_lost, residual_after
+from trihedron.diagnose.effects.lost_samples import (
+    Loss,
+    find_losses,
+    hidden_losses,
+    insert_samples,
+    most_lost,
+    residual_after,
+)
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.records import Recording, Segments
+from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.model import Prior, SessionState
@@ -173,65 +178,10 @@ class DroppedSamples(DirectEffect):
             tuple(dict.fromkeys(obs.move_names([loss.move for loss in losses]))),
             tuple((float(t[loss.sample]), float(t[loss.sample + 1])) for loss in losses),
         )
-        gain = sum(loss.gain for loss in losses)
-        # A chi-square with one degree of freedom, corrected for all intervals and 60 counts.
-        weakest = min(max(loss.per_sensor) for loss in losses)
-        p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
+        gain, weakest = sum(loss.gain for loss in losses), min(loss.gain for loss in losses)
+        # A chi-square with one degree of freedom, corrected for all intervals and counts.
+        p = float(np.exp(-0.5 * weakest)) * n_intervals * most_lost(obs)
         return Evidence(
             p, gain, parameters, statement, "timing", where,
             reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),
         )  # fmt: skip
-
-
-# Lost samples are inserted on a cubic across every gap; timestamps and poses behind it move.
-
-
-def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
-    """Insert ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic by the values and slopes on either side.
-
-    A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the error of the rotation integrated
-    across it is of fifth order in its length. Timestamps behind a gap move by the duration lost.
-    """
-    n_old = recording.n_samples
-    step = 1.0 / recording.rate_hz
-    extra = np.zeros(n_old + 1, dtype=np.intp)
-    for k, n in losses.items():
-        extra[k + 1] += n
-    shift = np.cumsum(extra)[:n_old]
-    new_index = np.arange(n_old) + shift
-    total = n_old + int(extra.sum())
-    time_s = np.full(total, np.nan)
-    time_s[new_index] = recording.time_s + shift * step
-    gaps = np.isnan(time_s)
-    time_s[gaps] = np.interp(np.flatnonzero(gaps), new_index, recording.time_s + shift * step)
-
-    def bridged(values: FloatArray | None) -> FloatArray | None:
-        if values is None:
-            return None
-        out = np.full((total, *values.shape[1:]), np.nan)
-        out[new_index] = values
-        for k, n in losses.items():
-            out[k + shift[k] + 1 : k + shift[k] + 1 + n] = bridge(values, k, n)
-        return out
-
-    channels = ("accelerometer", "gyroscope", "temperature_degc", "supply_v")
-    values: dict[str, Any] = {name: bridged(getattr(recording, name)) for name in channels}
-    mended = replace(recording, time_s=time_s, auxiliary=type(recording.auxiliary)({}), **values)
-    mended = mended.with_facts(recording.facts.moved(new_index))
-
-    def at(index: int) -> int:
-        return int(new_index[index]) if index < n_old else total
-
-    poses = tuple(
-        replace(
-            pose, start=at(pose.start), stop=at(pose.stop - 1) + 1, outer_start=at(pose.outer_start),
-            outer_stop=at(pose.outer_stop - 1) + 1,
-            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
-        )
-        for pose in segments.poses
-    )  # fmt: skip
-    moves = tuple(
-        replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
-    )
-    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses])
-    return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)

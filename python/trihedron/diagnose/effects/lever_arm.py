@@ -20,8 +20,6 @@ from trihedron.records.words import why_not
 MIN_SHARE = 0.1
 """Least share of the motion in other moves that one arm must predict. The travel of a hand does not follow the
 rotation: without an arm it leaves at most 5 % (21 simulated sessions)."""
-MOSTLY = 0.5
-"""Share from which the arm explains most of a session's motion; below it the arm ranks behind all other effects."""
 FEWEST_MOVES = 6
 """Twice the three unknowns of the arm: its uncertainty comes from the scatter between moves."""
 TOO_FLAT = 1e6
@@ -50,8 +48,6 @@ QUIETEST = 0.5
 """In medians: a move's misfit counts as at least this, so that its weight is at most twice the median one."""
 N_ARM = 3
 """Unknowns of an arm. A delay between the sensors is fitted beside it: turning gravity would imitate an arm."""
-ROUNDING = 1e-9
-"""Relative to the arm's diagonal, added to that of the delay against a singular matrix; no bias at a delay of 0.1 s."""
 
 
 class LeverArm(DirectEffect):
@@ -73,29 +69,24 @@ class LeverArm(DirectEffect):
         flat = np.einsum("mkia,mkib->ab", moves.columns, moves.columns)[:N_ARM, :N_ARM]
         if len(moves.target) < FEWEST_MOVES or np.linalg.cond(flat) > TOO_FLAT:
             return None
-        found, by = min((_fitted(moves, one) for one in SHRUNK), key=lambda one: one[0].p_value)
-        before, after = (float(by.weight @ one) for one in _held_out(moves, found, by.shapes))
+        found = min((_fitted(moves, one) for one in SHRUNK), key=lambda one: one.p_value)
+        p_value = len(SHRUNK) * found.p_value
+        before, after = (float(found.by.weight @ found.by.squares(one)) for one in (moves.target, found.held_out))
         share = 1.0 - after / before
-        if share < MIN_SHARE or len(SHRUNK) * found.p_value > P_LIMIT:
+        if share < MIN_SHARE or p_value > P_LIMIT:
             return None
         # Weighted rms over polynomials and moves, with the same weights before and after.
-        scale = 3.0 * float(np.trace(by.shapes)) * float(by.weight.sum())
+        scale = 3.0 * float((found.by.white**2).sum()) * float(found.by.weight.sum())
         before_rms, after_rms = float(np.sqrt(before / scale)), float(np.sqrt(after / scale))
         noise = float(np.sqrt((context.noise_floor[0] ** 2).mean()))
         held = HeldOut("dynamics", (before_rms / noise) ** 2, (after_rms / noise) ** 2, before_rms, after_rms, "m/s^2")
-        sigma = np.sqrt(np.diag(found.covariance))
+        arm, sigma = found.by.value[:N_ARM], np.sqrt(np.diag(found.covariance))
         parameters = tuple(
-            EffectParameter(f"r_{axis}", float(v), float(s), "m")
-            for axis, v, s in zip(AXES, found.value[:N_ARM], sigma, strict=True)
+            EffectParameter(f"r_{axis}", float(v), float(s), "m") for axis, v, s in zip(AXES, arm, sigma, strict=True)
         )
-        length = float(np.linalg.norm(found.value[:N_ARM]))
-        # Real motion explains no misfit of gravity or velocity: it ranks behind the effects that do.
-        whole, left = (float(one.sum()) for one in _held_out(moves, found, np.eye(moves.n_shapes)))
-        strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
-        return Evidence(
-            max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
-            self.reported("arm", arm_m=length, share=share), "dynamics", Where(("ax", "ay", "az")), (held,),
-        )  # fmt: skip
+        told = self.told("arm", arm_m=float(np.linalg.norm(arm)), share=share)
+        strength = float(len(moves.target) * np.log(before / after))
+        return Evidence(p_value, strength, parameters, told, "dynamics", Where(("ax", "ay", "az")), (held,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,23 +97,35 @@ class _Moves:
     target: FloatArray
     columns: FloatArray
 
-    @property
-    def n_shapes(self) -> int:
-        """Number of shapes."""
-        return int(self.target.shape[1])
+    def left(self, value: FloatArray) -> FloatArray:
+        """(m, shapes, 3) what arm and delay ``value`` (4,), or (m, 4) one for every move, do not explain."""
+        one = np.broadcast_to(value, (len(self.target), N_ARM + 1))
+        return np.asarray(self.target - np.einsum("mkia,ma->mki", self.columns, one))
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighed:
+    """One least-squares answer: ``value`` (4,) arm [m] and delay [s], ``white`` (shapes, shapes) that whitens curves,
+    ``weight`` (m,) of the moves."""
+
+    value: FloatArray
+    white: FloatArray
+    weight: FloatArray
+
+    def squares(self, curves: FloatArray) -> FloatArray:
+        """(m,) sums of squares of whitened curves (m, shapes, 3)."""
+        return np.asarray(((self.white @ curves) ** 2).sum(axis=(1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Arm:
-    """``value`` (4,) arm [m] and delay [s], the arm's jackknife ``covariance`` (3, 3) and Hotelling's ``p_value``;
-    ``without_one`` (m, 4) the value without each move's jackknife group, ``delay_without_one`` (m,) the delay fitted
-    alone without it."""
+    """The weighted fit ``by``, the arm's jackknife ``covariance`` (3, 3), Hotelling's ``p_value``, and ``held_out``
+    (m, shapes, 3) what is left in each move by arm and delay fitted without its jackknife group."""
 
-    value: FloatArray
+    by: _Weighed
     covariance: FloatArray
     p_value: float
-    without_one: FloatArray
-    delay_without_one: FloatArray
+    held_out: FloatArray
 
 
 def _true_moves(context: Context) -> list[slice]:
@@ -165,52 +168,34 @@ def _shapes(time_s: FloatArray, count: int) -> FloatArray:
     return np.asarray(legvander(x, count - 1) * np.sqrt(2.0 * np.arange(count) + 1.0) * weight[:, None])
 
 
-@dataclass(frozen=True, eq=False)
-class _Weighed:
-    """One least-squares answer: ``value`` (4,), inverse covariance of the ``shapes``, ``weight`` (m,) of the moves."""
-
-    value: FloatArray
-    shapes: FloatArray
-    weight: FloatArray
-
-
-def _normal(moves: _Moves, by: _Weighed) -> tuple[FloatArray, FloatArray]:
-    """(m, 4, 4) normal matrices and (m, 4) right-hand sides."""
-    m = len(moves.target)
-    flat = moves.columns.reshape(m, -1, N_ARM + 1)
-    weighted = by.weight[:, None, None] * (by.shapes @ moves.columns.reshape(m, moves.n_shapes, -1)).reshape(flat.shape)
-    normal = flat.transpose(0, 2, 1) @ weighted
-    # Rotations about the vertical alone do not determine the delay; it is zero then.
-    normal[:, N_ARM, N_ARM] += ROUNDING * np.trace(normal[:, :N_ARM, :N_ARM], axis1=1, axis2=2)
-    return normal, (weighted.transpose(0, 2, 1) @ moves.target.reshape(m, -1, 1))[:, :, 0]
-
-
 def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
     """``n`` iterations of the weighted least squares, each with covariance and weights from the last residuals."""
+    m, n_shapes = moves.target.shape[:2]
     for _ in range(n):
-        left = moves.target - moves.columns @ by.value
+        left = moves.left(by.value)
         # (shapes, 3 m): one matrix product instead of one per move.
-        rows = left.transpose(1, 0, 2).reshape(moves.n_shapes, -1)
-        covariance = (rows * np.repeat(by.weight, 3)) @ rows.T / (3.0 * len(left))
-        mean = float(np.trace(covariance)) / moves.n_shapes
-        shapes = np.asarray(np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes)), np.float64)
-        squares = _squares(left, shapes)
+        rows = left.transpose(1, 0, 2).reshape(n_shapes, -1)
+        covariance = (rows * np.repeat(by.weight, 3)) @ rows.T / (3.0 * m)
+        mean = float(np.trace(covariance)) / n_shapes
+        white = np.linalg.inv(np.linalg.cholesky(covariance + shrunk * mean * np.eye(n_shapes)))
+        squares = replace(by, white=white).squares(left)
         weight = 1.0 / np.maximum(squares, QUIETEST * float(np.median(squares)))
-        by = _Weighed(by.value, shapes, weight / weight.mean())
-        normal, side = (one.sum(axis=0) for one in _normal(moves, by))
-        by = replace(by, value=np.linalg.solve(normal, side))
+        root = np.sqrt(weight)[:, None, None]
+        columns, target = (root * (white @ one.reshape(m, n_shapes, -1)) for one in (moves.columns, moves.target))
+        # Rotations about the vertical alone do not determine the delay; the shortest solution has none then.
+        value, *_ = np.linalg.lstsq(columns.reshape(-1, N_ARM + 1), target.ravel(), rcond=None)
+        by = _Weighed(np.asarray(value, np.float64), white, weight / weight.mean())
     return by
 
 
-def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
+def _fitted(moves: _Moves, shrunk: float) -> _Arm:
     """The arm with its jackknife covariance: each move (or group of moves) is left out in turn, covariance and weights
     are estimated again without it.
 
     A single move that determines the arm, or the noise in which it is significant, so widens the covariance.
     """
-    m = len(moves.target)
-    start = _Weighed(np.zeros(N_ARM + 1), np.eye(moves.n_shapes), np.ones(m))
-    whole = _weighed(moves, start, shrunk, N_WEIGHINGS)
+    m, n_shapes = moves.target.shape[:2]
+    whole = _weighed(moves, _Weighed(np.zeros(N_ARM + 1), np.eye(n_shapes), np.ones(m)), shrunk, N_WEIGHINGS)
     groups = min(m, MOST_GROUPS)
     group = np.arange(m) % groups
     without_one = np.empty((groups, N_ARM + 1))
@@ -218,28 +203,10 @@ def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
         others = group != k
         few = _Moves(moves.target[others], moves.columns[others])
         without_one[k] = _weighed(few, replace(whole, weight=whole.weight[others]), shrunk, N_AGAIN).value
-    away = (without_one - whole.value)[:, :N_ARM]
+    arm, away = whole.value[:N_ARM], (without_one - whole.value)[:, :N_ARM]
     covariance = away.T @ away * ((groups - 1) / (groups - 3))
-    arm = whole.value[:N_ARM]
     wald = float(arm @ np.linalg.solve(covariance, arm)) / 3.0 * (groups - 3) / (groups - 1)
-    p_value = float(fdtrc(3.0, groups - 3.0, wald))
-    normal, side = _normal(moves, whole)
-    of_group = np.eye(groups)[group]
-    delay = (side.sum(axis=0) - of_group.T @ side)[:, N_ARM]
-    delay /= normal[:, N_ARM, N_ARM].sum() - of_group.T @ normal[:, N_ARM, N_ARM]
-    return _Arm(whole.value, covariance, p_value, without_one[group], delay[group]), whole
-
-
-def _squares(left: FloatArray, shapes: FloatArray) -> FloatArray:
-    """(m,) sums of squares of curves (m, shapes, 3) in the metric ``shapes``, their inverse covariance in time."""
-    return np.asarray((left * (shapes @ left)).sum(axis=(1, 2)))
-
-
-def _held_out(moves: _Moves, found: _Arm, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(m,) squares left in each move by a delay alone and by arm and delay, fitted without that move's group."""
-    alone = moves.target - moves.columns[..., N_ARM] * found.delay_without_one[:, None, None]
-    beside = moves.target - np.einsum("mkia,ma->mki", moves.columns, found.without_one)
-    return _squares(alone, shapes), _squares(beside, shapes)
+    return _Arm(whole, covariance, float(fdtrc(3.0, groups - 3.0, wald)), moves.left(without_one[group]))
 
 
 def _cross(v: FloatArray) -> FloatArray:

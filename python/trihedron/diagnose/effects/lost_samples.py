@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import percentile_filter
@@ -14,23 +15,24 @@ from trihedron.diagnose.effects.direct import MUST_HALVE
 from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import move_residuals, wrt_lost_time
-from trihedron.session.model import SessionState
+from trihedron.diagnose.session.state import SessionState
+from trihedron.records import Recording, Segments
 
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 AGREEMENT = 30.0
-"""Chi-square by which the common count may fit one sensor worse than its own best count."""
-AGREEMENT_SHARE = 0.01
-"""The same as a share of the chi-square without samples inserted: a large gap is no exact cubic."""
+"""Chi-square by which a smaller count may fit worse than the best: a large gap is no exact cubic."""
 LEAST_GAIN = 40.0
-"""Chi-square that a count must gain: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts."""
+"""Chi-square that a count of a hidden loss must gain: by chance once in 4·10⁹, once in 650 sessions."""
 OVER_USUAL, LEFT_SHARE = 5.0, 0.1
-"""The gain must also be five times the usual chi-square of joins nearby, and the remainder small: no loss is found
-in 48 healthy sessions."""
+"""The gain must be five times the usual chi-square of joins nearby (120 or more), and the remainder small: no loss is
+found in 48 healthy sessions."""
 NARROW = 3
 """Samples on either side that a join uses in quick motion."""
 PLACE_S = 0.01
 """Spacing of the places tried, s."""
+CUBIC, QUINTIC = 4, 6
+"""Coefficients."""
 MOST_IN_A_MOVE = 3
 FEWEST_OF_PARABOLA = 6
 """Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
@@ -44,7 +46,6 @@ class Loss:
     move: int
     count: int
     gain: float
-    per_sensor: tuple[float, ...]
 
 
 def most_lost(obs: Observations) -> int:
@@ -100,9 +101,9 @@ def _losses_of(obs: Observations, m: int) -> list[Loss]:
     k = k[~clipped_samples(obs)[k]]
     if len(k) == 0:
         return []
-    stack = _joints(w, 4, most)
+    stack = _joints(w, CUBIC, most)
     windows = _windows(obs, k, w)
-    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - 4)
+    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - CUBIC)
     # Usual chi-square of joins in motion as quick as here: jitter and curvature are no losses.
     near = [percentile_filter(one, 75, size=8 * w + 1, mode="nearest") for one in zero.T]
     usual = np.maximum(np.stack(near, axis=1), dof)
@@ -114,28 +115,16 @@ def _losses_of(obs: Observations, m: int) -> list[Loss]:
     # Quick motion over a wide gap is no cubic: a quintic is used where the cubic leaves too much.
     quick = (trial.min(axis=1) > 3.0 * usual[suspect]).any(axis=1)
     if quick.any():
-        trial[quick] = _trials(_joints(w, 6, most), [v[:, suspect[quick]] for v in windows])
+        trial[quick] = _trials(_joints(w, QUINTIC, most), [v[:, suspect[quick]] for v in windows])
     total = trial.sum(axis=2)
     # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
     best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
-    return [
-        Loss(int(k[s]), m, n, float(gains.sum()), tuple(gains.tolist()))
-        for s, n, costs in zip(suspect, best.tolist(), trial, strict=True)
-        if 0 < n < most and (gains := _gains(costs, n, zero[s], usual[s])) is not None
-    ]
-
-
-def _gains(costs: FloatArray, n: int, zero: FloatArray, usual: FloatArray) -> FloatArray | None:
-    """(sensors,) chi-square that the count ``n`` gains, from the ``costs`` (counts, sensors); ``None`` where a sensor
-    contradicts it."""
-    left = costs[n]
+    left, usual, zero = trial[np.arange(len(best)), best], usual[suspect], zero[suspect]
     gains = zero - left
-    # The gain must also exceed that of a count where the signal is merely rough (vibration, jitter).
-    clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero + 3.0 * usual)
-    # A sensor that does not show the loss must not contradict it; one that shows it must give the same count.
-    silent = ~clear & (left < 2.0 * usual)
-    agree = left - costs.min(axis=0) <= np.maximum(AGREEMENT, AGREEMENT_SHARE * zero)
-    return gains if clear.any() and (clear | silent).all() and agree[clear].all() else None
+    # More than a count gains where the signal is merely rough (vibration, jitter), and no sensor contradicts it.
+    clear = (gains > OVER_USUAL * usual).any(axis=1) & (left < LEFT_SHARE * zero + 3.0 * usual).all(axis=1)
+    found = np.flatnonzero(clear & (best > 0) & (best < most))
+    return [Loss(int(k[suspect[i]]), m, int(best[i]), float(gains[i].sum())) for i in found]
 
 
 def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
@@ -162,7 +151,7 @@ def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, 
         score = gain + (misfit - (left**2).sum(axis=2)) / usual
         score[~free] = -np.inf
         at, n = np.unravel_index(int(score.argmax()), score.shape)
-        loss = Loss(int(places[at]), m, int(n), float(score[at, n]), (float(score[at, n]),))
+        loss = Loss(int(places[at]), m, int(n), float(score[at, n]))
         without = residual_after(obs, state, m, held | {loss.sample: loss.count})
         if gain[at, n] < LEAST_GAIN or float(without @ without) > MUST_HALVE * misfit:
             break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
@@ -178,8 +167,8 @@ def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, IntArray]:
     k = k[~clipped_samples(obs)[k]]
     if not len(k):
         return np.zeros((0, 1)), k
-    costs = _trials(_joints(NARROW, 4, most_lost(obs)), _windows(obs, k, NARROW))
-    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - 4)), 1.0)
+    costs = _trials(_joints(NARROW, CUBIC, most_lost(obs)), _windows(obs, k, NARROW))
+    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - CUBIC)), 1.0)
     return ((costs[:, :1] - costs) / ordinary).sum(axis=2), k
 
 
@@ -192,20 +181,69 @@ def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observat
     """One move alone, with ``losses`` (counts after samples) inserted."""
     a, b = obs.move_ranges[m]
     assert obs.raw_rate is not None
-    force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
-    step = 1.0 / obs.recording.rate_hz
-    for k, n in sorted(losses.items(), reverse=True):
-        i = k - a
-        force = np.concatenate([force[: i + 1], bridge(force, i, n), force[i + 1 :]])
-        rate = np.concatenate([rate[: i + 1], bridge(rate, i, n), rate[i + 1 :]])
-        put = time[i] + step * np.arange(1, n + 1)
-        time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
+    own = {k - a: n for k, n in losses.items()}
+    time = with_time(obs.time_s[a:b], own, 1.0 / obs.recording.rate_hz)
+    force, rate = (with_bridges(one[a:b], own) for one in (obs.raw_force, obs.raw_rate))
     ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
     return replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
 
 
+def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
+    """Recording and segments with ``n`` samples inserted behind sample ``k`` for every ``k: n``."""
+    place = moved(recording.n_samples, losses)
+    time_s = with_time(recording.time_s, losses, 1.0 / recording.rate_hz)
+    channels = ("accelerometer", "gyroscope", "temperature_degc", "supply_v")
+    logged = {name: value for name in channels if (value := getattr(recording, name)) is not None}
+    values: dict[str, Any] = {name: with_bridges(value, losses) for name, value in logged.items()}
+    mended = replace(recording, time_s=time_s, auxiliary=type(recording.auxiliary)({}), **values)
+    mended = mended.with_facts(recording.facts.moved(place))
+
+    def at(index: int) -> int:
+        return int(place[index]) if index < len(place) else len(time_s)
+
+    poses = tuple(
+        replace(
+            pose, start=at(pose.start), stop=at(pose.stop - 1) + 1, outer_start=at(pose.outer_start),
+            outer_stop=at(pose.outer_stop - 1) + 1,
+            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
+        )
+        for pose in segments.poses
+    )  # fmt: skip
+    moves = tuple(
+        replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
+    )
+    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses])
+    return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)
+
+
+def moved(n: int, losses: dict[int, int]) -> IntArray:
+    """(n,) places of samples once ``losses`` (counts after samples) are inserted."""
+    extra = np.zeros(n, dtype=np.intp)
+    extra[[k + 1 for k in losses]] = list(losses.values())
+    return np.arange(n) + np.cumsum(extra)
+
+
+def with_time(time_s: FloatArray, losses: dict[int, int], step_s: float) -> FloatArray:
+    """Timestamps with those of the losses; behind a gap they move by the time lost."""
+    place = moved(len(time_s), losses)
+    return np.interp(np.arange(place[-1] + 1), place, time_s + (place - np.arange(len(place))) * step_s)
+
+
+def with_bridges(values: FloatArray, losses: dict[int, int]) -> FloatArray:
+    """Values (n, ...) with samples on a cubic across every loss."""
+    place = moved(len(values), losses)
+    out = np.empty((place[-1] + 1, *values.shape[1:]))
+    out[place] = values
+    for k, n in losses.items():
+        out[place[k] + 1 : place[k + 1]] = bridge(values, k, n)
+    return out
+
+
 def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side."""
+    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side.
+
+    The error of the rotation integrated across the gap is of fifth order in its length.
+    """
     if k < 1 or k + 2 >= len(values):
         return np.repeat(values[k : k + 1], n, axis=0)
     a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])

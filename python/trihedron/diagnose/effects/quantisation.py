@@ -155,7 +155,7 @@ class Quantisation(DirectEffect):
             times=worst.step / worst.sigma,
         )  # fmt: skip
         return Evidence(
-            1e-300, strength, _parameters(context, found), statement, "within-static", Where(names),
+            0.0, strength, _parameters(context, found), told, "within-static", Where(names),
             reweigh=reweigh, share=grid / (grid + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip
@@ -228,7 +228,7 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     kind = "force" if is_accel else "rate"
     mean, sigma, density = (getattr(obs, n).copy() for n in (f"pose_{kind}", f"pose_{kind}_sigma", f"{kind}_density"))
     mean[:, k] += one.mean_shift
-    sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, 1e-300), 1.0), one.mean_sigma)
+    sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, one.sigma), 1.0), one.mean_sigma)
     # In motion the readings cross many codes: the rounding error is white, of variance LSB²/12 per reading.
     density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
     if is_accel and obs.force_up is not None:

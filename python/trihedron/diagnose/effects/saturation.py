@@ -14,19 +14,20 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
-from trihedron.probability import MEDIAN_CHI2
+from trihedron.diagnose.session.state import DYNAMICS, MOVES
+from trihedron.probability import LEAST_P, MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.model import DYNAMICS, MOVES
 
 NEAR_LIMIT = 0.97
 """Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""
-CLEARLY = 5.0
-"""Factor by which the misfit of moves at a limit must exceed that of the other moves."""
 CONTRADICTION = 4.0
-"""Chi-square per row of the moves at a limit above which their readings are false."""
+"""Chi-square per row of the moves at a limit, over that of the others, above which their readings are false."""
 FEWEST_OTHERS = 10
-"""Rows of other moves from which their median is used: its relative error is then 75 %, against ``CLEARLY`` of 5."""
+"""Rows of other moves from which their median is used: its relative error is then 75 %."""
+ONE_CODE = 1e-30
+"""Chance that a part without a limit repeats one code at the end of its range."""
 ABOVE_REST = 1.2
 """Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
@@ -46,7 +47,7 @@ class _Saturation(DirectEffect):
         misfit, usual, n_rows = self._misfit(context, touched)
         # Repeated plateaus on one level need no comparison: where most moves are clipped, all disagree.
         repeats = max(Counter((run.axis, run.sign) for run in runs).values()) >= MIN_PLATEAUS
-        contradicts = misfit > CONTRADICTION and (repeats or misfit > CLEARLY * usual)
+        contradicts = misfit > CONTRADICTION * (1.0 if repeats else usual)
         is_rail = any(run.is_rail for run in runs)
         if not contradicts and not is_rail:
             return None
@@ -60,8 +61,8 @@ class _Saturation(DirectEffect):
         # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
         # undisturbed moves disagree so much more than the others.
         p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
-        p = float(np.clip(p * float(chdtrc(n_rows, misfit * n_rows / max(usual, 1.0))), 1e-300, 1.0))
-        p = min(p, 1e-30) if is_rail else p
+        p = max(min(p, 1.0) * float(chdtrc(n_rows, misfit * n_rows / usual)), LEAST_P)
+        p = min(p, ONE_CODE) if is_rail else p
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), times), reweigh=lambda old: old.without_moves(touched),
@@ -80,7 +81,7 @@ class _Saturation(DirectEffect):
         rows = np.isin(system.domain, domains) & (system.walk == 0)
         at_limit, squared = np.isin(system.segment, touched), system.residual**2
         others = squared[rows & ~at_limit]
-        usual = float(np.median(others) / MEDIAN_CHI2[1]) if len(others) >= FEWEST_OTHERS else 0.0
+        usual = max(float(np.median(others)) / MEDIAN_CHI2[1], 1.0) if len(others) >= FEWEST_OTHERS else 1.0
         return float(np.mean(squared[rows & at_limit])), usual, int((rows & at_limit).sum())
 
     def _si(self, context: Context) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -2,82 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 from scipy.special import ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
-from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter
-
-WINDOW_S = 4.0
-"""s: an even clock may drift over longer times than this."""
-_CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
-"""A sample minus the cubic through its four neighbours, on an even grid."""
-CLEAR = 0.1
-"""Standard error of ``followed`` below which 0 and 1 are separated."""
-EVEN = 0.02
-"""Scatter of timestamps, in steps, that rounding explains: a tenth of a millisecond at 200 Hz makes 0.006."""
-JOLT = 6.0
-"""Robust standard deviations beyond which a reading is a jolt: normal noise exceeds them once in 5·10⁸."""
-
-
-@dataclass(frozen=True, eq=False)
-class TimestampErrors:
-    """Scatter of the timestamps about an even clock, and the share of it that the readings follow (1 or 0).
-
-    ``even_s`` (n,) the even clock, ``rms_s`` the scatter, ``followed`` the share with standard error ``sigma``;
-    ``gain`` the chi-square of the readings on the timestamps minus that on the even clock.
-    """
-
-    even_s: FloatArray
-    rms_s: float
-    followed: float
-    sigma: float
-    gain: float
-
-
-def timestamp_errors(obs: Observations) -> TimestampErrors | None:
-    """Regress the readings' deviation from a smooth curve on the deviation that the timestamps' scatter would cause.
-
-    A sample taken δ late reads x' δ more. If the timestamps are right, the readings on an even grid deviate by it; if
-    the samples were taken evenly and only the timestamps scatter, they do not.
-    """
-    t = obs.time_s
-    n = len(t)
-    step = float((t[-1] - t[0]) / max(n - 1, 1))
-    window = max(int(WINDOW_S / step), 11)
-    even = np.arange(n) * step
-    even = even + uniform_filter1d(t - even, window, mode="nearest")
-    delta = t - even
-    rms = float(np.sqrt(np.mean(delta**2)))
-    if rms < EVEN * step or np.abs(delta).max() > step:
-        return None
-    jump = np.convolve(delta, _CONTRAST, mode="same")
-    top = both = square = 0.0
-    for x in obs.whitened:
-        slope = np.gradient(x, axis=0) / step
-        left = np.stack([np.convolve(x[:, c], _CONTRAST, mode="same") for c in range(3)], axis=1)
-        for a, b in obs.move_ranges:
-            inner = slice(a + 3, b - 3)
-            e, p = left[inner], slope[inner] * jump[inner, None]
-            usual = 1.4826 * np.median(np.abs(e)) if len(e) else 0.0
-            if usual == 0.0:
-                continue
-            keep = np.abs(e) < JOLT * usual  # jolts are no time errors
-            top += float((e * p)[keep].sum() / usual**2)
-            square += float((p**2)[keep].sum() / usual**2)
-            both += float(((e - p) ** 2 - e**2)[keep].sum() / usual**2)
-    if square <= 0.0:
-        return None
-    return TimestampErrors(even, rms, top / square, float(1.0 / np.sqrt(square)), both)
-
 
 STEP_FACTOR = 5.0
 """Variance of a step error over the variance of the jitter: 1.5² + 1.5² + 0.5² + 0.5²."""
@@ -133,9 +70,9 @@ def common_time_error(context: Context) -> tuple[float, float, int]:
     n = int(sharp.sum())
     if n < FEWEST_SHARP:
         return 0.0, np.inf, n
-    # Clipped at five robust standard deviations, so that single losses do not dominate.
+    # Clipped at robust standard deviations, so that single losses do not dominate.
     e = extra_s[sharp]
-    bound = 5.0 * 1.4826 * np.median(np.abs(e), axis=0)
+    bound = SURE * np.sqrt(np.median(e**2, axis=0) / MEDIAN_CHI2[1])
     product = np.prod(np.clip(e, -bound, bound), axis=1)
     weight = 1.0 / (np.prod(sigma_s[sharp], axis=1) + (0.05 * step_s) ** 2)
     value = float((weight * product).sum() / weight.sum())
@@ -155,31 +92,6 @@ class TimingJitter(DirectEffect):
     is_sought_again = True
 
     def find(self, context: Context) -> Evidence | None:
-        return self._wrong_timestamps(context) or self._uneven_samples(context)
-
-    def _wrong_timestamps(self, context: Context) -> Evidence | None:
-        found = timestamp_errors(context.obs)
-        if found is None or found.sigma > CLEAR or abs(found.followed) > CLEAR + 3.0 * found.sigma:
-            return None
-        even = found.even_s
-
-        def reweigh(obs: Observations) -> Observations:
-            if len(even) != len(obs.time_s):
-                return obs  # samples were inserted since
-            again = observe(obs.recording.with_same_readings(time_s=even), obs.segments, obs.averaging)
-            return replace(
-                again, move_ranges=obs.move_ranges, move_poses=obs.move_poses, jitter_s=obs.jitter_s,
-                disturbed_s=obs.disturbed_s,
-            )  # fmt: skip
-
-        return Evidence(
-            float(max(ndtr((found.followed - 1.0) / max(found.sigma, 1e-3)), 1e-300)), max(found.gain, 1.0),
-            (EffectParameter("timestamp_error", found.rms_s, found.rms_s * max(found.sigma, 1e-3), "s"),),
-            self.reported("timestamps", rms_s=found.rms_s, followed=found.followed, sigma=found.sigma),
-            "timing", reweigh=reweigh,
-        )  # fmt: skip
-
-    def _uneven_samples(self, context: Context) -> Evidence | None:
         step_s = 1.0 / context.obs.recording.rate_hz
         value, spread, n = common_time_error(context)
         if n < FEWEST_SHARP or value <= 0.0:
@@ -189,7 +101,7 @@ class TimingJitter(DirectEffect):
         if z < SURE or jitter < ORDINARY * step_s:
             return None
         return Evidence(
-            float(max(ndtr(-z), 1e-300)), float(z**2),
+            float(ndtr(-z)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
             self.reported("samples", jitter_s=jitter), "timing", reweigh=lambda obs: replace(obs, jitter_s=jitter),
         )  # fmt: skip

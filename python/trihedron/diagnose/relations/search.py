@@ -9,14 +9,12 @@ from itertools import chain
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.diagnose.candidates import PRIOR_SCALES
+from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, ROOM_VECTOR, Signal, room, signals
 
-N_FITTED = 3
-"""Relations that are evaluated with noise strengths refitted before the best is chosen."""
 ALL_AXES = (0, 1, 2)
 ANY_BY_ANY = ("rate", HISTORY, "rate products")
 """Families of vectors: three of their variables together may act on any axis."""
@@ -28,9 +26,6 @@ class Empirical(Effect):
     """Dependence of readings on a variable without a mechanism: an effect that is in no catalogue."""
 
     id = ""
-
-    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
-        return []
 
 
 EMPIRICAL = Empirical()
@@ -120,7 +115,7 @@ def _led(leading: list[list[Leader]], signal: Signal, ways: list[Way], gains: li
         way, scale = np.unravel_index(int(stacked[:, :, look].argmax()), stacked.shape[:2])
         kept.append((float(stacked[way, scale, look]), signal, ways[way], PRIOR_SCALES[scale]))
         # Columns are computed again for the leading ways only.
-        out[look] = sorted(kept, key=lambda one: -one[0])[:N_FITTED]
+        out[look] = sorted(kept, key=lambda one: -one[0])[:N_LEADERS]
     return out
 
 

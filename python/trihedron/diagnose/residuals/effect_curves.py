@@ -92,7 +92,7 @@ LEAST_PART = 0.4
 """Component of gravity along an axis, relative to g, below which a pose does not determine that axis."""
 BEYOND = 0.1
 """Extension of a curve beyond the poses, as a share of their range."""
-SIDES = (("accelerometer", "force", "static-accel"), ("gyroscope", "rate", "static-gyro"))
+SIDES = (("accelerometer", "static-accel"), ("gyroscope", "static-gyro"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def effect_curves(
     known = drivers(context)
     by_domain = {one.domain: one for one in residuals}
     out = []
-    for (sensor, _, domain), side in zip(SIDES, columns, strict=True):
+    for (sensor, domain), side in zip(SIDES, columns, strict=True):
         if side is None:
             continue
         found = [one for k in range(side.shape[2]) if (one := _driven(context, known, side[:, :, k], k)) is not None]
@@ -167,7 +167,7 @@ def bias_curves(
     context: Context, sensor: int, path: FloatArray, std: FloatArray, residuals: Sequence[DomainResiduals]
 ) -> tuple[EffectCurve, ...]:
     """A bias random walk as curves over time: ``path`` (poses, 3) with standard uncertainties (3,), SI."""
-    name, _, domain = SIDES[sensor]
+    name, domain = SIDES[sensor]
     h = context.obs.n_poses
     left = next((one for one in residuals if one.domain == domain), None)
     time = Driver("time", 0, context.time_s)
@@ -175,13 +175,10 @@ def bias_curves(
     for axis in range(3):
         column = _Column(axis, np.zeros(context.n_points), np.eye(3)[axis], time, False)
         poses, data = _of_poses(context, name, column, left)
+        at = tuple(poses.tolist()), time.values[poses], data + path[poses, axis]
         out.append(
-            EffectCurve(
-                name, axis, "time", 0, False,  # type: ignore[arg-type]
-                time.values[:h], path[:, axis], np.full(h, std[axis]),
-                tuple(int(k) for k in poses), time.values[poses], data + path[poses, axis],
-            )
-        )  # fmt: skip
+            EffectCurve(name, axis, "time", 0, False, time.values[:h], path[:, axis], np.full(h, std[axis]), *at)  # type: ignore[arg-type]
+        )
     return tuple(out)
 
 

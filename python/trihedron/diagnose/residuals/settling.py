@@ -19,8 +19,8 @@ SETTLES_S = (0.7, 1.4, 2.8, 5.6)
 """Time constants of supports, s: foam and skin, not the hours of a glue."""
 SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
 """Values tried for scatter and settling, in rms error of the readings: a quarter of an LSB is 10 %."""
-LEVEL = 0.5
-"""Cosine to the vertical that separates the level axes (0) from it (1)."""
+CONTRASTS = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
+"""(5, 6) orthonormal contrasts of the six part means."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,15 @@ def settling(context: Context) -> Settling:
     ``k`` across the vertical, the shape in time all of it. One bias ``z`` for the session, restricted likelihood.
     """
     directions = _directions(context)
-    tables = [table for tau in SETTLES_S if (table := _table(directions, tau)) is not None]
-    if not tables:
+    if directions is None:
         return Settling(0.0, 0.0)
+    tables = [_table(directions, tau) for tau in SETTLES_S]
     scale = tables[0].unit
     none = tables[0].log_likelihood(np.zeros(1), np.zeros(1))[0]
     scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
     a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
     both = []
-    for table, tau in zip(tables, SETTLES_S, strict=False):
+    for table, tau in zip(tables, SETTLES_S, strict=True):
         values = table.log_likelihood(a, b)
         best = int(values.argmax())
         both.append((float(values[best]), float(np.sqrt(b[best])), tau))
@@ -121,29 +121,26 @@ class _Table:
         return np.asarray(-0.5 * (np.log(det).sum(axis=1) + yy.sum(axis=1) - fitted + log_n))
 
 
-CONTRASTS = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
-"""(5, 6) orthonormal contrasts of the six part means."""
-
-
 @dataclass(frozen=True, eq=False)
-class _Direction:
-    """One direction ``axis`` (3,) of a pose: readings ``y`` in units of their noise, rates first; ``error`` noise of a
-    rate; parts of the pose from ``begins`` to ``ends``, s; ``tilt`` noise of the tilt about a level axis, else zero."""
+class _Directions:
+    """Three directions of every pose, ``axes`` (n, 3), the vertical and two level ones: readings ``y`` (n, 11) in units
+    of their noise, the rates of the parts and contrasts of the tilt; ``error`` (n, 1) noise of a rate, ``tilt`` (n, 1)
+    of the tilt, infinite about the vertical; ``begins`` (n, 6) of the parts and their duration ``lasts`` (n, 1), s."""
 
-    axis: FloatArray
+    axes: FloatArray
     y: FloatArray
-    error: float
-    tilt: float
+    error: FloatArray
+    tilt: FloatArray
     begins: FloatArray
-    ends: FloatArray
+    lasts: FloatArray
 
 
-def _directions(context: Context) -> list[_Direction]:
+def _directions(context: Context) -> _Directions | None:
     obs, state = context.obs, context.fitted.state
     noise = obs.pose_rate_noise
     if obs.raw_rate is None or noise is None:
-        return []
-    out = []
+        return None
+    rows = []
     for i, pose in enumerate(obs.segments.poses):
         n = (pose.stop - pose.start) // N_BLOCKS
         if n < 2:
@@ -152,33 +149,26 @@ def _directions(context: Context) -> list[_Direction]:
         rate = np.nanmean(obs.raw_rate[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.gyro_S.T
         force = np.nanmean(obs.raw_force[span].reshape(N_BLOCKS, n, 3), axis=1) @ state.accel_S.T / state.gravity
         up = state.up[i]
+        axes = np.linalg.svd(up[None])[2]
+        error = np.sqrt((axes @ state.gyro_S) ** 2 @ noise[i] ** 2 * N_BLOCKS)[:, None]
+        # A tilt changes the force along the other level axis; its white noise is that of the quiet floor.
+        across = np.cross(axes[1:], up) @ state.accel_S
+        level = np.sqrt(across**2 @ obs.pose_force_sigma[i] ** 2 * N_BLOCKS) / state.gravity
+        tilt = np.array([np.inf, *level])[:, None]
         # Rotation of the vertical since the mean of the pose, across it.
-        angle = np.cross(force - force.mean(axis=0), up)
-        begins = np.arange(N_BLOCKS) * n / obs.recording.rate_hz
-        ends = begins + n / obs.recording.rate_hz
-        for axis in np.linalg.svd(up[None])[2]:
-            own = float(np.sqrt(((axis @ state.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
-            y, tilt = rate @ axis / own, 0.0
-            if abs(float(axis @ up)) < LEVEL:
-                # A tilt changes the force along the other level axis; its white noise is that of the quiet floor.
-                across = np.cross(axis, up) @ state.accel_S
-                tilt = float(np.sqrt((across**2 * obs.pose_force_sigma[i] ** 2).sum() * N_BLOCKS)) / state.gravity
-                y = np.concatenate([y, CONTRASTS @ angle @ axis / tilt])
-            out.append(_Direction(axis, y, own, tilt, begins, ends))
-    return out
-
-
-def _table(directions: list[_Direction], tau: float) -> _Table | None:
-    if len(directions) < 3 * FEWEST_POSES:
+        turned = CONTRASTS @ np.cross(force - force.mean(axis=0), up) @ axes.T
+        y = np.hstack([(rate @ axes.T).T / error, turned.T / tilt])
+        last = n / obs.recording.rate_hz
+        rows.append((axes, y, error, tilt, np.tile(last * np.arange(N_BLOCKS), (3, 1)), np.full((3, 1), last)))
+    if len(rows) < FEWEST_POSES:
         return None
-    sums = []
-    for one in directions:
-        fades = tau * (np.exp(-one.begins / tau) - np.exp(-one.ends / tau)) / (one.ends - one.begins)
-        y, a, b = one.y, np.ones(N_BLOCKS) / one.error, fades / one.error
-        if len(y) > N_BLOCKS:
-            a = np.concatenate([a, np.zeros(N_BLOCKS - 1)])
-            b = np.concatenate([b, CONTRASTS @ (tau * (1.0 - fades)) / one.tilt])
-        sums.append([a @ a, a @ b, b @ b, a @ y, b @ y, y @ y])
-    aa, ab, bb, ay, by, yy = np.array(sums).T
-    unit = float(np.median([one.error / np.sqrt(N_BLOCKS) for one in directions]))
-    return _Table(aa, ab, bb, ay, by, yy, np.array([one.axis for one in directions]), unit)
+    return _Directions(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def _table(of: _Directions, tau: float) -> _Table:
+    fades = tau * (np.exp(-of.begins / tau) - np.exp(-(of.begins + of.lasts) / tau)) / of.lasts
+    a = np.hstack([np.ones(fades.shape) / of.error, np.zeros((len(fades), len(CONTRASTS)))])
+    b = np.hstack([fades / of.error, tau * (1.0 - fades) @ CONTRASTS.T / of.tilt])
+    pairs = ((a, a), (a, b), (b, b), (a, of.y), (b, of.y), (of.y, of.y))
+    aa, ab, bb, ay, by, yy = ((one * other).sum(axis=1) for one, other in pairs)
+    return _Table(aa, ab, bb, ay, by, yy, of.axes, float(np.median(of.error)) / math.sqrt(N_BLOCKS))

@@ -14,6 +14,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import LEAST_P
 from trihedron.records.domains import DomainTest, Where
 
 MIN_LINE_SHARE = 0.03
@@ -60,7 +61,7 @@ class Line:
     @property
     def share(self) -> float:
         """Variance of the line over that of the static readings."""
-        return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
+        return 0.5 * self.amplitude**2 / self.rms_before**2 if self.rms_before > 0.0 else 0.0
 
     @property
     def has_size(self) -> bool:
@@ -196,8 +197,8 @@ def _refine(
     rest = ~early
     left = x[rest] - _basis(t[rest], best_f) @ _sinusoid(t[early], x[early], best_f)
     before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean(left**2)))
-    frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / max(amplitude, 1e-300) / np.sqrt(2.0))
-    return Line(c, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300), noise, before, after)
+    frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / amplitude / np.sqrt(2.0))
+    return Line(c, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, LEAST_P), noise, before, after)
 
 
 def _wandering(
@@ -229,7 +230,7 @@ def _wandering(
     before, after = np.sqrt(sums / max(n, 1))
     sigma = noise * float(np.sqrt(2.0 / lengths.sum()))
     of_frequency = float(resolution / max(np.sqrt(lengths.sum() / lengths.mean()), 1.0))
-    found = (amplitude, sigma, max(p, 1e-300), noise, float(before), float(after))
+    found = (amplitude, sigma, max(p, LEAST_P), noise, float(before), float(after))
     return Line(c, f, of_frequency, resolution, *found)
 
 
@@ -271,14 +272,22 @@ def pose_scatter(obs: Observations) -> PoseScatter:
     return PoseScatter(relative, freedom, np.asarray(chdtrc(freedom[:, None], freedom[:, None] * relative)))
 
 
+def loud_poses(obs: Observations) -> FloatArray:
+    """(poses, channels) p-values of poses that are louder than usual, times the number of looks; 1 for the others.
+
+    A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
+    """
+    scatter = pose_scatter(obs)
+    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
+    is_loud = steady[:, None] & (scatter.ratio > LOUD)
+    return np.where(is_loud, np.minimum(scatter.p_value * scatter.p_value.size, 1.0), 1.0)
+
+
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, corrected for the number of tests."""
-    scatter = pose_scatter(obs)
-    n_looks = scatter.p_value.size
-    # A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
+    scatter, loud = pose_scatter(obs), loud_poses(obs)
+    p_scatter = float(loud.min(initial=1.0))
     steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
-    p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
@@ -288,11 +297,11 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
-        poses = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
+        poses = np.flatnonzero(loud.min(axis=1) < alpha)[:8]
         t = obs.time_s
         spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in poses)
         strong = [line for line in lines if line.p_value < alpha]
-        loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
+        loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) < alpha)]
         channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
         where = Where(channels, obs.pose_names(poses), spans, tuple(line.frequency_hz for line in strong))
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

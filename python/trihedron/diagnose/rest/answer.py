@@ -16,10 +16,11 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, smooth_curve, thermal_curve
+from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.probability import LEAST_P
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
@@ -202,7 +203,7 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         for j, name in enumerate(curve.names)
         for k, axis in enumerate(AXES)
     ]
-    raw, rest = curve.raw * size, curve.rest * size
+    raw, rest = side.biases, curve.rest * size
     gap = branch_gap(side.pieces, rest)
     if gap is not None:
         parameters += [
@@ -210,23 +211,24 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
             for axis, g, s in zip(AXES, *gap, strict=True)
         ]
     effect_id, is_accelerometer = side.id("thermal-bias"), side.sensor == ACCELEROMETER
-    order, (low, high) = sum(name in POWERS for name in curve.names), curve.range_degc
+    order, heat = sum(name in POWERS for name in curve.names), side.pieces.temperature
+    assert heat is not None
     statement = effect_words(
-        effect_id, side.case, low_degc=low, high_degc=high, is_straight=order == 1, is_parabola=order == 2,
-        has_rate="bias_per_kelvin_per_s" in curve.names, has_branches="half_gap" in curve.names,
+        effect_id, side.case, low_degc=float(heat.min()), high_degc=float(heat.max()), is_straight=order == 1,
+        is_parabola=order == 2, has_rate="bias_per_kelvin_per_s" in curve.names, has_branches="half_gap" in curve.names,
         swing=curve.swing * size, left=rest.std(axis=0), raw=raw.std(axis=0), has_gap=gap is not None,
         gap=() if gap is None else gap[0], is_one_pose=is_accelerometer and side.pieces.n_poses == 1,
     )  # fmt: skip
     mean_size = float(np.sqrt(np.mean(size**2)))
-    held = HeldOut(DOMAINS[side.sensor], 1.0, (curve.held_after / curve.held_before) ** 2,
-                   curve.held_before * mean_size, curve.held_after * mean_size, unit)  # fmt: skip
+    before, after = curve.held_out
+    held = HeldOut(
+        DOMAINS[side.sensor], 1.0, (after / before) ** 2, before * mean_size, after * mean_size, unit
+    )  # fmt: skip
     series = {"time_s": side.pieces.time_s.tolist(), "value": side.biases.T.tolist(),
-              "pose": side.pieces.pose.tolist(), "unit": unit}  # fmt: skip
-    if side.pieces.temperature is not None:
-        series["temperature_degc"] = side.pieces.temperature.tolist()
+              "pose": side.pieces.pose.tolist(), "unit": unit, "temperature_degc": heat.tolist()}  # fmt: skip
     return AcceptedEffect(
         id=effect_id, statement=statement, parameters=tuple(parameters),
-        p_adjusted=float(min(1.0, max(curve.p_value, 1e-300) * n_effects)), delta_bic=curve.gain - curve.cost,
+        p_adjusted=float(min(1.0, max(curve.p_value, LEAST_P) * n_effects)), delta_bic=curve.score,
         held_out=(held,), confounded_with=("accel-thermal-scale",) if is_accelerometer else (),
         separating_experiment=experiment_for(effect_id, is_static=True) if is_accelerometer else "",
         model=_model("rest-curve", series),
@@ -245,19 +247,17 @@ def _drift(side: _Side) -> tuple[DriftCurve | None, float, bool]:
 
     ``None`` where they do not change slowly. The noise of every sensor becomes a walk; a smooth drift is an effect.
     """
-    together = side.pieces.readings(side.sensor, range(3))
-    found = slow_change(together)
+    found = slow_change(side.pieces.readings(side.sensor))
     if not found.is_slow:
         return None, found.p_value, False
-    columns = list(range(together.design.shape[1]))
-    curve = smooth_curve(found.process, columns, found.sigma, together.time_s[::2])
-    return curve, max(found.p_value, 1e-300), found.is_smooth
+    curve = found.curve(range(side.pieces.n_poses), side.pieces.time_s[::2])
+    return curve, max(found.p_value, LEAST_P), found.is_smooth
 
 
 def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> AcceptedEffect:
     size, spans = side.size, curve.range * side.size
     errors = [float(np.hypot(s[v.argmax()], s[v.argmin()])) for v, s in zip(curve.values, curve.sigma, strict=True)]
-    whole = max(float(side.biases.var(axis=0).sum()), 1e-300)
+    whole = float(side.biases.var(axis=0).sum())
     series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
               "sigma": (curve.sigma * size[:, None]).tolist(), "unit": side.unit}  # fmt: skip
     parameters = [
@@ -296,6 +296,6 @@ def _lines(
         return test, None
     return test, AcceptedEffect(
         id=effect.id, statement=found.statement, parameters=found.parameters,
-        p_adjusted=float(min(1.0, max(found.p_value, 1e-300) * len(catalogue()))), delta_bic=found.strength,
+        p_adjusted=float(min(1.0, found.p_value * len(catalogue()))), delta_bic=found.strength,
         held_out=found.held_out, model=_model("", {}), share=found.share,
     )  # fmt: skip

@@ -62,14 +62,13 @@ class RestPieces:
         level = np.array([values[self.pose == p].mean(axis=0) for p in range(self.n_poses)])
         return np.asarray(values - level[self.pose])
 
-    def readings(self, sensor: int, axes: Sequence[int], columns: Sequence[FloatArray] = ()) -> BiasReadings:
-        """Readings of some axes for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
+    def readings(self, sensor: int, columns: Sequence[FloatArray] = ()) -> BiasReadings:
+        """Readings of a sensor for the bias process: columns of a bias per orientation, then ``columns`` (n,) each."""
         levels = [np.ones(len(self.time_s))]
         levels += [(self.pose == k).astype(np.float64) for k in range(1, self.n_poses)]
         return BiasReadings(
-            np.ascontiguousarray(self.means[sensor].T[axes]), self.sigma[sensor][axes][:, None] / np.sqrt(self.count),
+            np.ascontiguousarray(self.means[sensor].T), self.sigma[sensor][:, None] / np.sqrt(self.count),
             self.time_s, self.length_s, self.piece, np.column_stack([*levels, *columns]),
-            np.ones((len(self.time_s), 1)),
         )  # fmt: skip
 
 
@@ -89,8 +88,7 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
         rough = np.array([np.nanvar(np.diff(values[a : a + 2 * half], axis=0), axis=0) / 2.0 for a in starts])
         step = _at_least(np.zeros(3), known) ** 2
         quiet = np.maximum(np.nanquantile(rough, QUIET_QUANTILE, axis=0), step)
-        limit = LOUD * np.maximum(quiet, 1e-300)
-        loud |= ~(rough <= limit).all(axis=1)
+        loud |= ~(rough <= LOUD * quiet).all(axis=1)
         noise.append(np.sqrt(np.maximum(np.nanmedian(rough[~loud], axis=0), quiet) if (~loud).any() else quiet))
     means = [np.array([[np.nanmean(v[a + k * half : a + (k + 1) * half], axis=0) for k in (0, 1)] for a in starts])
              for v in sides]  # fmt: skip
@@ -143,11 +141,10 @@ def _orientations(force: FloatArray) -> IntArray:
     found = 0
     while (out < 0).any():
         free = np.flatnonzero(out < 0)
-        near = np.arccos(np.clip(up[free] @ up[free].T, -1.0, 1.0)) < SAME_POSE_RAD
-        members = free[near[near.sum(axis=1).argmax()]]
-        # A drifting bias widens an orientation: select once more about the mean of the members found.
-        centre = up[members].mean(axis=0)
-        members = free[np.arccos(np.clip(up[free] @ (centre / np.linalg.norm(centre)), -1.0, 1.0)) < SAME_POSE_RAD]
+        near = up[free] @ up[free].T > np.cos(SAME_POSE_RAD)
+        # A drifting bias widens an orientation: it is selected about the mean of the largest group.
+        centre = up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)
+        members = free[up[free] @ (centre / np.linalg.norm(centre)) > np.cos(SAME_POSE_RAD)]
         if len(members) < max(LEAST_SHARE * len(up), FEWEST_OF_POSE):
             break
         out[members] = found

@@ -1,12 +1,22 @@
-"""Accelerometer bias that differs from pose to pose."""
+"""Bias that differs from pose to pose."""
 
 from __future__ import annotations
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import ACCELEROMETER
+from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
+
+
+class GyroBiasRepeatability(BiasProcess):
+    """The bias of every axis is drawn anew in every pose, beyond noise and drift."""
+
+    is_spread = True
+    id, sensor, walks = "gyro-bias-repeatability", GYRO, False
+
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        return per_axis_parameters("sigma", size, std, self.unit), self.told("scatter", sigma=size)
 
 
 class AccelBiasRepeatability(BiasProcess):

@@ -1,0 +1,191 @@
+"""Rotations on a table by multiples of 90°: a table that is not level, rotations that miss their angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import trapezoid
+from scipy.special import chdtrc, ndtr, stdtrit
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
+from trihedron.records.words import why_not
+
+NEAR_DEG = 12.0
+"""Distance from a multiple of 90° within which an intended one ends; moves by hand end anywhere."""
+MOST_SWING_DEG = 8.0
+"""On a table tilted by 4° half a turn moves the vertical in the body by twice that."""
+MOST_ACROSS = 0.25
+"""Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
+FEWEST_TURNS, NEARLY_ALL = 4, 0.7
+"""Hand moves end near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
+P_LIMIT = 1e-4
+"""False-alarm rate of the χ² tests on a level table and on all angles together: none in 24 healthy sessions."""
+HALF_RIGHT_RAD = np.pi / 4
+"""45°: a smaller angle is nearer to 0° than to 90°."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableTurn:
+    """One move about the vertical between two poses of the same face: angle and its error to a multiple of 90°."""
+
+    move: int
+    angle_rad: float
+    error_rad: float
+
+
+def table_turns(context: Context) -> list[TableTurn]:
+    """Moves about the vertical throughout: the vertical in the body is the same before and after."""
+    state = context.fitted.state
+    out = []
+    for m, where in enumerate(context.moves):
+        before, after = context.obs.move_poses[m]
+        up = state.up[before]
+        if up @ state.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
+            continue
+        t = context.time_s[where]
+        about_up = context.rate[where] @ up
+        across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
+        angle = float(trapezoid(about_up, t))
+        if abs(angle) < HALF_RIGHT_RAD or np.mean(across) > MOST_ACROSS * np.mean(np.abs(about_up)):
+            continue
+        error = (angle + HALF_RIGHT_RAD) % (2.0 * HALF_RIGHT_RAD) - HALF_RIGHT_RAD
+        out.append(TableTurn(m, angle, float(error)))
+    return out
+
+
+class TableEffect(DirectEffect):
+    """An effect of an experiment on a table."""
+
+    is_of_session = True
+
+    def unavailable(self, context: Context) -> str | None:
+        """Unless at least four rotations, nearly all of them close to a multiple of 90°, are meant as such."""
+        near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in table_turns(context)]
+        is_there = len(near) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
+        return None if is_there else why_not("no-table-turns")
+
+
+FEWEST_TO_SCATTER = 3
+"""Rotations from which their scatter is used."""
+LEAST_SINE = 0.3
+"""Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
+ORDINARY_DEG = 0.05
+"""Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
+
+
+def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
+    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise.
+
+    Neighbouring rotations share a pose, and a scatter of four values has an uncertainty of 40 %. It is widened so that
+    two standard errors of a t distribution cover as much as those of a normal one.
+    """
+    share = weights / weights.sum()
+    by_noise = float(np.sqrt((share**2 * noise**2).sum()))
+    n = len(values)
+    if n < FEWEST_TO_SCATTER:
+        return by_noise
+    variance = float((share * (values - (share * values).sum()) ** 2).sum()) * n / (n - 1)
+    wider = float(stdtrit(n - 1, ndtr(2.0)) / 2.0)
+    return max(by_noise, wider * float(np.sqrt(variance * (share**2).sum())))
+
+
+class TableTilt(TableEffect):
+    """Rotating on a tilted table turns the vertical about the table's normal; it returns only after a full turn."""
+
+    id = "table-tilt"
+
+    def find(self, context: Context) -> Evidence | None:
+        state, obs = context.fitted.state, context.obs
+        chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
+        for turn in table_turns(context):
+            before, after = obs.move_poses[turn.move]
+            half = abs(np.sin(turn.angle_rad / 2.0))
+            if half < LEAST_SINE:
+                continue
+            change = state.up[after] - state.up[before]
+            variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
+            sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
+            chi2 += float(change @ change) / sigma**2
+            dof += 2
+            tilts.append(float(np.linalg.norm(change)) / (2.0 * half))
+            weights.append(half**2)
+            noises.append(sigma / (2.0 * half))
+        if dof == 0:
+            return None
+        p = float(chdtrc(dof, chi2))
+        tilt = float(np.degrees(np.average(tilts, weights=weights)))
+        scatter = _error_of_mean(np.degrees(tilts), np.array(weights), np.degrees(noises))
+        if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * scatter:
+            return None
+        return Evidence(
+            p, chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
+            self.told("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
+        )  # fmt: skip
+
+
+OFF_SIGMA = 4.0
+"""Deviation in sigma from which a rotation is named: by chance one of 16 000."""
+
+
+class TurnAngleError(TableEffect):
+    """Rotations on a table against a stop deviate from their multiple of 90° by more than the gyro's own error."""
+
+    id = "turn-angle-error"
+
+    def find(self, context: Context) -> Evidence | None:
+        turns = table_turns(context)
+        errors, sigmas = _without_common_scale(context, turns)
+        z = errors / sigmas
+        chi2 = float((z**2).sum())
+        p = float(chdtrc(len(z), chi2))
+        bad = np.flatnonzero(np.abs(z) > OFF_SIGMA)
+        if p > P_LIMIT or len(bad) == 0:
+            return None
+        parameters = tuple(
+            EffectParameter(
+                f"error_move{turns[k].move}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg"
+            )
+            for k in bad
+        )
+        t = context.obs.time_s
+        spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
+        return Evidence(
+            p, chi2, parameters,
+            self.told(
+                "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
+            ),
+            "moves", Where(("gx", "gy", "gz"), context.obs.move_names([turns[k].move for k in bad]), spans),
+        )  # fmt: skip
+
+
+def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[FloatArray, FloatArray]:
+    """Errors of the rotations without the part that one scale error per body axis explains, and their noise [rad].
+
+    A scale error grows with the angle and is the same for every rotation about an axis. The weighted median of error
+    over angle is robust against single wrong rotations.
+    """
+    noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
+    axes = np.array(
+        [int(np.abs(context.fitted.state.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
+    )
+    errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
+    sigmas = np.zeros(len(turns))
+    for k, turn in enumerate(turns):
+        where = context.moves[turn.move]
+        duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
+        sigmas[k] = np.hypot(noise * np.sqrt(duration), 1e-3)
+    for axis in range(3):
+        rows = axes == axis
+        if rows.sum() < 2:
+            continue
+        ratio, weight = errors[rows] / angles[rows], np.abs(angles[rows])
+        order = np.argsort(ratio)
+        heavy = np.cumsum(weight[order])
+        common = float(ratio[order][np.searchsorted(heavy, 0.5 * heavy[-1])])
+        errors[rows] -= common * angles[rows]
+    return errors, sigmas
