@@ -21,7 +21,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_r
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
-from trihedron.probability import LEAST_P, NORMAL_95
+from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.session.model import misfits

@@ -162,8 +162,8 @@ def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
         return float(((reduced - _model(reduced, [*lines, f])[0]) ** 2).sum())
 
     bin_ = 1.0 / len(part)
-    options = {"xatol": REFINED * bin_}
-    return float(minimize_scalar(left, bounds=(near - bin_, near + bin_), method="bounded", options=options).x)
+    within = (near - bin_, near + bin_)
+    return float(minimize_scalar(left, bounds=within, method="bounded", options={"xatol": REFINED * bin_}).x)
 
 
 def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -205,7 +205,8 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
     if np.count_nonzero(usable) < FEWEST_POSES:
         return 0.0
     spans, size, up = spans[usable], size[usable], up[usable]
-    return float(_between_poses(*(_steps(readings, spans, up[:, None, :], n) for n in (2, PARTS)), spans)[0])
+    halves, parts = (_steps(readings, spans, up[:, None, :], n) for n in (2, PARTS))
+    return float(_between_poses(halves, parts, spans)[0])
 
 
 def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
@@ -213,7 +214,8 @@ def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
     spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
     if len(spans) < FEWEST_POSES:
         return 0.0
-    found = _between_poses(*(_steps(readings, spans, np.eye(3)[None], n) for n in (2, PARTS)), spans)
+    halves, parts = (_steps(readings, spans, np.eye(3)[None], n) for n in (2, PARTS))
+    found = _between_poses(halves, parts, spans)
     return float(np.sqrt(np.mean(found**2)))
 
 

@@ -45,4 +45,6 @@ class AxisHandedness(DirectEffect):
         )  # fmt: skip
         signed = zip(AXES, signs, strict=True)
         parameters = tuple(EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in signed)
-        return Evidence(0.0, CERTAIN, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)))
+        return Evidence(
+            0.0, CERTAIN, parameters, statement, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes))
+        )

@@ -16,7 +16,7 @@ class GyroBiasRepeatability(BiasProcess):
     id, sensor, walks = "gyro-bias-repeatability", GYRO, False
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
-        return per_axis_parameters("sigma", size, std, self.unit), self.told("scatter", sigma=size)
+        return per_axis_parameters("sigma", size, std, self.unit), self.reported("scatter", sigma=size)
 
 
 class AccelBiasRepeatability(BiasProcess):

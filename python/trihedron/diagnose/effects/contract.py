@@ -145,7 +145,7 @@ class Effect:
         """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
         linear = [p for p in parameters if p.name not in SHAPE_NAMES]
         strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, LEAST_RMS))
-        return self.told(
+        return self.reported(
             "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
             unit=strongest.unit,
         )  # fmt: skip

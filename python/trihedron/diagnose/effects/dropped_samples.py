@@ -20,7 +20,6 @@ from trihedron.diagnose.effects.lost_samples import (
 )
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.diagnose.session.state import NO_DISTORTION, Prior, SessionState
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.model import Prior, SessionState

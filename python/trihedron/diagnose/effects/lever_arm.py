@@ -84,9 +84,9 @@ class LeverArm(DirectEffect):
         parameters = tuple(
             EffectParameter(f"r_{axis}", float(v), float(s), "m") for axis, v, s in zip(AXES, arm, sigma, strict=True)
         )
-        told = self.told("arm", arm_m=float(np.linalg.norm(arm)), share=share)
+        statement = self.reported("arm", arm_m=float(np.linalg.norm(arm)), share=share)
         strength = float(len(moves.target) * np.log(before / after))
-        return Evidence(p_value, strength, parameters, told, "dynamics", Where(("ax", "ay", "az")), (held,))
+        return Evidence(p_value, strength, parameters, statement, "dynamics", Where(("ax", "ay", "az")), (held,))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from trihedron.diagnose.effects.direct import MUST_HALVE
 from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import move_residuals, wrt_lost_time
-from trihedron.diagnose.session.state import SessionState
 from trihedron.records import Recording, Segments
+from trihedron.session.model import SessionState
 
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""

@@ -155,7 +155,7 @@ class Quantisation(DirectEffect):
             times=worst.step / worst.sigma,
         )  # fmt: skip
         return Evidence(
-            0.0, strength, _parameters(context, found), told, "within-static", Where(names),
+            0.0, strength, _parameters(context, found), statement, "within-static", Where(names),
             reweigh=reweigh, share=grid / (grid + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip

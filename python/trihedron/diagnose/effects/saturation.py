@@ -14,7 +14,6 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
-from trihedron.diagnose.session.state import DYNAMICS, MOVES
 from trihedron.probability import LEAST_P, MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where

@@ -124,7 +124,7 @@ class TableTilt(TableEffect):
             return None
         return Evidence(
             p, chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
-            self.told("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
+            self.reported("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ class TurnAngleError(TableEffect):
         spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
         return Evidence(
             p, chi2, parameters,
-            self.told(
+            self.reported(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),
             "moves", Where(("gx", "gy", "gz"), context.obs.move_names([turns[k].move for k in bad]), spans),
