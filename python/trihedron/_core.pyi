@@ -624,7 +624,9 @@ def move_shifted(
 # reference_motion
 @final
 class ReferenceLog:
-    def __new__(cls, start_s: float, step_s: float, is_valid: BoolArray, signals: FloatArray) -> ReferenceLog: ...
+    def __new__(
+        cls, start_s: float, step_s: float, is_valid: BoolArray, signals: FloatArray, axes: FloatArray
+    ) -> ReferenceLog: ...
     def blocks(self, rate: FloatArray, time_s: FloatArray, attitude: FloatArray, block: int) -> ReferenceBlocks: ...
 
 @final

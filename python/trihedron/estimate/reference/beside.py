@@ -155,7 +155,7 @@ class Beside:
         n = len(self.grid.time_s)
         force = np.zeros((n, 0)) if self.force is None else self.force
         signals = np.ascontiguousarray(np.column_stack([self.grid.gyroscope, np.ones(n), own**2, own**3, force]))
-        log = ReferenceLog(float(self.grid.time_s[0]), self.grid.step_s, self.seen, signals)
+        log = ReferenceLog(float(self.grid.time_s[0]), self.grid.step_s, self.seen, signals, along)
         time, attitude = self.attitudes(point)
         blocks = log.blocks(self.corrected(point), time, attitude, max(2, round(block_s / self.grid.step_s)))
         M = blocks.moments().reshape(-1, 3, 3, signals.shape[1])

@@ -95,11 +95,11 @@ def fit_motion(
         else:
             break
         points, problems = ahead, there
-    return MotionFit(sides, points, where, problems, fit(problems, strengths), wider)
+    return MotionFit(sides, points, where, problems, fit(problems, strengths, is_everywhere=before is None), wider)
 
 
 def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
-    """The reference's smoothed slow error under ``strengths`` (7,), at parameters ``mean`` with biases at the start."""
+    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start."""
     *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
@@ -162,25 +162,29 @@ def scores(found: MotionFit) -> list[Scored]:
         if not any(side.has(name) for side in found.sides for name in names):
             continue
         base = tuple(held - set(names))
-        without = _tuned(found, base, {})
+        start = found.fitted.strengths
+        without = _tuned(found, base, {}, start)
         tried: list[MotionFit] = []
         for by in WIDER:
-            tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by)))
+            tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by), start))
             # The evidence has one maximum over the size: stop beyond it.
             if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
                 break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
+        # An effect must not win by strengths that its absence was not tried with.
+        again = _tuned(found, base, {}, tried[best].fitted.strengths)
+        without = max(without, again, key=lambda one: one.fitted.evidence)
         score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - SEARCH_COST)
         out.append(Scored(ident, score, WIDER[best], tried[best], without))
     return sorted(out, key=lambda one: -one.score)
 
 
-def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float]) -> MotionFit:
-    """Another hypothesis about the same point, with effects at 0 there, under its own most likely strengths."""
+def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float], start: FloatArray) -> MotionFit:
+    """Another hypothesis about the same point, with effects at 0 there, under its own strengths, sought at ``start``."""
     points = [replace(p, g=np.zeros((3, 3)), bend=np.zeros(6)) for p in found.points]
     where = places(found.sides, names)
     problems = _problems(found.sides, points, where, wider)
-    strengths, evidence = most_likely(problems, found.fitted.strengths, found.fitted.spread())
+    strengths, evidence = most_likely(problems, start, found.fitted.spread())
     all_of = together(problems, strengths)
     fitted = Fitted(all_of.mean, all_of.covariance, evidence, strengths, strengths[None])
     return MotionFit(found.sides, points, where, problems, fitted, wider)
