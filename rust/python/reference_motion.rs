@@ -114,6 +114,20 @@ struct ReferenceNormal {
 
 #[pymethods]
 impl ReferenceBlocks {
+    /// The blocks with those excluded where `lost` `(m,)`: their rows are not used, and the attitude begins anew.
+    fn without(&self, lost: PyReadonlyArray1<'_, bool>) -> Self {
+        let mut blocks = self.0.clone();
+        for (block, _) in blocks
+            .iter_mut()
+            .zip(flat1(&lost).iter())
+            .filter(|(_, l)| **l)
+        {
+            block.rows = [0, block.rows[0] + block.rows[1]];
+            block.is_lost = true;
+        }
+        Self(blocks)
+    }
+
     /// `(m,)` mean times of the reference's rows in each block, s.
     fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0

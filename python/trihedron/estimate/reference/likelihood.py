@@ -180,7 +180,7 @@ def most_likely(
 
 
 def _starts(height: Height) -> list[FloatArray]:
-    """Where the search begins: one kind of error of its most likely size, the others typical; the likeliest of these."""
+    """Likeliest points at which one kind of error has its own most likely size and the others are typical."""
     points = TYPICAL + np.einsum("k,ij->ikj", TRIED_SIZES, np.diag(SPREAD)[list(KINDS)])
     heights = np.reshape(side_by_side(height, points.reshape(-1, len(TYPICAL))), points.shape[:2])
     best = heights.argmax(axis=1)
@@ -212,9 +212,9 @@ def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Heig
     return height
 
 
-def fit(problems: Sequence[Problem], start: FloatArray, *, is_everywhere: bool) -> Fitted:
+def fit(problems: Sequence[Problem], start: FloatArray) -> Fitted:
     """Mode of the strengths, a Metropolis walk over their posterior per recording, and parameters averaged over it."""
-    best, evidence = most_likely(problems, start, is_everywhere=is_everywhere)
+    best, evidence = most_likely(problems, start)
     walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
     draws = np.stack(walks, axis=1)
     solved = [_with_mean_bias(problems, draw) for draw in draws]

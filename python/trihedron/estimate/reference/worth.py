@@ -27,8 +27,6 @@ QUIET_PARTS = 50
 QUIETER = 0.8
 """Ratio of the difference's noise, which contains the gyro's, to static noise below which the two are dependent."""
 CERTAIN = 1e-4
-SURPRISE = 1e-6
-"""False alarm rate of a deviating block, divided by the number of blocks."""
 
 
 def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
@@ -38,6 +36,7 @@ def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
     rows = problem.blocks.rows()
     seen = rows[:, 0] > 0
     time = problem.blocks.time_s()
+    lost = found.points[k].deviates(time)
     slow = np.sqrt(np.sum(draws[:, [WORLD, BODY]] ** 2, axis=1))
     is_body = middle[BODY] > middle[WORLD]
     return ReferenceError(
@@ -47,21 +46,10 @@ def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
         is_of_body=bool(is_body),
         rows=int(rows[:, 0].sum()),
         rows_left_out=int(rows[:, 1].sum()),
-        gaps_s=_runs(time, ~seen & (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)),
-        apart_s=_runs(time, surprises(found, k) < SURPRISE / max(int(seen.sum()), 1)),
+        gaps_s=_runs(time, ~seen & ~lost & (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)),
+        apart_s=_runs(time, lost),
         signs=signs_of_this_gyro(found.sides[k], found, k),
     )
-
-
-def surprises(found: MotionFit, k: int) -> FloatArray:
-    """(m,) p-value of each block's innovation under the fit; 1 without rows."""
-    problem = found.problems[k]
-    with_ = np.exp(found.fitted.strengths[k]).tolist()
-    normal = problem.blocks.normal(problem.table, with_)
-    theta = found.fitted.mean[problem.index]
-    left = (normal.innovations @ np.append(-theta, 1.0)).reshape(-1, 3)
-    # `mean` has the bias averaged over time, not that at the start: the filter's first blocks absorb the difference.
-    return np.asarray(chi2.sf(np.sum(left**2, axis=1), 3))
 
 
 def _runs(time: FloatArray, where: np.ndarray) -> tuple[tuple[float, float], ...]:
