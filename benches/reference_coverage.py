@@ -7,7 +7,7 @@ tracked: tests/reference_rig.py, attitude with 0.05° of white error on a clock 
 walk, drone, robot: motions of tests/reference_truths.py, two minutes, truths off by 0.1 to 2° over 4 to 40 s in the
 world or the body, clocks up to 50 ms and 300 ppm apart, walks of the bias; odd seeds have a g-sensitivity of data
 sheets' size, seeds 2 and 3 of every four a position. shaken: 5 Hz all along, so that two offsets of the clock fit, and
-an error is the right result.
+an error is the right result. unsteady: a walk with scales of the gyro that fluctuate by 0.5 % √s (white).
 `--speed`: CPU of the fit beside 2.5 to 10 minutes of walk at 200 Hz, and of `calibrate` on a simulated session.
 """
 
@@ -39,6 +39,7 @@ def shaken(seed):
 
 KINDS = {
     "shaken": shaken,
+    "unsteady": lambda seed: truth(seed, "walk", size_deg=0.1, unsteady=5e-3),
     "tracked": tracked,
     **{
         kind: partial(

@@ -89,20 +89,35 @@ def small_turn(v):
     return turn(0, v[:, 0]) @ turn(1, v[:, 1]) @ turn(2, v[:, 2])
 
 
-def readings(rng, u, C, path, step):
-    """Gyro [rad/s] and accelerometer [m/s²], and the walk (n, 3) of the gyro's bias [rad/s]; white noise besides."""
+def readings(rng, u, C, path, step, unsteady):
+    """Gyro [rad/s] and accelerometer [m/s²], and the walk (n, 3) of the gyro's bias [rad/s]; white noise besides.
+
+    The scales of the gyro are ``unsteady`` [√s]: they fluctuate as white noise of that density.
+    """
     f, w = forces(C, path), rates_of(C)
     n = len(C) // step
     f, w = (x[: n * step].reshape(n, step, 3).mean(axis=1) for x in (f, w))
     dt = step / FINE_HZ
     noise, drift = np.exp(rng.uniform(np.log([5e-5, 2e-6]), np.log([5e-4, 5e-5])))
     bias = np.cumsum(drift * np.sqrt(dt) * rng.normal(size=(n, 3)), axis=0)
+    if unsteady:
+        w = w * (1 + unsteady / np.sqrt(dt) * rng.normal(size=(n, 3)))
     felt = w if u.g_sensitivity is None else w + f @ u.g_sensitivity.T
     gyro = (felt + bias) @ u.M.T + u.c + noise / np.sqrt(dt) * rng.normal(size=(n, 3))
     return gyro, f @ u.N.T + u.d + 0.02 * rng.normal(size=(n, 3)), bias
 
 
-def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=None, lasting_s=None, step=STEP):
+def truth(
+    seed,
+    kind,
+    seconds=120,
+    has_g_sensitivity=False,
+    has_path=False,
+    size_deg=None,
+    lasting_s=None,
+    step=STEP,
+    unsteady=0,
+):
     """One trial: ``kind`` of motion, its truth off by 0.1 to 2° over 4 to 40 s in world or body, clocks apart."""
     rng = np.random.default_rng(seed)
     u = unit(rng)
@@ -112,7 +127,7 @@ def truth(seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size
     t = np.arange(0, seconds, 1 / FINE_HZ)
     C, path = MOTIONS[kind](rng, t)
     arm = rng.uniform(-0.1, 0.1, 3) if has_path else np.zeros(3)
-    gyro, accelerometer, walked = readings(rng, u, C, path + C @ arm, step)
+    gyro, accelerometer, walked = readings(rng, u, C, path + C @ arm, step, unsteady)
     u.c = u.c + u.M @ walked.mean(axis=0)
     lead, ppm = rng.uniform(-0.05, 0.05), rng.uniform(-300, 300)
     k = np.arange(0, len(t), STEP)

@@ -1,6 +1,6 @@
 //! Bindings for a gyro beside a reference motion.
 
-use nalgebra::{DMatrix, Dyn, OMatrix, U3};
+use nalgebra::{DMatrix, Dyn, Matrix3, OMatrix, U3};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use super::arrays::{
-    as_vectors, dmatrix, flat1, flat2, flat3, matrices3, matrix, of3, stack3, vectors,
+    as_vectors, dmatrix, flat1, flat2, flat3, matrices3, matrix, matrix3, of3, stack3, vectors,
 };
 use crate::reference_motion::{Block, Log, Strengths, Truth, blocks, normal, smoothed};
 
@@ -18,7 +18,8 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ReferenceNormal>()
 }
 
-/// A log at even times: its first time and step, validity of samples, and the signals `(n, q)` to be integrated.
+/// A log at even times: its first time and step, validity of samples, the signals `(n, q)` to be integrated, and the
+/// directions `(3, 3)` of the gyro's axes in columns.
 #[pyclass(frozen, module = "trihedron._core")]
 struct ReferenceLog {
     start_s: f64,
@@ -26,6 +27,7 @@ struct ReferenceLog {
     is_valid: Vec<bool>,
     signals: Vec<f64>,
     n_signals: usize,
+    axes: Matrix3<f64>,
 }
 
 #[pymethods]
@@ -36,14 +38,16 @@ impl ReferenceLog {
         step_s: f64,
         is_valid: PyReadonlyArray1<'_, bool>,
         signals: PyReadonlyArray2<'_, f64>,
-    ) -> Self {
-        Self {
+        axes: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Self> {
+        Ok(Self {
             start_s,
             step_s,
             is_valid: flat1(&is_valid).into_owned(),
             signals: flat2(&signals).into_owned(),
             n_signals: signals.shape()[1],
-        }
+            axes: matrix3("axes", &axes)?,
+        })
     }
 
     /// Blocks of `block` samples of the corrected `rate` `(n, 3)` against attitudes `(m, 3, 3)` at log times `(m,)`.
@@ -65,6 +69,7 @@ impl ReferenceLog {
                 is_valid: &self.is_valid,
                 signals: &self.signals,
                 n_signals: self.n_signals,
+                axes: self.axes,
             };
             let truth = Truth {
                 time_s: &time_s,
@@ -80,13 +85,14 @@ impl ReferenceLog {
 #[pyclass(frozen, module = "trihedron._core")]
 struct ReferenceBlocks(Vec<Block>);
 
-fn named(of: [f64; 7]) -> Strengths {
+fn named(of: [f64; 8]) -> Strengths {
     Strengths {
         angle_walk: of[0],
-        bias_walk: of[1],
-        white: of[2],
-        world: [of[3], of[4]],
-        body: [of[5], of[6]],
+        scale_noise: of[1],
+        bias_walk: of[2],
+        white: of[3],
+        world: [of[4], of[5]],
+        body: [of[6], of[7]],
     }
 }
 
@@ -108,6 +114,20 @@ struct ReferenceNormal {
 
 #[pymethods]
 impl ReferenceBlocks {
+    /// The blocks with those excluded where `lost` `(m,)`: their rows are not used, and the attitude begins anew.
+    fn without(&self, lost: PyReadonlyArray1<'_, bool>) -> Self {
+        let mut blocks = self.0.clone();
+        for (block, _) in blocks
+            .iter_mut()
+            .zip(flat1(&lost).iter())
+            .filter(|(_, l)| **l)
+        {
+            block.rows = [0, block.rows[0] + block.rows[1]];
+            block.is_lost = true;
+        }
+        Self(blocks)
+    }
+
     /// `(m,)` mean times of the reference's rows in each block, s.
     fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0
@@ -164,7 +184,7 @@ impl ReferenceBlocks {
         &self,
         py: Python<'py>,
         columns: PyReadonlyArray2<'py, f64>,
-        strengths: [f64; 7],
+        strengths: [f64; 8],
     ) -> PyResult<ReferenceNormal> {
         let columns = dmatrix(&columns);
         let found = super::run(py, || normal(&self.0, &columns, &named(strengths)))?;
@@ -185,7 +205,7 @@ impl ReferenceBlocks {
         &self,
         py: Python<'py>,
         columns: PyReadonlyArray2<'py, f64>,
-        strengths: [f64; 7],
+        strengths: [f64; 8],
     ) -> PyResult<(
         Bound<'py, PyArray2<f64>>,
         Bound<'py, PyArray3<f64>>,

@@ -26,6 +26,8 @@ pub struct Log<'a> {
     pub signals: &'a [f64],
     /// Signals per sample.
     pub n_signals: usize,
+    /// Directions of the gyro's axes in the body, unit vectors in columns.
+    pub axes: Matrix3<f64>,
 }
 
 /// The reference's attitudes, body → world, at times of the log's clock (ascending), s.
@@ -56,6 +58,8 @@ pub struct Block {
     pub wrt_clock: [Vector3<f64>; 2],
     /// Mean over the rows of `∫ C_ai s_j dt` since the beginning: row 3 a + i, column j.
     pub moments: DMatrix<f64>,
+    /// `∫ Σ_i ω_i² c_i c_iᵀ dt` over the block with the gyro's axes `c_i` in the world, rad²/s.
+    pub rotation: Matrix3<f64>,
 }
 
 /// Motion by the gyro from the block's start to one row of the reference.
@@ -74,6 +78,7 @@ struct Path {
     turned: Matrix3<f64>,
     moments: DMatrix<f64>,
     bias: Matrix3<f64>,
+    rotation: Matrix3<f64>,
     is_lost: bool,
 }
 
@@ -115,6 +120,7 @@ pub fn blocks(of: &Log<'_>, truth: &Truth<'_>, block: usize) -> Result<Vec<Block
             let mut one = unseen(of, first, block, angle, moments.clone());
             one.wrt_bias = [start * path.bias, 0.5 * start * path.bias];
             one.is_lost = path.is_lost;
+            one.rotation = start * path.rotation * start.transpose();
             (false, Vector3::zeros(), one)
         };
         if is_seen {
@@ -144,6 +150,7 @@ fn unseen(
         wrt_bias: [Matrix3::zeros(); 2],
         wrt_clock: [Vector3::zeros(); 2],
         moments,
+        rotation: Matrix3::zeros(),
     }
 }
 
@@ -178,8 +185,10 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
         turned: Matrix3::identity(),
         moments: DMatrix::zeros(9, q),
         bias: Matrix3::zeros(),
+        rotation: Matrix3::zeros(),
         is_lost: false,
     };
+    let own = of.axes.try_inverse().unwrap_or_else(Matrix3::identity);
     for i in first..first + block {
         let (w0, w1) = (of.rate[i], of.rate[i + 1]);
         let is_valid = of.is_valid[i] && of.is_valid[i + 1];
@@ -227,6 +236,8 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
         if is_valid {
             add(&mut at.moments, 1.0);
             at.bias += middle * h;
+            let scaled = middle * of.axes * Matrix3::from_diagonal(&(own * (0.5 * (w0 + w1))));
+            at.rotation += scaled * scaled.transpose() * h;
             at.turned *= part(1.0);
         } else {
             at.is_lost = true;
@@ -265,6 +276,7 @@ fn seen(
         wrt_bias: [start * path.bias, Matrix3::zeros()],
         wrt_clock: [Vector3::zeros(); 2],
         moments: DMatrix::zeros(0, 0),
+        rotation: start * path.rotation * start.transpose(),
     };
     for ((row, d), _) in path.rows.iter().zip(&off).zip(&keep).filter(|(_, k)| **k) {
         let rate = start * row.rate;

@@ -29,6 +29,8 @@ type Seen = SMatrix<f64, 3, STATE>;
 pub struct Strengths {
     /// Angle random walk, rad/√s.
     pub angle_walk: f64,
+    /// White density of each axis' scale, √s: angle random walk that grows with the rate.
+    pub scale_noise: f64,
     /// Random walk of the gyro's bias, rad/s/√s.
     pub bias_walk: f64,
     /// White error of a block of the reference with all its rows, rad.
@@ -157,7 +159,7 @@ fn filter(
         advance(&mut cov, block, &slow, step_s);
         cov.transpose_mut();
         advance(&mut cov, block, &slow, step_s);
-        add_process(&mut cov, with, &slow, step_s);
+        add_process(&mut cov, block, with, &slow, step_s);
         if block.is_lost {
             for k in 0..3 {
                 cov[(ANGLE + k, ANGLE + k)] += UNKNOWN;
@@ -296,14 +298,26 @@ fn advance<C: Dim, S: RawStorageMut<f64, U24, C>>(
 }
 
 /// Process noise of a block: the mean of a walk over it has a third of the walk's variance, and half of it in common.
-fn add_process(cov: &mut State, with: &Strengths, slow: &[(usize, Slow); 2], step_s: f64) {
-    let walk = with.angle_walk * with.angle_walk * step_s;
+fn add_process(
+    cov: &mut State,
+    block: &Block,
+    with: &Strengths,
+    slow: &[(usize, Slow); 2],
+    step_s: f64,
+) {
+    let walk = Matrix3::from_diagonal_element(with.angle_walk.powi(2) * step_s)
+        + block.rotation * with.scale_noise.powi(2);
     let bias = with.bias_walk * with.bias_walk * step_s;
+    for (i, j, share) in [
+        (ANGLE, ANGLE, 1.0),
+        (ANGLE, MEAN, 0.5),
+        (MEAN, ANGLE, 0.5),
+        (MEAN, MEAN, 1.0 / 3.0),
+    ] {
+        let mut part = cov.fixed_view_mut::<3, 3>(i, j);
+        part += walk * share;
+    }
     for k in 0..3 {
-        cov[(ANGLE + k, ANGLE + k)] += walk;
-        cov[(ANGLE + k, MEAN + k)] += 0.5 * walk;
-        cov[(MEAN + k, ANGLE + k)] += 0.5 * walk;
-        cov[(MEAN + k, MEAN + k)] += walk / 3.0;
         cov[(BIAS + k, BIAS + k)] += bias;
         for (first, slow) in slow {
             for i in 0..2 {

@@ -57,7 +57,8 @@ class SlowError:
 @dataclass(frozen=True, eq=False)
 class Point:
     """Point of linearisation: ω = S w' + b - G f - nonlinearity ``bend``, in the reference's body rotated by
-    ``mounting``; t_reference = t (1 + rate) + offset; ``slow`` is the slow error of the reference's attitudes.
+    ``mounting``; t_reference = t (1 + rate) + offset; ``slow`` is the slow error of the reference's attitudes. Blocks
+    about ``lost_s`` (k,) deviate and are not used; the attitude begins anew after them.
 
     About attitudes with errors of degrees a constant body error and a rotation of S would differ at second order, and
     the evidence would seem to separate them.
@@ -71,6 +72,12 @@ class Point:
     bend: FloatArray = field(default_factory=lambda: np.zeros(6))
     mounting: FloatArray = field(default_factory=lambda: np.eye(3))
     slow: SlowError | None = None
+    lost_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def deviates(self, time_s: FloatArray, block_s: float = BLOCK_S) -> BoolArray:
+        """Which blocks of ``block_s`` about ``time_s`` (m,) are not used."""
+        far = np.abs(time_s[:, None] - self.lost_s).min(axis=1, initial=np.inf)
+        return np.asarray(far < 0.5 * max(block_s, BLOCK_S))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +137,7 @@ class Beside:
             bend=point.bend + bend,
             mounting=point.mounting @ Rotation.from_rotvec(change.get("mounting", np.zeros(3))).as_matrix(),
             slow=point.slow,
+            lost_s=point.lost_s,
         )
 
     def _own(self, point: Point) -> tuple[FloatArray, FloatArray]:
@@ -155,9 +163,10 @@ class Beside:
         n = len(self.grid.time_s)
         force = np.zeros((n, 0)) if self.force is None else self.force
         signals = np.ascontiguousarray(np.column_stack([self.grid.gyroscope, np.ones(n), own**2, own**3, force]))
-        log = ReferenceLog(float(self.grid.time_s[0]), self.grid.step_s, self.seen, signals)
+        log = ReferenceLog(float(self.grid.time_s[0]), self.grid.step_s, self.seen, signals, along)
         time, attitude = self.attitudes(point)
         blocks = log.blocks(self.corrected(point), time, attitude, max(2, round(block_s / self.grid.step_s)))
+        blocks = blocks.without(point.deviates(blocks.time_s(), block_s))
         M = blocks.moments().reshape(-1, 3, 3, signals.shape[1])
         m = len(M)
         # A reference whose timestamps are later by dτ is compared with the gyro earlier by dτ.

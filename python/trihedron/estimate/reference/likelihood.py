@@ -21,18 +21,27 @@ from trihedron.threads import side_by_side
 
 Height = Callable[[FloatArray], float]
 
-STRENGTHS = ("angle_walk", "bias_walk", "white", "world", "world_s", "body", "body_s")
-TYPICAL = np.log([2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
-"""Prior means of the logarithms: consumer gyros and optical trackers; rad/√s, rad/s/√s, rad, rad, s, rad, s."""
-SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
+STRENGTHS = ("angle_walk", "scale_noise", "bias_walk", "white", "world", "world_s", "body", "body_s")
+TYPICAL = np.log([2e-4, 1e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
+"""Prior means of the logarithms: consumer gyros and optical trackers; rad/√s, √s, rad/s/√s, rad, rad, s, rad, s."""
+SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
 """Prior σ of the logarithms: a factor of 30 either way, of 4 for time constants."""
 FARTHEST = 4.0
 """Limit of the search in prior σ: beyond it a strength is negligible."""
 LEAST_SPREAD = 0.01
 """Smallest posterior σ of a strength that is used, relative to the prior's."""
-STEP = 0.02
+KINDS = tuple(k for k, name in enumerate(STRENGTHS) if not name.endswith("_s"))
+"""Indices of the sizes among the strengths: each is one kind of error."""
+TRIED_SIZES = np.linspace(-1.0, 2.0, 7)
+"""Sizes of one error at which the search may begin, in prior σ from typical."""
+STARTS = 3
+"""Starts of the search: one error explains the residual nearly as well as another, and each is a maximum of its own."""
+STEP = 1e-4
 CURVATURE_STEP = 0.25
-"""Steps in the logarithm of a strength for the gradient, and for the curvature at the start of the Metropolis walk."""
+"""Steps in the logarithm of a strength for the gradient (the curvature reaches the number of rows: a hundred times as
+long a step ended searches ten units of log evidence too early), and for the curvature at the start of the walk."""
+MOST_TURNS, FIRST_TURNS = 60, 15
+"""Turns of a search; turns after which only the best of several searches goes on."""
 STEPS, ADAPTED, THINNED = 600, 150, 12
 """Steps of the Metropolis walk; steps between adaptations of its proposal, and burn-in; thinning."""
 
@@ -74,7 +83,7 @@ class Equations:
 
 
 def equations(problem: Problem, strengths: FloatArray) -> Equations:
-    """Normal equations of a recording under ``strengths`` (7,), logarithms in the order of :data:`STRENGTHS`."""
+    """Normal equations of a recording under ``strengths`` (8,), logarithms in the order of :data:`STRENGTHS`."""
     found = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
     gram, far = found.gram, (strengths - TYPICAL) / SPREAD
     constant = -0.5 * (gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far))
@@ -91,7 +100,7 @@ class Together:
 
 
 def together(problems: Sequence[Problem], strengths: FloatArray) -> Together:
-    """Posterior of several recordings in one fit under ``strengths`` (recordings, 7); every prior counts once."""
+    """Posterior of several recordings in one fit under ``strengths`` (recordings, 8); every prior counts once."""
     return _solved(problems, _equations(problems, strengths))
 
 
@@ -132,8 +141,8 @@ def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
 class Fitted:
     """Parameters of one hypothesis with the strengths integrated out: mean (p,) and covariance (p, p) in prior units.
 
-    Biases are means over time. ``strengths`` (recordings, 7) are the logarithms at the posterior maximum, ``evidence``
-    the log evidence there; ``draws`` (k, recordings, 7) their posterior.
+    Biases are means over time. ``strengths`` (recordings, 8) are the logarithms at the posterior maximum, ``evidence``
+    the log evidence there; ``draws`` (k, recordings, 8) their posterior.
     """
 
     mean: FloatArray
@@ -143,32 +152,43 @@ class Fitted:
     draws: FloatArray
 
     def spread(self) -> FloatArray:
-        """Cholesky roots (recordings, 7, 7) of the covariance of the strengths' logarithms."""
+        """Cholesky roots (recordings, 8, 8) of the covariance of the strengths' logarithms."""
         # With few accepted steps the draws' covariance is singular.
         least = np.diag((LEAST_SPREAD * SPREAD) ** 2)
         return np.array([np.linalg.cholesky(np.cov(one.T) + least) for one in self.draws.swapaxes(0, 1)])
 
 
 def most_likely(
-    problems: Sequence[Problem], start: FloatArray | None = None, spread: FloatArray | None = None
+    problems: Sequence[Problem], start: FloatArray, spread: FloatArray | None = None, *, is_everywhere: bool = False
 ) -> tuple[FloatArray, float]:
-    """Logarithms (recordings, 7) of the strengths at the posterior maximum, and the log evidence there.
+    """Logarithms (recordings, 8) of the strengths at the posterior maximum, and the log evidence there.
 
-    ``spread`` (recordings, 7, 7) are roots of their covariance under a neighbouring hypothesis at ``start``: in these
-    units the problem is well conditioned, and a few steps are enough.
+    ``spread`` (recordings, 8, 8) are roots of their covariance under a neighbouring hypothesis at ``start``: in these
+    units the problem is well conditioned, and a few steps are enough. Sought ``is_everywhere`` or near ``start``.
     """
-    best = np.tile(TYPICAL, (len(problems), 1)) if start is None else start.copy()
+    best = start.copy()
     roots = np.tile(np.eye(len(TYPICAL)), (len(problems), 1, 1)) if spread is None else spread
     # From the strengths of a neighbouring hypothesis one round over the recordings is enough.
-    for _ in range(1 if len(problems) == 1 or start is not None else 2):
+    for _ in range(1 if len(problems) == 1 or spread is not None else 2):
         for k, root in enumerate(roots):
             height = _heights(problems, best, k)
+            if is_everywhere:
+                tried = [_highest(height, one, root, FIRST_TURNS) for one in (best[k], *_starts(height))]
+                best[k] = max(tried, key=height)
             best[k] = _highest(height, best[k], root)
     return best, height(best[-1])
 
 
-def _highest(height: Height, start: FloatArray, root: FloatArray) -> FloatArray:
-    """Maximum (7,) of ``height`` by L-BFGS from ``start``, in units of ``root`` (7, 7)."""
+def _starts(height: Height) -> list[FloatArray]:
+    """Likeliest points at which one kind of error has its own most likely size and the others are typical."""
+    points = TYPICAL + np.einsum("k,ij->ikj", TRIED_SIZES, np.diag(SPREAD)[list(KINDS)])
+    heights = np.reshape(side_by_side(height, points.reshape(-1, len(TYPICAL))), points.shape[:2])
+    best = heights.argmax(axis=1)
+    return [points[i, best[i]] for i in np.argsort(-heights.max(axis=1))[:STARTS]]
+
+
+def _highest(height: Height, start: FloatArray, root: FloatArray, turns: int = MOST_TURNS) -> FloatArray:
+    """Maximum (8,) of ``height`` by L-BFGS from ``start``, in units of ``root`` (8, 8)."""
 
     def at(z: FloatArray) -> FloatArray:
         return np.clip(start + root @ z, TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD)
@@ -177,8 +197,8 @@ def _highest(height: Height, start: FloatArray, root: FloatArray) -> FloatArray:
         here, *ahead = side_by_side(lambda one: height(at(one)), [z, *(z + STEP * np.eye(len(z)))])
         return -here, np.array([(here - one) / STEP for one in ahead])
 
-    found = minimize(descent, np.zeros(len(start)), jac=True, method="L-BFGS-B", options={"ftol": 3e-6, "maxiter": 60})
-    return at(found.x)
+    options = {"ftol": 3e-6, "maxiter": turns}
+    return at(minimize(descent, np.zeros(len(start)), jac=True, method="L-BFGS-B", options=options).x)
 
 
 def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Height:
@@ -192,7 +212,7 @@ def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Heig
     return height
 
 
-def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
+def fit(problems: Sequence[Problem], start: FloatArray) -> Fitted:
     """Mode of the strengths, a Metropolis walk over their posterior per recording, and parameters averaged over it."""
     best, evidence = most_likely(problems, start)
     walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
@@ -204,10 +224,8 @@ def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
 
 
 def _walk(height: Height, start: FloatArray) -> FloatArray:
-    """(k, 7) draws by an adaptive Metropolis walk (Haario): proposals from the curvature first, then from the draws."""
-    n = len(start)
-    values, vectors = np.linalg.eigh(_curvature(height, start))
-    covariance = (vectors / np.maximum(values, 1.0 / SPREAD.max() ** 2)) @ vectors.T
+    """(k, 8) draws by an adaptive Metropolis walk (Haario): proposals from the curvature first, then from the draws."""
+    n, covariance = len(start), _covariance(height, start)
     rng = np.random.default_rng(0)
     now, here = start, height(start)
     seen: list[FloatArray] = []
@@ -235,6 +253,12 @@ def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple
         shift[b] = one.mean_bias[:, -1] / sigma
         added[np.ix_(b, b)] = one.cov_mean_bias / np.outer(sigma, sigma)
     return change @ all_of.mean + shift, change @ all_of.covariance @ change.T + added
+
+
+def _covariance(height: Height, at: FloatArray) -> FloatArray:
+    """(8, 8) inverse of the curvature of ``height``, at most the prior's variance."""
+    values, vectors = np.linalg.eigh(_curvature(height, at))
+    return np.asarray((vectors / np.maximum(values, 1.0 / SPREAD.max() ** 2)) @ vectors.T)
 
 
 def _curvature(function: Height, at: FloatArray) -> FloatArray:

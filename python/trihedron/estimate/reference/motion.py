@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
@@ -32,6 +33,10 @@ SEARCH_COST = 2.0 * np.log(len(WIDER) * len(EFFECTS))
 LARGEST = 100.0
 """Largest size of an effect of a working part, in data-sheet sizes."""
 RELINEARISED = 3
+SURPRISE = 1e-6
+"""False alarm rate of a deviating block, divided by the number of blocks."""
+MOST_ROUNDS = 6
+"""Rounds of excluding deviating blocks: a large deviation conceals smaller ones."""
 SHORTER = 0.5 ** np.arange(6)
 """Factors on a step that are tried: a clock offset is linear only up to a quarter of a period of the motion."""
 
@@ -64,7 +69,8 @@ def fit_motion(
     sides: list[Beside], wanted: tuple[str, ...] = ALWAYS, wider: Mapping[str, float] | None = None,
     block_s: float = BLOCK_S, before: MotionFit | None = None,
 ) -> MotionFit:  # fmt: skip
-    """Fit parameters and strengths of recordings of one instrument, relinearised up to ``RELINEARISED`` times."""
+    """Fit parameters and strengths of recordings of one instrument, relinearised up to ``RELINEARISED`` times, and anew
+    after every exclusion of deviating blocks."""
     wider = wider or {}
     # One instrument: a common initial S.
     S = np.median([side.start.S for side in sides], axis=0)
@@ -73,14 +79,21 @@ def fit_motion(
     points = [side.start for side in sides] if before is None else before.points
     strengths = np.tile(TYPICAL, (len(sides), 1)) if before is None else before.fitted.strengths
     problems = _problems(sides, points, where, wider, block_s)
-    for turn in range(RELINEARISED if before is None else 1):
+    turn = rounds = 0
+    is_new = True
+    while turn < (RELINEARISED if before is None else 1):
         if turn:
-            strengths, _ = most_likely(problems, strengths)
+            strengths, _ = most_likely(problems, strengths, is_everywhere=is_new)
         mean = together(problems, strengths).mean
+        lost = [np.zeros(0)] * len(sides)
+        if turn and rounds < MOST_ROUNDS:
+            lost = [_deviating(problem, s, mean) for problem, s in zip(problems, strengths, strict=True)]
+        is_new = any(len(one) for one in lost) or not turn
+        turn, rounds = (1, rounds + 1) if turn and is_new else (turn + 1, rounds)
         # Log densities are compared about the same slow error: another one is another linear model.
         points = [
-            point if side.reference.motion.attitude is None else replace(point, slow=slow_error(problem, s, mean))
-            for side, point, problem, s in zip(sides, points, problems, strengths, strict=True)
+            replace(point, lost_s=np.append(point.lost_s, one), slow=_slow(side, problem, s, mean))
+            for side, point, problem, s, one in zip(sides, points, problems, strengths, lost, strict=True)
         ]
         problems = _problems(sides, points, where, wider, block_s)
         height = at_the_point(problems, strengths)
@@ -91,15 +104,28 @@ def fit_motion(
             ]
             there = _problems(sides, ahead, where, wider, block_s)
             if at_the_point(there, strengths) > height:
+                points, problems = ahead, there
                 break
         else:
-            break
-        points, problems = ahead, there
+            if not is_new:
+                break
     return MotionFit(sides, points, where, problems, fit(problems, strengths), wider)
 
 
+def _deviating(problem: Problem, strengths: FloatArray, mean: FloatArray) -> FloatArray:
+    """Times (k,) of blocks whose innovation the fit does not explain."""
+    normal = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
+    left = (normal.innovations @ np.append(-mean[problem.index], 1.0)).reshape(-1, 3)
+    p = chi2.sf(np.sum(left**2, axis=1), 3)
+    return np.asarray(problem.blocks.time_s()[p < SURPRISE / max(normal.rows, 1)])
+
+
+def _slow(side: Beside, problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError | None:
+    return None if side.reference.motion.attitude is None else slow_error(problem, strengths, mean)
+
+
 def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
-    """The reference's smoothed slow error under ``strengths`` (7,), at parameters ``mean`` with biases at the start."""
+    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start."""
     *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
@@ -162,25 +188,29 @@ def scores(found: MotionFit) -> list[Scored]:
         if not any(side.has(name) for side in found.sides for name in names):
             continue
         base = tuple(held - set(names))
-        without = _tuned(found, base, {})
+        start = found.fitted.strengths
+        without = _tuned(found, base, {}, start)
         tried: list[MotionFit] = []
         for by in WIDER:
-            tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by)))
+            tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by), start))
             # The evidence has one maximum over the size: stop beyond it.
             if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
                 break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
+        # An effect must not win by strengths that its absence was not tried with.
+        again = _tuned(found, base, {}, tried[best].fitted.strengths)
+        without = max(without, again, key=lambda one: one.fitted.evidence)
         score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - SEARCH_COST)
         out.append(Scored(ident, score, WIDER[best], tried[best], without))
     return sorted(out, key=lambda one: -one.score)
 
 
-def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float]) -> MotionFit:
-    """Another hypothesis about the same point, with effects at 0 there, under its own most likely strengths."""
+def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float], start: FloatArray) -> MotionFit:
+    """Another hypothesis about the same point, effects at 0 there, under its own strengths, sought from ``start``."""
     points = [replace(p, g=np.zeros((3, 3)), bend=np.zeros(6)) for p in found.points]
     where = places(found.sides, names)
     problems = _problems(found.sides, points, where, wider)
-    strengths, evidence = most_likely(problems, found.fitted.strengths, found.fitted.spread())
+    strengths, evidence = most_likely(problems, start, found.fitted.spread())
     all_of = together(problems, strengths)
     fitted = Fitted(all_of.mean, all_of.covariance, evidence, strengths, strengths[None])
     return MotionFit(found.sides, points, where, problems, fitted, wider)

@@ -46,7 +46,7 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
 
 
 def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Value and variance (m, 3) at given strengths (a recording, 7)."""
+    """Value and variance (m, 3) at given strengths (a recording, 8)."""
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
     all_of = posterior(found, strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
@@ -156,7 +156,7 @@ def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray,
 def _under(
     found: MotionFit, k: int, strengths: FloatArray, direct: FloatArray, nodes: tuple[FloatArray, FloatArray] | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (n,), up to a constant common to all ``strengths`` (a recording, 7), and covariance (n, n) of the errors of
+    """Mean (n,), up to a constant common to all ``strengths`` (a recording, 8), and covariance (n, n) of the errors of
     (1); L is ``direct`` (n, p), ``nodes`` holds H of the world and of the body error, (m, 3, n) each."""
     problem = found.problems[k]
     all_of = posterior(found, strengths)

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
+from trihedron.estimate.reference.likelihood import STRENGTHS
 from trihedron.estimate.reference.motion import MotionFit, fit_motion
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.ranges import edges_of
@@ -16,6 +17,7 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
+WHITE, WORLD, BODY = (STRENGTHS.index(one) for one in ("white", "world", "body"))
 FINE_S, COARSE = 0.1, 4.0
 """Block length [s] whose differences show noise from some 0.1 to 5 Hz; block length [s] of a second estimate of S."""
 SQUARE = np.radians(0.01)
@@ -25,8 +27,6 @@ QUIET_PARTS = 50
 QUIETER = 0.8
 """Ratio of the difference's noise, which contains the gyro's, to static noise below which the two are dependent."""
 CERTAIN = 1e-4
-SURPRISE = 1e-6
-"""False alarm rate of a deviating block, divided by the number of blocks."""
 
 
 def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
@@ -36,30 +36,20 @@ def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
     rows = problem.blocks.rows()
     seen = rows[:, 0] > 0
     time = problem.blocks.time_s()
-    slow = np.sqrt(np.sum(draws[:, [3, 5]] ** 2, axis=1))
-    is_body = middle[5] > middle[3]
+    lost = found.points[k].deviates(time)
+    slow = np.sqrt(np.sum(draws[:, [WORLD, BODY]] ** 2, axis=1))
+    is_body = middle[BODY] > middle[WORLD]
     return ReferenceError(
-        white_rad=float(middle[2]),
+        white_rad=float(middle[WHITE]),
         slow_rad=(float(np.median(slow)), float(np.quantile(slow, 0.025)), float(np.quantile(slow, 0.975))),
-        slow_s=float(middle[6] if is_body else middle[4]),
+        slow_s=float(middle[(BODY if is_body else WORLD) + 1]),
         is_of_body=bool(is_body),
         rows=int(rows[:, 0].sum()),
         rows_left_out=int(rows[:, 1].sum()),
-        gaps_s=_runs(time, ~seen & (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)),
-        apart_s=_runs(time, surprises(found, k) < SURPRISE / max(int(seen.sum()), 1)),
+        gaps_s=_runs(time, ~seen & ~lost & (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)),
+        apart_s=_runs(time, lost),
         signs=signs_of_this_gyro(found.sides[k], found, k),
     )
-
-
-def surprises(found: MotionFit, k: int) -> FloatArray:
-    """(m,) p-value of each block's innovation under the fit; 1 without rows."""
-    problem = found.problems[k]
-    with_ = np.exp(found.fitted.strengths[k]).tolist()
-    normal = problem.blocks.normal(problem.table, with_)
-    theta = found.fitted.mean[problem.index]
-    left = (normal.innovations @ np.append(-theta, 1.0)).reshape(-1, 3)
-    # `mean` has the bias averaged over time, not that at the start: the filter's first blocks absorb the difference.
-    return np.asarray(chi2.sf(np.sum(left**2, axis=1), 3))
 
 
 def _runs(time: FloatArray, where: np.ndarray) -> tuple[tuple[float, float], ...]:
