@@ -197,8 +197,9 @@ def _highest(height: Height, start: FloatArray, root: FloatArray, turns: int = M
         here, *ahead = side_by_side(lambda one: height(at(one)), [z, *(z + STEP * np.eye(len(z)))])
         return -here, np.array([(here - one) / STEP for one in ahead])
 
-    options = {"ftol": 3e-6, "maxiter": turns}
-    return at(minimize(descent, np.zeros(len(start)), jac=True, method="L-BFGS-B", options=options).x)
+    begin = np.zeros(len(start))
+    found = minimize(descent, begin, jac=True, method="L-BFGS-B", options={"ftol": 3e-6, "maxiter": turns})
+    return at(found.x)
 
 
 def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Height:
