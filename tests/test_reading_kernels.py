@@ -5,7 +5,6 @@ import pytest
 from scipy import fft, ndimage
 
 from trihedron import _core
-from trihedron.segment.noise import _fit, _fit_open
 
 WITH_GAPS = [np.nan, np.inf, -0.0, 0.0]
 
@@ -94,19 +93,3 @@ def test_lengths_in_windows_and_means_of_blocks_are_those_of_numpy():
         _core.median_length(readings, np.array([980]), 50)
     with pytest.raises(ValueError, match="blocks must hold rows"):
         _core.block_mean_readings(readings, 7, 143)
-
-
-@pytest.mark.parametrize("chosen", [[0], [0, 1], [0, 2], [0, 1, 2]])
-@pytest.mark.parametrize("terms", [(1.0, 0.0, 0.0), (1.0, 0.3, 0.0), (1e-3, 0.0, 2.0), (0.0, 1.0, 0.0)])
-def test_the_law_of_a_mean_is_that_of_lawson_and_hanson(chosen, terms):
-    rng = np.random.default_rng(11)
-    tau = 0.2 * 2.0 ** np.arange(8)
-    design = np.stack([1.0 / tau, np.ones(8), tau / 3.0], axis=1)
-    n = np.round(400.0 / 2.0 ** np.arange(8))
-    for _ in range(20):
-        seen = (design @ terms) * rng.chisquare(n) / n
-        deviance, found = _fit(design, seen, n, chosen)
-        slow_deviance, slow = _fit_open(design, seen, n, chosen)
-        # Normal equations of a graded design lose some digits; a deviance is a difference of logarithms.
-        np.testing.assert_allclose(found, slow, rtol=1e-8, atol=1e-12)
-        assert deviance == pytest.approx(slow_deviance, rel=1e-8, abs=1e-9)

@@ -30,16 +30,16 @@ def without_its_day(text):
 
 @pytest.fixture(scope="module")
 def long_logs(tmp_path_factory):
-    """A session and a rest of more than 20 000 readings, beyond which sums are shared between threads."""
+    """A session and a static log of more than 20 000 readings, beyond which sums are shared between threads."""
     folder = tmp_path_factory.mktemp("long")
     rng = np.random.default_rng(2)
     motion = hand_session(n_poses=26, pose_s=8.0, move_s=2.0, first_pose_s=10.0)
     recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
     assert recording.n_samples > THREADED_ROWS
     rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
-    rest = np.column_stack([np.arange(30_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (30_000, 6))])
+    static = np.column_stack([np.arange(30_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (30_000, 6))])
     (folder / "s.toml").write_text(SCENARIO)
-    for name, table in (("log", rows), ("rest", rest)):
+    for name, table in (("log", rows), ("static", static)):
         np.savetxt(folder / f"{name}.csv", table, "%.10g", ",", header="time_s,ax,ay,az,gx,gy,gz", comments="")
     return folder
 

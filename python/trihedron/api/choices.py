@@ -5,7 +5,6 @@ from __future__ import annotations
 from trihedron.errors import RefusedError
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Finding, FindingCode
-from trihedron.simulate import Scenario
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -42,13 +41,6 @@ def settle_gravity(
 def gravity_of(calibration: Calibration | None) -> tuple[float, str] | None:
     """|g| [m/s²] of a calibration and the words for this source; ``None`` without one."""
     return None if calibration is None else (calibration.gravity_m_s2, "that of the calibration")
-
-
-def gravity_of_scenario(model: object) -> tuple[float, str] | None:
-    """|g| [m/s²] that a scenario states and the words for this source; ``None`` where it states none."""
-    if not isinstance(model, Scenario) or model.environment.gravity == STANDARD_GRAVITY_M_S2:
-        return None
-    return model.environment.gravity, "that of the scenario"
 
 
 def _defaulted() -> Finding:

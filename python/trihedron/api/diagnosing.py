@@ -10,7 +10,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
-from trihedron.api.choices import gravity_of, gravity_of_scenario, settle_gravity
+from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
@@ -32,6 +32,7 @@ from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario
+from trihedron.units import STANDARD_GRAVITY_M_S2
 
 GivenModel = Recording | Scenario | str | os.PathLike[str]
 """A simulated recording or its file, or a scenario or its .toml."""
@@ -336,3 +337,10 @@ def _noise(
         *correlation_times(simulated.sampled, ours, alpha=alpha),
         *slow_noise(theirs, (found, recording, segments), alpha=alpha),
     )
+
+
+def gravity_of_scenario(model: object) -> tuple[float, str] | None:
+    """|g| [m/s²] that a scenario states and the words for this source; ``None`` where it states none."""
+    if not isinstance(model, Scenario) or model.environment.gravity == STANDARD_GRAVITY_M_S2:
+        return None
+    return model.environment.gravity, "that of the scenario"

@@ -215,8 +215,6 @@ SESSION = {
         "samples were not taken at their timestamps",
         "let the sensor's own clock trigger the sampling, or log its data-ready times",
         {
-            "timestamps": "The timestamps scatter by {rms_s:.2g ms} about an even clock, the readings do not "
-            "(share that follows {followed:.2f} ± {sigma:.1g}): the samples were taken evenly.",
             "samples": "Samples are off their timestamps by {jitter_s:.2g ms} rms: both sensors scatter together, "
             "in proportion to the slope of the signal.",
         },
