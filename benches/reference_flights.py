@@ -3,7 +3,8 @@
     python benches/reference_flights.py LOG TRUTH [LOG TRUTH ...] [--inject full|one|none] [--joint] [--gravity 9.807]
 
 Logs in SI. `full`: nine elements of about 0.1 °/s/g (seed 5); `one`: 0.1 °/s/g of gyro X along accelerometer Y alone.
-Printed: the scores, from which size the reference would show one, and the errors of the estimates in σ.
+Printed: the scores, from which size the reference would show one, the errors of the estimates in σ, and χ² of S of all
+recordings, each fitted alone, about their common mean.
 """
 
 import argparse
@@ -37,8 +38,10 @@ def main():
     for path, beside in zip(given.paths[::2], given.paths[1::2], strict=True):
         log = read(path)
         pairs.append((replace(log, gyroscope=log.gyroscope + log.accelerometer @ injected.T), read_reference(beside)))
+    alone = []
     for group in [pairs] if given.joint else [[pair] for pair in pairs]:
         found = fit_references(group, given.gravity)[0]
+        alone.append((found.gyroscope.S.ravel(), np.linalg.inv(found.gyroscope.covariance[:9, :9])))
         print(" + ".join(str(log.source) for log, _ in group))
         for ident, one in found.effects.items():
             print(f"  {ident} score {one.score:.1f}, shown from {one.shown_from:.2f} times a data sheet's")
@@ -47,6 +50,10 @@ def main():
         print(
             f"  estimates {np.abs(z).max():.1f} sigma at most from what was put in (rms {np.sqrt(np.mean(z**2)):.2f})"
         )
+    if len(alone) > 1:
+        mean = np.linalg.solve(sum(W for _, W in alone), sum(W @ S for S, W in alone))
+        chi2 = sum((S - mean) @ W @ (S - mean) for S, W in alone)
+        print(f"S of {len(alone)} recordings about their mean: chi-square {chi2:.1f} of {9 * (len(alone) - 1)}")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,15 @@ from pathlib import Path
 import pytest
 
 from small_session import made_once
-from trihedron.cli.next_step import again, begin_next_step, note_file, note_log, note_place, with_arguments
+from trihedron.cli.next_step import (
+    again,
+    begin_next_step,
+    note_file,
+    note_log,
+    note_place,
+    note_reference,
+    with_arguments,
+)
 from trihedron.cli.options import GravitySource, LogSource
 from trihedron.cli.provenance import begin
 from trihedron.files.calibration import read_calibration
@@ -44,6 +52,13 @@ def test_the_place_goes_to_commands_that_take_it():
         said
         == "`trihedron diagnose 'my log.csv' --rate 50 --latitude 59.9`, `trihedron segment 'my log.csv' --rate 50`"
     )
+
+
+def test_a_reference_goes_to_commands_that_take_it():
+    note_reference(Path("motion.csv"))
+    said = filled("`trihedron calibrate LOG`, `trihedron segment LOG`")
+    assert "calibrate 'my log.csv' --rate 50 --reference motion.csv --latitude 59.9`" in said
+    assert "segment 'my log.csv' --rate 50`" in said
 
 
 def test_a_calibration_that_was_not_written_is_stored_first():

@@ -19,10 +19,11 @@ _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "-o", "--output")
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
-"""Commands that take the place of the recording; the others take gravity from the calibration."""
+"""Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
 UNSTORED = "calibration.json"
 _log: ContextVar[str] = ContextVar("log", default="LOG")
 _place: ContextVar[str] = ContextVar("place", default="")
+_beside: ContextVar[str] = ContextVar("beside", default="")
 _file: ContextVar[str] = ContextVar("file", default="")
 
 
@@ -30,6 +31,7 @@ def begin_next_step() -> None:
     """Forget the arguments of an earlier run."""
     _log.set("LOG")
     _place.set("")
+    _beside.set("")
     _file.set("")
 
 
@@ -42,6 +44,12 @@ def note_log(source: Any) -> None:
 def note_place(source: Any) -> None:
     """Store the place of the recording as typed."""
     _place.set(shlex.join(_words(source)))
+
+
+def note_reference(given: Any) -> None:
+    """Store the known motion beside the log, the first of several."""
+    first = given[0] if isinstance(given, (list, tuple)) and given else given
+    _beside.set(f"--reference {shlex.quote(str(first))}" if first else "")
 
 
 def note_file(path: Path | None) -> None:
@@ -73,7 +81,8 @@ def with_arguments(document: Document) -> Document:
 
 def _filled(command: str) -> str:
     verb = command.strip("`").split(" ")[1]
-    log = f"{_log.get()} {_place.get()}".rstrip() if verb in _WITH_PLACE else _log.get()
+    more = (_beside.get(), _place.get()) if verb in _WITH_PLACE else ()
+    log = " ".join(filter(None, (_log.get(), *more)))
     words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": again(typed.get())}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from trihedron.cli.next_step import note_file, note_log, note_place
+from trihedron.cli.next_step import note_file, note_log, note_place, note_reference
 from trihedron.cli.provenance import note_input, note_options
 
 if TYPE_CHECKING:
@@ -207,6 +207,7 @@ def with_options(table: Table | None = None, /, **groups: type) -> Callable[[Cal
         def run(**given: Any) -> None:
             note_options(given)
             note_file(given.get("output"))
+            note_reference(given.get("reference"))
             for name, group in groups.items():
                 given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
                 if group is GravitySource:

@@ -176,9 +176,8 @@ def bias_curves(
         column = _Column(axis, np.zeros(context.n_points), np.eye(3)[axis], time, False)
         poses, data = _of_poses(context, name, column, left)
         at = tuple(poses.tolist()), time.values[poses], data + path[poses, axis]
-        out.append(
-            EffectCurve(name, axis, "time", 0, False, time.values[:h], path[:, axis], np.full(h, std[axis]), *at)  # type: ignore[arg-type]
-        )
+        curve = time.values[:h], path[:, axis], np.full(h, std[axis])
+        out.append(EffectCurve(name, axis, "time", 0, False, *curve, *at))  # type: ignore[arg-type]
     return tuple(out)
 
 
