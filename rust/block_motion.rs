@@ -55,12 +55,13 @@ pub struct Edges<'a> {
     pub limit: f64,
 }
 
-/// Blocks to trim from either end of a pose until no stretch there deviates from its middle half; at most a third each.
+/// Blocks to trim from either end of a pose until no stretch there deviates from its middle half, at most a third each,
+/// and whether none deviates after that.
 ///
 /// `rows` are its block means, `bumps` ranges of blocks to exclude. `(0, 0)` where less than half would remain: such a
-/// pose settles throughout, which is reported instead.
+/// pose moves throughout.
 #[must_use]
-pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize) {
+pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize, bool) {
     let channels = edges.rounding.len().max(1);
     let n = rows.len() / channels;
     let is_good = |i: usize| {
@@ -108,13 +109,16 @@ pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize
     let clean = |off: &[f64]| {
         // The onset of a motion is below the detection limit: twice the length detected is trimmed, and one block, in
         // which the motion may begin.
-        first_clean(off, channels, most, &sizes, &variances, edges.limit)
-            .map_or(most, |clean| (2 * clean + 1).min(most))
+        let moving = first_clean(off, channels, most, &sizes, &variances, edges.limit)
+            .map_or(most + 1, |clean| 2 * clean + 1);
+        (moving.min(most), moving <= most)
     };
     let backward: Vec<f64> = off.rchunks(channels).flatten().copied().collect();
     match (clean(&off), clean(&backward)) {
-        (start, tail) if start + tail > n / 2 => (0, 0),
-        ends => ends,
+        ((start, _), (tail, _)) if start + tail > n / 2 => (0, 0, false),
+        ((start, is_start_still), (tail, is_tail_still)) => {
+            (start, tail, is_start_still && is_tail_still)
+        }
     }
 }
 

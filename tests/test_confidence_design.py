@@ -53,6 +53,10 @@ WEAKNESSES = {
     ),
     # Stops of two seconds that still turned by a degree were poses, and S_w was off by six standard errors.
     "pauses of slow moves": Weakness(710, AXIS_BY_AXIS | {"move_s": 25.0, "poses": 12}, {"S_w": 4.0}, (12, 12)),
+    # What a pause turned before and after its middle was no part of the moves beside it: S_w was off by 4.1.
+    "pauses that turn throughout": Weakness(
+        1, {"path": "axis by axis", "move_s": 25.0, "pose_s": 2.0, "poses": 14, "support": "settling"}, {"S_w": 3.0}
+    ),
     # The last seconds before it was set down were a pose that settles: three of eight were trusted, of 20 poses for 12.
     "onto a support that settles": Weakness(
         800, {"move_s": 30.0, "support": "settling", "poses": 12}, {"S_w": 4.0}, (1, 14), True

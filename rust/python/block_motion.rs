@@ -37,7 +37,7 @@ fn ends_to_trim(
     variances: PyReadonlyArray2<'_, f64>,
     is_live: PyReadonlyArray1<'_, bool>,
     limit: f64,
-) -> PyResult<(usize, usize)> {
+) -> PyResult<(usize, usize, bool)> {
     let channels = rows.shape()[1];
     let fits = channels > 0
         && noise.shape() == [3, channels]

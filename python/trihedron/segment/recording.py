@@ -153,7 +153,7 @@ def _describe(
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
     noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
-    moves = tuple(Move(k, k, k + 1, before.stop, after.start) for k, (before, after) in enumerate(pairwise(poses)))
+    moves = tuple(_move(k, *near) for k, near in enumerate(pairwise(zip(poses, runs, strict=True))))
     means = average_poses(recording, channels, runs, poses, noise)
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
@@ -173,6 +173,17 @@ def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: 
     first, last = run.first * m, run.last * m
     outer = min(outer_start, run.first) * m, max(outer_stop, run.last) * m
     return Pose(index, first, min(last, n_samples), *outer, bumps, run.is_unsteady)
+
+
+def _move(index: int, before: tuple[Pose, Run], after: tuple[Pose, Run]) -> Move:
+    """From the end of one pose to the start of the next; from or to the middle of one whose ends still move, where the
+    attitude is the mean one: what the body rotates in its other half is part of the move."""
+    first, last = before[0].stop, after[0].start
+    if not before[1].is_still:
+        first = (before[0].start + before[0].stop) // 2
+    if not after[1].is_still:
+        last = (after[0].start + after[0].stop) // 2
+    return Move(index, index, index + 1, first, last)
 
 
 def _nothing_found(recording: Recording, channels: Channels) -> Segments:

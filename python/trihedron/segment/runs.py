@@ -43,13 +43,17 @@ a slow move and in its pauses, almost nothing in a tremor of several swings."""
 
 @dataclass(frozen=True)
 class Run:
-    """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges of disturbances in it, which are excluded."""
+    """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges of disturbances in it, which are excluded.
+
+    ``is_still`` where its trimmed ends do not move; otherwise the rotation of a move begins and ends inside it.
+    """
 
     first: int
     last: int
     bumps: tuple[Range, ...] = ()
     is_unsteady: bool = False
     trimmed: Range = (0, 0)
+    is_still: bool = True
 
     @property
     def outer_first(self) -> int:
@@ -300,11 +304,14 @@ def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
     Edges of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is removed.
     """
     n = run.last - run.first
-    start, tail = _core.ends_to_trim(
+    start, tail, is_still = _core.ends_to_trim(
         channels.mean[run.first : run.last], [(a - run.first, b - run.first) for a, b in run.bumps], edges.terms,
         channels.quantisation_variance, channels.step_s, edges.variance, edges.live, edges.limit,
     )  # fmt: skip
     stop = n - tail
     bumps = tuple((a, b) for a, b in run.bumps if b > run.first + start and a < run.first + stop)
     bumps = tuple((max(a, run.first + start), min(b, run.first + stop)) for a, b in bumps)
-    return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=(start, n - stop))
+    trimmed = (start, n - stop)
+    return replace(
+        run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=trimmed, is_still=is_still
+    )
