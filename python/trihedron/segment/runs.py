@@ -312,6 +312,4 @@ def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
     bumps = tuple((a, b) for a, b in run.bumps if b > run.first + start and a < run.first + stop)
     bumps = tuple((max(a, run.first + start), min(b, run.first + stop)) for a, b in bumps)
     trimmed = (start, n - stop)
-    return replace(
-        run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=trimmed, is_still=is_still
-    )
+    return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=trimmed, is_still=is_still)
