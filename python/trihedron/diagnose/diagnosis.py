@@ -16,7 +16,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.timing_jitter import STEP_FACTOR, TimingJitter, common_time_error
+from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
@@ -211,7 +211,7 @@ def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> 
         (), tuple(s for e in found for s in e.where.segments), tuple(t for e in found for t in e.where.times_s)
     )
     chi2_per_dof = 1.0 + max(z, 0.0) ** 2 / n + sum(e.strength for e in found if e.reweigh is not None) / n
-    rms = float(np.sqrt(max(value, 0.0) / STEP_FACTOR))
+    rms = float(np.sqrt(max(value, 0.0) / ERROR_FACTOR))
     return DomainTest("timing", chi2_per_dof, float(n), p, p < alpha / N_DOMAINS_TESTED, where, rms, "s")
 
 

@@ -97,6 +97,8 @@ def find_pose_lines(part: FloatArray) -> tuple[list[float], npt.NDArray[np.bool_
     """Significant lines of one pose's readings (n, 3): frequencies in cycles per sample, and the axes that have any."""
     lines: list[float] = []
     has_line = np.zeros(part.shape[1], dtype=bool)
+    # Relative to a reading, an axis that never changes is exactly zero, not a rounding error with a spectrum.
+    part = part - part[0]
     rest = part - part.mean(axis=0)
     while len(lines) < MOST_LINES:
         found = _strongest(rest)

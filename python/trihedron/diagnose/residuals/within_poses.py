@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import LEAST_P
@@ -90,18 +90,21 @@ def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     return out
 
 
-def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[FloatArray, int]:
-    """Mean periodogram (n//2+1, channels) of non-overlapping parts of n samples, and their number."""
-    total, count = None, 0
-    window = np.hanning(n)[:, None]
-    for _, piece in pieces:
-        for k in range(len(piece) // n):
-            part = piece[k * n : (k + 1) * n]
-            power = np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)) ** 2
-            total = power if total is None else total + power
-            count += 1
-    assert total is not None
-    return total / count, count
+def _averaged_spectra(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Mean periodogram (n//2+1, channels) of non-overlapping parts of n samples; the same of each part relative to its
+    own variance, and their number (channels,).
+
+    Readings that their noise does not dither change in some parts and not in others. The mean of all follows the few
+    that change, whose peaks chance alone makes.
+    """
+    parts = [piece[k * n : (k + 1) * n] for _, piece in pieces for k in range(len(piece) // n)]
+    centred = np.array(parts) - np.mean(parts, axis=1, keepdims=True)
+    power = np.abs(np.fft.rfft(centred * np.hanning(n)[:, None], axis=1)) ** 2
+    variance = centred.var(axis=1)
+    is_live = variance > 0.0
+    count = is_live.sum(axis=0)
+    relative = power / np.where(is_live, variance, np.inf)[:, None]
+    return power.mean(axis=0), relative.sum(axis=0) / np.maximum(count, 1), count
 
 
 @lru_cache(maxsize=4)
@@ -116,12 +119,12 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
         n //= 2
     if sum(len(p) // n for _, p in pieces) < 3:
         return []
-    spectrum, count = _averaged_spectrum(pieces, n)
+    spectrum, relative, counts = _averaged_spectra(pieces, n)
     rate = obs.recording.rate_hz
     out = []
     width = max(15, (n // 32) | 1)
     for c in range(spectrum.shape[1]):
-        power = spectrum[:, c]
+        power, count = relative[:, c], int(counts[c])
         if not np.all(power[1:] > 0):
             continue
         smooth = median_filter(power, size=width, mode="nearest")
@@ -134,7 +137,8 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
             p = float(min(1.0, gammaincc(count, count * ratio[k]) * (n / 2) * spectrum.shape[1]))
             if p > p_limit:
                 break
-            density = float(smooth[k] / (np.hanning(n) ** 2).sum())
+            noise = np.median(spectrum[max(k - width // 2, 0) : k + width // 2 + 1, c])
+            density = float(noise / (np.hanning(n) ** 2).sum())
             line = _refine(obs, pieces, c, k * rate / n, rate / n, p, density)
             if line is not None and not _dies_away(pieces, c, line.frequency_hz / rate, density):
                 out.append(line)
