@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import trihedron
+from confidence import design
+from confidence.sensor import recorded
 from trihedron.simulate import Environment, Scenario, Temperature, hand_session, profile_by_name, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
@@ -120,3 +122,20 @@ def test_one_bad_pose_is_one_bad_pose():
     # The tenth, as reports count.
     assert poses == [10.0]
     assert "Pose 10 was disturbed" in trihedron.report(found)
+
+
+def designed(seed, **levels):
+    """A session of benches/confidence/design.py diagnosed: none of its levels is an effect with a name."""
+    made = design.session(seed, grade="industrial", **levels)
+    recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
+    return {effect.id for effect in trihedron.diagnose(recording, gravity_m_s2=design.G).effects}
+
+
+def test_the_curvature_of_quick_motion_is_not_jitter():
+    # Both sensors saw a common time error of 0.4 ms, 7 of its standard errors.
+    assert "timing-jitter" not in designed(0, rate_hz=50.0, move_s=1.2, path="axis by axis", tremor_deg_s=0.0)
+
+
+def test_readings_that_change_in_few_poses_have_no_line():
+    # The poses whose bias is near the edge of an LSB determined the spectrum: a line with p = 1e-9.
+    assert "periodic-interference" not in designed(1, rate_hz=20.0, move_s=8.0, bits=10, poses=20, pose_s=3.0)

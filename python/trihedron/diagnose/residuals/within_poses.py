@@ -127,7 +127,7 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
         power, count = relative[:, c], int(counts[c])
         if not np.all(power[1:] > 0):
             continue
-        smooth = median_filter(power, size=width, mode="nearest")
+        smooth = median_filter(power, size=width, mode="mirror")
         # The median of an average of `count` exponentials sits a little below its mean.
         ratio = power / smooth * (1.0 - 1.0 / (3.0 * count))
         lowest = max(3, n // 128)
