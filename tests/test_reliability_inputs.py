@@ -19,7 +19,7 @@ from small_session import made_elsewhere
 from trihedron import _core
 from trihedron.cli import main
 from trihedron.documents import DocumentError, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
 from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
@@ -171,7 +171,7 @@ def test_a_session_of_odd_values_is_made_or_refused(tmp_path, kind):
     for key in inspect.signature(SESSIONS[kind]).parameters:
         for value in _ODD:
             path.write_text(f'[session]\nkind = "{kind}"\n{key} = {value}\n')
-            with contextlib.suppress(RefusedError), np.errstate(all="ignore"):
+            with contextlib.suppress(InputError), np.errstate(all="ignore"):
                 read_scenario(path)
 
 

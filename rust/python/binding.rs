@@ -150,7 +150,7 @@ fn forget(payload: Box<dyn Any + Send>) {
 
 pyo3::create_exception!(
     trihedron._core,
-    RefusedError,
+    InputError,
     PyValueError,
     "A log, a value or a question that cannot be answered; the message says why and what to do. Never a defect of the program."
 );
@@ -162,7 +162,7 @@ fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
         ));
     }
     match out {
-        Ok(answer) => answer.map_err(|error| RefusedError::new_err(error.to_string())),
+        Ok(answer) => answer.map_err(|error| InputError::new_err(error.to_string())),
         Err(Failure::Threads(why)) => Err(no_threads(&why)),
         Err(Failure::Panic) => Err(PyRuntimeError::new_err(format!(
             "the numerical core failed on this input ({}); this is a defect of trihedron, please report it",

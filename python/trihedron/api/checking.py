@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of, segment
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
@@ -45,7 +45,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
-    except REFUSALS as error:
+    except INPUT_ERRORS as error:
         why = words("because", sentence=error)
         return CheckResult(
             recording,

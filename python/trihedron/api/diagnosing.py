@@ -25,7 +25,7 @@ from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
@@ -95,9 +95,9 @@ def diagnose(
     ('consistent', [])
     """
     if calibration is not None and against is not None:
-        raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")
+        raise InputError("two models were given: a calibration or a simulated recording to compare with, not both.")
     if not 0.0 < alpha < 0.5:
-        raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+        raise InputError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     notify = progress or (lambda _fraction, _text: None)
     recording, against = recording_of(recording), _opened(against)
     ordinary = partial(
@@ -240,7 +240,7 @@ def _start(
         return calibrated(), True
     try:
         own = calibrated()
-    except REFUSALS:
+    except INPUT_ERRORS:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
     return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
@@ -265,7 +265,7 @@ def _simulated_log(
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         return read(against), None
     if recording.gyroscope is None:
-        raise RefusedError(
+        raise InputError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
             "or compare with a simulated log of your own"
         )
@@ -293,8 +293,8 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     own = gravity if scenario is None else scenario.environment.gravity
     try:
         result = calibrate(recording, gravity_m_s2=own)
-    except REFUSALS as error:
-        raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
+    except INPUT_ERRORS as error:
+        raise InputError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=notify)
     noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)

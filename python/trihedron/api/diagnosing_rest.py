@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.diagnose.rest.answer import diagnose_rest
 from trihedron.diagnose.session.starting_point import is_open, nominal
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
@@ -62,7 +62,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         return False
     try:
         own = calibrated()
-    except REFUSALS:
+    except INPUT_ERRORS:
         return True
     return is_open(own)
 

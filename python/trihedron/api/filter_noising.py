@@ -12,7 +12,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 from trihedron.estimate.filter_noise.static_intervals import at_rest, between_intervals, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
@@ -113,7 +113,7 @@ def filter_noise(
                 if rate_to_si(recording.gyroscope_unit) is None
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )
-            raise RefusedError(
+            raise InputError(
                 f"{recording.source}: {why}, so it does not show the sensor's own noise; give known motion beside it "
                 "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
             )
@@ -136,11 +136,9 @@ def filter_noise(
 
 def _check(recording: Recording, horizons: Sequence[float], band_hz: float | None) -> None:
     if not horizons or not all(0.0 < h <= 3600.0 for h in horizons):
-        raise RefusedError(
-            "horizons are seconds between 0 and 3600 over which a filter carries on alone, as in 1,10,60."
-        )
+        raise InputError("horizons are seconds between 0 and 3600 over which a filter carries on alone, as in 1,10,60.")
     if band_hz is not None and not 0.0 < band_hz < 0.5 * recording.rate_hz:
-        raise RefusedError(
+        raise InputError(
             f"{recording.source}: vibration cannot be looked for above {band_hz:g} Hz at {recording.rate_hz:.4g} "
             f"samples/s; give --band between 0 and {0.5 * recording.rate_hz:.4g}."
         )
@@ -149,7 +147,7 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
 def _segments(recording: Recording) -> Segments | None:
     try:
         return segment(recording)
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
 
 
@@ -170,7 +168,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
     )
     try:
         found = allan(part)
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
     return found if _sensors(found) else None
 
@@ -195,7 +193,7 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         )
     known = _sensors(given)
     if not known:
-        raise RefusedError(
+        raise InputError(
             f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG` with --calibration "
             "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )

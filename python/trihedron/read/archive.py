@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib import format as npy_format
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line, from_os_error
 from trihedron.read.memory import check_memory, check_unpacked
@@ -73,9 +73,9 @@ def header(stream: Any, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]
     read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
     shape, by_columns, dtype = read(stream)
     if dtype.hasobject:
-        raise RefusedError("objects of Python are not read")
+        raise InputError("objects of Python are not read")
     if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != size - stream.tell():
-        raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
+        raise InputError(f"its header says {dtype} of shape {shape}, and it has another length")
     return shape, bool(by_columns), dtype
 
 

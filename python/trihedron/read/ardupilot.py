@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
@@ -118,7 +118,7 @@ def _keep(
     if key not in names:
         timestamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
         if not timestamp:
-            raise RefusedError(f"{message.get_type()} has no timestamp")
+            raise InputError(f"{message.get_type()} has no timestamp")
         names[key] = [f"{timestamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
         rows[key] = []
     plain = [names[key][0].split(" ")[0], *names[key][1:]]

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
@@ -193,7 +193,7 @@ class Calibration(Presented):
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
         if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
-            raise RefusedError(f"gravity must be in m/s², got {self.gravity_m_s2}")
+            raise InputError(f"gravity must be in m/s², got {self.gravity_m_s2}")
         freeze(self)
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
@@ -93,7 +93,7 @@ class AllanCurve(Presented):
     def of_one_series(self) -> AllanCurve:
         """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` for several channels."""
         if self.n_channels > 1:
-            raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
+            raise InputError(f"this curve is of {self.n_channels} channels, not of one series")
         flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
         return replace(self, **flat)
 
@@ -206,7 +206,7 @@ class NoiseAxis(Frozen):
     def __post_init__(self) -> None:
         missing = [term.value for term in TermName if term not in self.terms]
         if missing:
-            raise RefusedError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
+            raise InputError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
         freeze(self)
 
     def value(self, symbol: TermName | str) -> float:
@@ -257,11 +257,11 @@ class NoiseAxis(Frozen):
         for one bias that is fitted to all poses.
         """
         if not window_s > 0:
-            raise RefusedError(f"a window must last longer than 0 s, got {window_s}")
+            raise InputError(f"a window must last longer than 0 s, got {window_s}")
         if session_s is None:
             return float(self.allan_variance(window_s)[0])
         if session_s < window_s:
-            raise RefusedError(f"a session of {session_s} s holds no window of {window_s} s")
+            raise InputError(f"a session of {session_s} s holds no window of {window_s} s")
         Q, N, B, K, R = (self.fitted(term) for term in TermName)
         t, d = window_s, session_s
         total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)

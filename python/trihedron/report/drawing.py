@@ -5,11 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.report.document import Picture
 
 
-class NoFiguresError(RefusedError):
+class NoFiguresError(InputError):
     """Figures are requested, but matplotlib is not installed."""
 
 

@@ -19,7 +19,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.at_rest import AxisAtRest
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of, low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
@@ -58,11 +58,11 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
     polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
-    frequency zero: the uncertainty of the filter's shape is included. Raises ``RefusedError`` when ``low_pass`` has no
+    frequency zero: the uncertainty of the filter's shape is included. Raises ``InputError`` when ``low_pass`` has no
     corner.
     """
     if low_pass.corner_hz is None:
-        raise RefusedError("no corner shows: the density is that of all readings")
+        raise InputError("no corner shows: the density is that of all readings")
     corner = low_pass.corner_hz.value
     axes = []
     for spectrum in spectra:
@@ -143,10 +143,10 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     x = np.asarray(readings, dtype=np.float64)
     x = x[:, np.newaxis] if x.ndim == 1 else x
     if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+        raise InputError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     for start, stop in poses:
         if not 0 <= start < stop <= len(x):
-            raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
+            raise InputError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
     axes = [AxisAtRest.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(x.T)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)

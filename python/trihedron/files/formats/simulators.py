@@ -22,7 +22,7 @@ def distortion(
 ) -> tuple[Calibration, dict[str, tuple[FloatArray, FloatArray]], Figures]:
     """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and the noise; an ideal gyro where there is none.
 
-    Raises ``RefusedError`` when noise or rate are not given.
+    Raises ``InputError`` when noise or rate are not given.
     """
     known = of_si_readings(calibration, target, options)
     pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
