@@ -11,7 +11,7 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
-from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
+from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log, model_of_static_log
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
@@ -134,10 +134,12 @@ def _of_poses(
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
-    resting = None if against is not None else at_rest(recording, segments, known, (gravity, source), calibrated)
+    resting = (
+        None if against is not None else model_of_static_log(recording, segments, known, (gravity, source), calibrated)
+    )
     if resting is not None:
         notify(0.1, "looking at biases and spectral lines")
-        return diagnosed_at_rest(
+        return diagnosed_static_log(
             recording, segments, resting, (gravity, source), tuple(findings), alpha, is_given=known is not None
         )
     simulated: _Free | None = None

@@ -14,7 +14,7 @@ from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
-from trihedron.estimate.filter_noise.static_intervals import at_rest, between_intervals, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.static_intervals import static_noise, between_intervals, tilt_over_moves, unlike_axes
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
@@ -117,7 +117,7 @@ def filter_noise(
                 f"{recording.source}: {why}, so it does not show the sensor's own noise; give known motion beside it "
                 "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
             )
-        sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
+        sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
         findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC))
@@ -176,7 +176,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
 def _sensors(found: Noise | None) -> Static:
     if found is None:
         return {}
-    stated = {sensor: at_rest(found.axes, unit) for sensor, unit in UNITS.items()}
+    stated = {sensor: static_noise(found.axes, unit) for sensor, unit in UNITS.items()}
     return {sensor: one for sensor, one in stated.items() if one is not None}
 
 
@@ -205,10 +205,10 @@ def _bounded(figure: NoiseFigure) -> Bounded:
     return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
 
 
-def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
+def _static_sensor(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
     """Filter noise of a sensor from this log's own static interval, with the static values."""
     unit = UNITS[sensor]
-    found = at_rest(own.axes, unit)
+    found = static_noise(own.axes, unit)
     assert found is not None
     return SensorFilterNoise(
         "gyroscope" if sensor == "gyroscope" else "accelerometer", unit, found.N, found.K, known.get(sensor),

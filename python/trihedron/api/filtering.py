@@ -9,7 +9,7 @@ from dataclasses import replace
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
+from trihedron.channel_facts.static_axes import SHORTEST as SHORTEST_POSE
 from trihedron.errors import InputError
 from trihedron.estimate.kalman.identified import check_same_adc, check_same_gravity, noise_from_identified
 from trihedron.estimate.kalman.norm_invariant import NormFrame

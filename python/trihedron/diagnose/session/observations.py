@@ -14,9 +14,9 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
-from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.model import Prior, SessionReadings
 from trihedron.session.noise import along_gradient, measure_noise
+from trihedron.session.static_lines import means_beside_lines
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means

@@ -14,8 +14,7 @@ from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
-from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
-from trihedron.estimate.reference.refusals import (
+from trihedron.estimate.reference.mismatch import (
     reject_parts_elsewhere,
     reject_still,
     reject_strangers,
@@ -23,6 +22,7 @@ from trihedron.estimate.reference.refusals import (
     reject_units,
     share_left,
 )
+from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
 from trihedron.estimate.reference.replay import held_out
 from trihedron.estimate.reference.smoothed import (
     bias_over_time,

@@ -87,7 +87,7 @@ FEWER = 4.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class AxisAtRest:
+class StaticAxis:
     """Poses of one axis without disturbed ones and lines, and their pooled noise."""
 
     parts: list[FloatArray]
@@ -97,7 +97,7 @@ class AxisAtRest:
     spectrum: Spectrum
 
     @classmethod
-    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
+    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> StaticAxis:
         parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
             raise InputError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
@@ -280,7 +280,7 @@ def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str,
     found = {}
     for name, readings in sensors.items():
         try:
-            axes = [AxisAtRest.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
+            axes = [StaticAxis.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
         except InputError:
             continue  # fewer than 32 readings in a row
         found[name] = tuple(low_passes([axis.spectrum for axis in axes], rate_hz))

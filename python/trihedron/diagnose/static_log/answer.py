@@ -16,10 +16,10 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
-from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.static_log.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
+from trihedron.diagnose.static_log.pieces import StaticPieces, static_pieces
 from trihedron.probability import LEAST_P
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
@@ -48,7 +48,7 @@ class _Samples:
         return tuple(f"pose {i + 1}" for i in which)
 
 
-def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
+def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
     """Biases against temperature and time, and spectral lines, of a log with too few orientations for a calibration.
 
     Parameters
@@ -58,7 +58,7 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
     model : LinearModel
             Nominal or given S, b of both sensors, used only for sizes in physical units.
     """
-    pieces = rest_pieces(recording)
+    pieces = static_pieces(recording)
     domains: list[DomainTest] = []
     remaining: list[DomainTest] = []
     effects: list[AcceptedEffect] = []
@@ -101,7 +101,7 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
 class _Side:
     """One sensor of a static log: its number, and the ``size`` (3,) of a raw unit along every axis in ``unit``."""
 
-    pieces: RestPieces
+    pieces: StaticPieces
     sensor: int
     size: FloatArray
     unit: str
@@ -137,7 +137,7 @@ def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:
     return "raw" if is_counts and _matrix(model, GYRO)[0, 0] == 1.0 else SENSORS[sensor].unit
 
 
-def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) -> dict[str, Any]:
+def _noise(recording: Recording, pieces: StaticPieces | None, model: LinearModel) -> dict[str, Any]:
     step = np.sqrt(1.0 / recording.rate_hz)
     out: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
                            "accelerometer_corner_s": None, "gyroscope_density": None,
@@ -274,7 +274,7 @@ def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> Accep
 
 
 def _lines(
-    recording: Recording, pieces: RestPieces, model: LinearModel, alpha: float
+    recording: Recording, pieces: StaticPieces, model: LinearModel, alpha: float
 ) -> tuple[DomainTest, AcceptedEffect | None]:
     """Spectral lines of the pieces, their slow part subtracted, and the test of noise that differs between pieces."""
     assert recording.accelerometer is not None
