@@ -14,7 +14,12 @@ from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
-from trihedron.estimate.filter_noise.static_intervals import static_noise, between_intervals, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.static_intervals import (
+    between_intervals,
+    static_noise,
+    tilt_over_moves,
+    unlike_axes,
+)
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments

@@ -44,7 +44,7 @@ from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
 from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 # In the order in which they are used.
 COMMANDS = (
@@ -261,5 +261,5 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
 
 
 def _reject(sentence: str) -> int:
-    typer.echo(f"trihedron: {printable(sentence)}", err=True)
+    typer.echo(f"trihedron: {escaped(sentence)}", err=True)
     return COULD_NOT_RUN

@@ -30,7 +30,7 @@ from trihedron.records import (
     SensorCalibration,
 )
 from trihedron.records.plain import as_plain, from_plain
-from trihedron.sanitise import printable_json
+from trihedron.sanitise import escaped_json
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1
@@ -94,7 +94,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def calibration_text(calibration: Calibration) -> str:
     """The content of a calibration file."""
-    return printable_json(_folded(calibration_document(calibration))) + "\n"
+    return escaped_json(_folded(calibration_document(calibration))) + "\n"
 
 
 def calibration_document(calibration: Calibration) -> dict[str, Any]:

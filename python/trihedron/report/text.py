@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
-from trihedron.sanitise import one_line, printable
+from trihedron.sanitise import escaped, one_line
 
 WIDTH = 100
 """Columns of a report in a file, a pipe or a notebook."""
@@ -43,7 +43,7 @@ class Style:
 
     def plain(self, text: str) -> str:
         """The text with control characters escaped, since names in logs are untrusted, and in ASCII if needed."""
-        return printable(ascii_of(text) if self.is_ascii else text)
+        return escaped(ascii_of(text) if self.is_ascii else text)
 
 
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:

@@ -28,7 +28,7 @@ from trihedron.files.formats.matrices import upper_frame as upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.folders import modules_of
 from trihedron.records import Calibration
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 
 @cache
@@ -65,7 +65,7 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     made = one.write(require_plausible(calibration), options or ExportOptions())
     texts = {"": made} if isinstance(made, str) else made
     # The texts contain file names, which may contain control characters.
-    return {ending: printable(text) for ending, text in texts.items()}
+    return {ending: escaped(text) for ending, text in texts.items()}
 
 
 def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
