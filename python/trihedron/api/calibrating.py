@@ -45,6 +45,8 @@ Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
 """Findings that already state the number of poses."""
+FEWEST_POSES = 3
+"""Fewest poses with which a fit is tried."""
 MOST_SETTLING = 0.05
 """Fraction of poses with detected settling that is allowed, since more settle undetected: with one of 18 on a support
 that yields, a fifth of the elements of the gyro's S were outside their 95 % interval."""
@@ -205,7 +207,7 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
             f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
             "or name its columns with --columns."
         )
-    if segments.n_poses < 3:
+    if segments.n_poses < FEWEST_POSES:
         of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
         grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
         is_count = grave is not None and grave.code in COUNTS_OF_POSES

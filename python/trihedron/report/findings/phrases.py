@@ -82,7 +82,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "names": "the line of names",
         "counted": "{words:each}",
         "both": "{one} and {other}",
-        "streams": "{streams:each}{has_more:? ...|}",
+        "streams": "{streams:each}{has_more:? and others|}",
         "this-container": "This {kind}",
         "unit-with-rate": "{unit} ({rate_hz:.4g} Hz)",
         "amount-of-scatter": "{value:.3g} {unit} in {name}",

@@ -9,8 +9,8 @@ _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wron
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
-    "gravity rotates by {factor:.3g} (± {percent:.1g} %) times the gyro's angle in {unit} (1 where the unit is right; "
-    "correlation {correlation:.2f})"
+    "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit} (1 "
+    "where the unit is right; correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
@@ -201,7 +201,7 @@ _ROWS = {
         "The log is damaged inside; what could not be read of it was skipped, readings among it.", _CUT_OFF, _COPY_AGAIN
     ),
     (Code.SAMPLES_LOST, "dropouts", WARNING): Words(
-        "The logger itself reports {count} dropouts, {lost_s:.3g} s altogether.",
+        "The logger itself reports {count:# dropout}, {lost_s:.3g} s in all.",
         "A memory card that was too slow.",
         _INTEGRATED,
     ),
