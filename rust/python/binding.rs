@@ -152,7 +152,14 @@ pyo3::create_exception!(
     trihedron._core,
     InputError,
     PyValueError,
-    "A log, a value or a question that cannot be answered; the message says why and what to do. Never a defect of the program."
+    "An error about the input: a log, a value or a request that allows no result.
+
+The message names the cause and the remedy; it is never a defect of the program.
+
+Examples
+--------
+>>> issubclass(trihedron.InputError, ValueError)
+True"
 );
 
 fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {

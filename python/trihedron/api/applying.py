@@ -68,6 +68,11 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
     overwrite : bool
         Replace a file that exists.
 
+    Returns
+    -------
+    None
+        The file at ``path`` is the result; :func:`read_calibration` reads it.
+
     Raises
     ------
     OutputError
@@ -75,7 +80,7 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
 
     Examples
     --------
-    >>> trihedron.write_calibration(result, "calibration.json")  # doctest: +SKIP
+    >>> trihedron.write_calibration(result, "calibration.json", overwrite=True)
     """
     write_file(calibration_of(calibration), path, overwrite=overwrite)
 

@@ -254,17 +254,15 @@ def _by_poses(
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
+            return replace(both, findings=(*_still_said(found), *both.findings))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except INPUT_ERRORS as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
 
 
-def _still_said(found: Found, joint: SensorCalibration) -> Found:
-    """Findings of the accelerometer's own fit for the joint fit: excess residual only if that is widened as well."""
-    if joint.quality is None or joint.quality.covariance_scale > 1.0:
-        return found
+def _still_said(found: Found) -> Found:
+    """Findings of the accelerometer's own fit that hold for the joint fit, which states its own excess residual."""
     return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
 
 

@@ -83,7 +83,7 @@ def capture(
     overwrite: bool = False,
     on_block: Callable[[Block], bool | None] | None = None,
 ) -> Recording:
-    """Record what a board sends into a log, on disk as it comes, then read the log back.
+    """Record what a board sends into a log, written as it arrives, then read the log back.
 
     Parameters
     ----------
@@ -160,16 +160,21 @@ def stopped_by(recorder: Recorder, *numbers: int) -> Iterator[None]:
 
 
 def ports() -> list[Port]:
-    """The serial ports that are plugged in; takes no arguments and never raises.
+    """The serial ports that are plugged in.
 
     Returns
     -------
     list of Port
-        Each with its name and the system's description of the device.
+        Each with its name and the system's description of the device; empty without one.
+
+    Raises
+    ------
+    Nothing
+        A device without a description is listed by its name.
 
     Examples
     --------
-    >>> [port.name for port in trihedron.ports()]  # doctest: +SKIP
+    >>> names = [port.name for port in trihedron.ports()]
     """
     return list_ports()
 

@@ -40,7 +40,7 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
 
     Examples
     --------
-    >>> trihedron.convert("flight.bag", "flight.csv")  # doctest: +SKIP
+    >>> written = trihedron.convert(recording, "plain.csv", overwrite=True)
     """
     if options and (isinstance(log, Recording) or hasattr(log, "recording")):
         raise InputError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")

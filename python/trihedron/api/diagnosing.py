@@ -134,13 +134,12 @@ def _of_poses(
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
-    resting = (
-        None if against is not None else model_of_static_log(recording, segments, known, (gravity, source), calibrated)
-    )
-    if resting is not None:
+    stated = (gravity, source)
+    static = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
+    if static is not None:
         notify(0.1, "looking at biases and spectral lines")
         return diagnosed_static_log(
-            recording, segments, resting, (gravity, source), tuple(findings), alpha, is_given=known is not None
+            recording, segments, static, stated, tuple(findings), alpha, is_given=known is not None
         )
     simulated: _Free | None = None
     if against is not None:

@@ -44,7 +44,7 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 
     Examples
     --------
-    >>> trihedron.extend(result).calibration.extensions  # doctest: +SKIP
+    >>> effects = trihedron.extend(result).calibration.extensions.get("effects")
     """
     if not isinstance(result, CalibrationResult):
         raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")

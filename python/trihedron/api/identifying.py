@@ -75,9 +75,9 @@ def allan(
 
     Examples
     --------
-    >>> static = {"t": [k / 100 for k in range(6000)], "acc": [[0.0, 0.0, 9.8]] * 6000}
-    >>> found = trihedron.allan(static)  # doctest: +SKIP
-    >>> found.axis("gyro x").terms  # doctest: +SKIP
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.01, (20000, 3))
+    >>> static = trihedron.Recording(np.arange(20000) / 100.0, noise + [0.0, 0.0, 9.81], None, 100.0)
+    >>> found = trihedron.allan(static).axis("accel x").term("N")  # m/s²/√Hz
     """
     recording = recording_of(recording)
     doubts: tuple[Finding, ...] = ()

@@ -63,7 +63,8 @@ def rank(
 
     Examples
     --------
-    >>> trihedron.rank([result, result], recording).candidates[0].name  # doctest: +SKIP
+    >>> len(trihedron.rank([result, result], recording).candidates)
+    2
     """
     if len(calibrations) < 2:
         raise InputError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")

@@ -84,7 +84,9 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
     Examples
     --------
-    >>> trihedron.read_calibration("calibration.json").gyroscope.b  # doctest: +SKIP
+    >>> trihedron.write_calibration(result, "calibration.json", overwrite=True)
+    >>> trihedron.read_calibration("calibration.json").gyroscope.si_unit
+    'rad/s'
     """
     path = Path(path)
     meant = "name a calibration file written by `trihedron calibrate -o` (it comes before the log)"

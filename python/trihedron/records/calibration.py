@@ -92,6 +92,11 @@ class SensorCalibration(Frozen):
         Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
         Residuals pose by pose or move by move, and what the motion determined.
+
+    Examples
+    --------
+    >>> result.accelerometer.S.shape, result.accelerometer.sigma_b.shape
+    ((3, 3), (3,))
     """
 
     S: FloatArray
@@ -162,6 +167,11 @@ class Calibration(Presented):
     averaging : float
         0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
         11.6d); fractions between them are estimates from the rotations.
+
+    Examples
+    --------
+    >>> result.calibration.covariance.shape
+    (24, 24)
     """
 
     accelerometer: SensorCalibration

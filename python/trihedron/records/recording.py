@@ -112,6 +112,12 @@ class Recording(Presented):
     ------
     ValueError
         When shapes disagree or time runs backward.
+
+    Examples
+    --------
+    >>> static = trihedron.Recording(np.arange(200) / 100.0, np.tile([0.0, 0.0, 9.81], (200, 1)), None, 100.0)
+    >>> static.n_samples, static.duration_s
+    (200, 1.99)
     """
 
     time_s: FloatArray

@@ -31,6 +31,6 @@ def figures() -> ModuleType:
 
 def png_of(picture: Picture) -> bytes:
     """A figure as the bytes of a PNG file; raises as :func:`figures` does."""
-    room = figures()
-    made: bytes = room.png(room.draw_chart(picture.chart))
+    library = figures()
+    made: bytes = library.png(library.draw_chart(picture.chart))
     return made

@@ -103,7 +103,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     usable = [log for log in summary.logs if _is_usable(log)]
     again = [log.name for log in summary.logs if not _is_usable(log)]
     opened = [log.name for log in usable if log.verdict in OPEN]
-    steps = [f"state the units if {_first(moved)} holds several ({BY_FILE})"] if moved else []
+    steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"record again {_first(again)}"] if again else []
     steps += [f"diagnose {_first(opened)}"] if opened else []
     steps += [f"look at {_first(strays)}"] if strays else []

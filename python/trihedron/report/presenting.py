@@ -169,7 +169,7 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
 
     Examples
     --------
-    >>> trihedron.plot(result, "residuals").savefig("residuals.png")  # doctest: +SKIP
+    >>> trihedron.plot(result, "residuals").savefig("residuals.png")
     """
     there = pictures(result)
     chosen = next(iter(there), None) if name is None else name

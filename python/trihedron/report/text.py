@@ -101,8 +101,8 @@ def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
     # A command that fits in a line is not broken, so that it can be copied.
-    room = width - max(len(first), len(rest)) - 1
-    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= room else found[0], text)
+    most = width - max(len(first), len(rest)) - 1
+    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= most else found[0], text)
     lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )
@@ -161,8 +161,8 @@ def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 
 
 def _heads(heads: Sequence[str], below: Grid) -> list[list[str]]:
-    room = _widths(below) if below else [0] * len(heads)
-    return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, room, strict=True)]
+    widest = _widths(below) if below else [0] * len(heads)
+    return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, widest, strict=True)]
 
 
 def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
@@ -174,9 +174,9 @@ def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
 def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
     """As :func:`_stacked`, with row names wrapped to the remaining width."""
     grid, gap = _stacked(rows)
-    room = columns - sum(width + gap for width in _widths(grid)[1:])
+    most = columns - sum(width + gap for width in _widths(grid)[1:])
     for row, cells in zip(grid, rows, strict=True):
-        row[0] = _wrap(cells[0], max(room, _FEWEST))
+        row[0] = _wrap(cells[0], max(most, _FEWEST))
     return grid, gap
 
 
@@ -197,9 +197,9 @@ def _widths(grid: Grid) -> list[int]:
     return [max(_width(line) for row in grid for line in row[k]) for k in range(len(grid[0]))]
 
 
-def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], room: tuple[int, int]) -> list[str]:
-    """One row of a part; ``room`` is (columns, gap); a last cell that is too long is wrapped."""
-    columns, gap = room
+def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], space: tuple[int, int]) -> list[str]:
+    """One row of a part; ``space`` is (columns, gap); a last cell that is too long is wrapped."""
+    columns, gap = space
     high = max(len(row[k]) for k in chosen)
     lines = []
     for n in range(high):

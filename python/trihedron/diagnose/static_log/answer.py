@@ -231,7 +231,7 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         p_adjusted=float(min(1.0, max(curve.p_value, LEAST_P) * n_effects)), delta_bic=curve.score,
         held_out=(held,), confounded_with=("accel-thermal-scale",) if is_accelerometer else (),
         separating_experiment=experiment_for(effect_id, is_static=True) if is_accelerometer else "",
-        model=_model("rest-curve", series),
+        model=_model("static-curve", series),
         share=float(np.clip(1.0 - (rest**2).sum() / (raw**2).sum(), 0.0, 1.0)),
     )  # fmt: skip
 
@@ -268,7 +268,7 @@ def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> Accep
         id=side.id("bias-drift"), statement=effect_words(side.id("bias-drift"), side.case, range=spans),
         parameters=tuple(parameters), p_adjusted=float(min(1.0, p * n_effects)),
         delta_bic=float(max(-2.0 * np.log(p), 0.0)), held_out=(), separating_experiment="",
-        model=_model("rest-drift", series),
+        model=_model("static-drift", series),
         share=float(np.clip(((curve.rms * size) ** 2).sum() / whole, 0.0, 1.0)),
     )  # fmt: skip
 

@@ -14,7 +14,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise.gaps import true_share
-from trihedron.records.noise import AllanCurve, AllanKind
+from trihedron.records.allan_curve import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 

@@ -18,8 +18,9 @@ from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
 STEP = 1.9

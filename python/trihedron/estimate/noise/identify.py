@@ -19,8 +19,9 @@ from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_b
 from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
+from trihedron.records.noise import Noise, NoiseAxis
 
 # Warm-up of the bias: an exponential approach, separated from a random walk by likelihood.
 MEANS = 64
