@@ -92,7 +92,7 @@ def calibration_by(
     """
     if recording.accelerometer is None:
         raise InputError(
-            f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
+            f"{recording.source}: a calibration contains an accelerometer too, and this log has none; "
             "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
         )
     gyro = found.gyroscope

@@ -279,7 +279,7 @@ def apply_file(
     sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
     used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]
     if not used:
-        raise InputError(f"{log.source}: the calibration holds none of its sensors.")
+        raise InputError(f"{log.source}: the calibration contains none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
     part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
     of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))

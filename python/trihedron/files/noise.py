@@ -48,7 +48,7 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
         rate = float(document["rate_hz"])
     except (KeyError, TypeError, ValueError, IndexError, ArithmeticError):
         raise NoiseFileError(
-            f"{source}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
+            f"{source}: this JSON contains no noise terms; name a file written by `trihedron allan --json`."
         ) from None
     if not out:
         raise NoiseFileError(

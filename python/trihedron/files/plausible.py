@@ -29,7 +29,7 @@ def require_plausible(calibration: Calibration) -> Calibration:
     for name, sensor in named_sensors(calibration):
         largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))
         if not largest < LARGEST_NUMBER:
-            raise InputError(f"the {name} holds {largest:.3g} among S and b: the file is damaged; calibrate again.")
+            raise InputError(f"the {name} contains {largest:.3g} among S and b: the file is damaged; calibrate again.")
         lengths = np.linalg.norm(sensor.S, axis=0)
         if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
             raise InputError(

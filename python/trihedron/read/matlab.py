@@ -48,7 +48,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     if not found:
         held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
         raise ReadError(
-            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it holds {held[:300]}."
+            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it contains {held[:300]}."
         )
     sha256 = file_sha256(path)
     if choice.topic is None:

@@ -137,7 +137,7 @@ def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) 
     streams = [Stream(topic, count) for topic, count in sorted(counts.items())]
     if not streams:
         raise ReadError(
-            f"{path}: no topic of type sensor_msgs/Imu in this bag; it holds {', '.join(others[:12]) or '0 messages'}."
+            f"{path}: no topic of type sensor_msgs/Imu in this bag; there are {', '.join(others[:12]) or '0 messages'}."
         )
     sha256 = file_sha256(path) if path.is_file() else ""
     pair = _pair(streams) if choice.topic is None else None

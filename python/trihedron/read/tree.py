@@ -118,7 +118,9 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
         return Table(path, None, columns, file_sha256(path))
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
-        raise ReadError(f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it holds {held[:300]}.")
+        raise ReadError(
+            f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains {held[:300]}."
+        )
     streams = [Stream(name, table.n_rows) for name, table in tables.items()]
     taken = pick(path, streams, choice, what)
     chosen = tables[taken.topic]

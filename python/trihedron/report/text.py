@@ -25,7 +25,7 @@ _FEWEST, _FEWEST_OF_HEADS = 16, 9
 # The sixteen ANSI colours, which follow the terminal's theme.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
-Grid = list[list[list[str]]]
+InLines = list[list[list[str]]]
 """Rows of cells, each of one line or more; the first row is the head."""
 
 
@@ -137,47 +137,47 @@ def _table(table: Table, style: Style) -> list[str]:
     """The first layout in which all columns fit, else the one with the fewest parts."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
     found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
-    grid, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
-    widths = _widths(grid)
+    in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
+    widths = _widths(in_lines)
     out = _wrap(style.plain(table.caption), style.width) if table.caption else []
     for n, part in enumerate(_parts(widths, style.width, gap)):
         if n:
             names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[1:])
             out += ["", *_wrap(f"(continued: {names})", style.width)]
-        head, *body = (_line(row, part, widths, (style.width, gap)) for row in grid)
+        head, *body = (_line(row, part, widths, (style.width, gap)) for row in in_lines)
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
         out += [line for row in body for line in row]
     return out
 
 
-def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     return [[[cell] for cell in row] for row in rows], _GAP
 
 
-def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     """Heads wrapped to the width of their columns."""
-    grid, gap = _as_it_is(rows)
-    return [_heads(rows[0], grid[1:]), *grid[1:]], gap
+    in_lines, gap = _as_it_is(rows)
+    return [_heads(rows[0], in_lines[1:]), *in_lines[1:]], gap
 
 
-def _heads(heads: Sequence[str], below: Grid) -> list[list[str]]:
+def _heads(heads: Sequence[str], below: InLines) -> list[list[str]]:
     widest = _widths(below) if below else [0] * len(heads)
     return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, widest, strict=True)]
 
 
-def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _stacked(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     """Heads wrapped, uncertainties below their values, and narrower gaps."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
     return [_heads(rows[0], low), *low], _NARROW_GAP
 
 
-def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[InLines, int]:
     """As :func:`_stacked`, with row names wrapped to the remaining width."""
-    grid, gap = _stacked(rows)
-    most = columns - sum(width + gap for width in _widths(grid)[1:])
-    for row, cells in zip(grid, rows, strict=True):
+    in_lines, gap = _stacked(rows)
+    most = columns - sum(width + gap for width in _widths(in_lines)[1:])
+    for row, cells in zip(in_lines, rows, strict=True):
         row[0] = _wrap(cells[0], max(most, _FEWEST))
-    return grid, gap
+    return in_lines, gap
 
 
 def _in_lines(text: str, most: int) -> list[str]:
@@ -193,8 +193,8 @@ def _below(cell: str) -> list[str]:
     return [value, f"± {rest}"] if sign and value.strip() else [cell]
 
 
-def _widths(grid: Grid) -> list[int]:
-    return [max(_width(line) for row in grid for line in row[k]) for k in range(len(grid[0]))]
+def _widths(in_lines: InLines) -> list[int]:
+    return [max(_width(line) for row in in_lines for line in row[k]) for k in range(len(in_lines[0]))]
 
 
 def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], space: tuple[int, int]) -> list[str]:

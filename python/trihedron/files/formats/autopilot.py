@@ -101,7 +101,7 @@ def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, p
     current = {key: value for key, value in parameters_in(text).items() if key.startswith((prefix, *_SHARED))}
     if text and not any(key.startswith(prefix) for key in current):
         raise InputError(
-            f"the file of current parameters holds no {prefix}...: save the parameters of the {name} board."
+            f"the file of current parameters contains no {prefix}...: save the parameters of the {name} board."
         )
     if known is not None:
         return replace(known, parameters={**known.parameters, **current})
@@ -149,7 +149,7 @@ def composed(
         b = own.turn.T @ sensor.b - S @ own.offset
         if np.any(np.diag(S) <= 0.0):
             raise InputError(
-                f"an axis of the {name} is mirrored against the board and {target} holds positive scales only: "
+                f"an axis of the {name} is mirrored against the board and {target} stores positive scales only: "
                 "set the orientation of the sensor first."
             )
         made[name] = replace(sensor, S=S, b=b, covariance=_turned(sensor.covariance, own))

@@ -220,7 +220,7 @@ def lost_temperature(calibration: Calibration) -> list[str]:
             else f"{degrees_from_radians(bias):.3g} deg/s"
         )
         said.append(
-            f"This file holds the {name} at {thermal.reference_degc:.1f} degC: its change from "
+            f"This file contains the {name} at {thermal.reference_degc:.1f} degC: its change from "
             f"{thermal.range_degc[0]:.1f} to {thermal.range_degc[1]:.1f} degC is lost, up to {size} of bias and "
             f"{100 * thermal.scale:.2g} % of scale."
         )

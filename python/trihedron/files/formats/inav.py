@@ -55,7 +55,7 @@ def _size_of_a_count(name: str, options: ExportOptions) -> float:
         (options.accel_lsb, "--accel-lsb", "0.488 mg") if is_accel else (options.gyro_lsb, "--gyro-lsb", "0.061 deg/s")
     )
     if not said:
-        raise InputError(f"INAV holds whole counts: say the size of one of the {name} with {option} '{example}'.")
+        raise InputError(f"INAV stores whole counts: say the size of one of the {name} with {option} '{example}'.")
     return acceleration_lsb_to_si(said) if is_accel else rate_lsb_to_si(said)
 
 

@@ -135,8 +135,8 @@ class _Planner:
 
     def step(self, step: Step) -> None:
         if isinstance(step, Pose):
-            creep = radians_from_degrees(step.creep_deg) * unit(step.creep_axis)
-            self.add("pose", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
+            creep = radians_from_degrees(step.settling_deg) * unit(step.settling_axis)
+            self.add("pose", step.name, step.duration_s, creep if step.settling_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
             # R' = R exp(v) has `up` vertical if exp(v) rotates `up` to the old vertical in the body frame.
             turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))

@@ -24,12 +24,12 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Pose:
-    """Static pose. With ``creep_deg`` it settles by that angle about ``creep_axis`` (body) over the whole pose."""
+    """Static pose; it settles by ``settling_deg`` about ``settling_axis`` (body) over the whole pose."""
 
     duration_s: float
     name: str = ""
-    creep_deg: float = 0.0
-    creep_axis: Vector = (1.0, 0.0, 0.0)
+    settling_deg: float = 0.0
+    settling_axis: Vector = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
