@@ -206,7 +206,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
     said += "departures from 90°."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
-    return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices and of one device")]
+    return [Paragraph(said), Table(tuple(head), tuple(rows), "Standard deviations between devices and of one device")]
 
 
 def _outliers(summary: FleetSummary) -> list[Block]:
