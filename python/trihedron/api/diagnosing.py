@@ -138,9 +138,7 @@ def _of_poses(
     static = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
     if static is not None:
         notify(0.1, "looking at biases and spectral lines")
-        return diagnosed_static_log(
-            recording, segments, static, stated, tuple(findings), alpha, is_given=known is not None
-        )
+        return diagnosed_static_log(recording, segments, static, stated, (*findings,), alpha, is_given=known is not None)
     simulated: _Free | None = None
     if against is not None:
         simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, notify)
