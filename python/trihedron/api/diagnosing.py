@@ -135,10 +135,10 @@ def _of_poses(
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
     stated = (gravity, source)
-    static = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
-    if static is not None:
+    model = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
+    if model is not None:
         notify(0.1, "looking at biases and spectral lines")
-        return diagnosed_static_log(recording, segments, static, stated, (*findings,), alpha, is_given=known is not None)
+        return diagnosed_static_log(recording, segments, model, stated, (*findings,), alpha, is_given=known is not None)
     simulated: _Free | None = None
     if against is not None:
         simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, notify)
