@@ -34,7 +34,7 @@ CASES = {
     ),
     "constant-time": (
         (HEADER + "\n".join(",".join(["1.0", *r.split(",")[1:]]) for r in ROWS)).encode(),
-        "time column 't' holds 1 in every row",
+        "time column 't' contains 1 in every row",
     ),
     "binary": (bytes(range(256)) * 20, "zero byte|no line of numbers"),
     "zero-bytes-at-the-end": (TEXT.encode() + b"\0" * 512, "line 302 contains binary data"),
