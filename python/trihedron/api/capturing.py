@@ -174,7 +174,7 @@ def ports() -> list[Port]:
 
     Examples
     --------
-    >>> names = [port.name for port in trihedron.ports()]
+    >>> names = [port.device for port in trihedron.ports()]
     """
     return list_ports()
 

@@ -77,7 +77,7 @@ def allan(
     --------
     >>> noise = np.random.default_rng(1).normal(0.0, 0.01, (20000, 3))
     >>> static = trihedron.Recording(np.arange(20000) / 100.0, noise + [0.0, 0.0, 9.81], None, 100.0)
-    >>> found = trihedron.allan(static).axis("accel x").term("N")  # m/s²/√Hz
+    >>> white = trihedron.allan(static).axis("accel x").terms["N"].value  # m/s²/√Hz
     """
     recording = recording_of(recording)
     doubts: tuple[Finding, ...] = ()

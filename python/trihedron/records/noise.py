@@ -245,7 +245,7 @@ class Noise(Presented):
 
     Examples
     --------
-    >>> found = trihedron.identify_noise(recording.gyroscope[:400, 0], recording.rate_hz)
+    >>> found = trihedron.identify_noise(recording.gyroscope[:2000, 0], recording.rate_hz)
     >>> len(found.axes), found.curve.rate_hz == recording.rate_hz
     (1, True)
     """

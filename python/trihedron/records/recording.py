@@ -117,7 +117,7 @@ class Recording(Presented):
     --------
     >>> static = trihedron.Recording(np.arange(200) / 100.0, np.tile([0.0, 0.0, 9.81], (200, 1)), None, 100.0)
     >>> static.n_samples, static.duration_s
-    (200, 1.99)
+    (200, 2.0)
     """
 
     time_s: FloatArray
