@@ -169,8 +169,8 @@ def ports() -> list[Port]:
 
     Raises
     ------
-    Nothing
-        A device without a description is listed by its name.
+    CaptureError
+        (a ``ValueError``) when pyserial is not installed.
 
     Examples
     --------

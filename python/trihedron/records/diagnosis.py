@@ -245,7 +245,7 @@ class Diagnosis(Frozen, Plain):
 
     Examples
     --------
-    >>> trihedron.diagnose(recording, latitude_deg=60.0).diagnosis.alpha
+    >>> trihedron.diagnose(recording, latitude_deg=60.0).alpha
     0.01
     """
 
