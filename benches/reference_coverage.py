@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
 from reference_rig import G, tracked
 from reference_truths import truth
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference.fit import fit_reference
 from trihedron.records.reference import NAMED_FROM
 
@@ -53,7 +53,7 @@ KINDS = {
 def one_or_rejected(trial):
     try:
         return one(trial)
-    except RefusedError:
+    except InputError:
         return None
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.diagnose.rest.process import BiasReadings
+from trihedron.diagnose.static_log.process import BiasReadings
 
 STEP_S = 0.25
 POSE_S, MOVE_S = 6.0, 4.0

@@ -68,8 +68,8 @@ def test_a_stage_imports_no_other_stage():
 
 def test_records_import_nobody():
     for path in (PACKAGE / "records").rglob("*.py"):
-        rooms = {m.split(".")[1] for m in imported_modules(path) if m.startswith("trihedron.")} - {"records"}
-        assert rooms <= BELOW_RECORDS, f"{path.name} imports {sorted(rooms - BELOW_RECORDS)}"
+        parts = {m.split(".")[1] for m in imported_modules(path) if m.startswith("trihedron.")} - {"records"}
+        assert parts <= BELOW_RECORDS, f"{path.name} imports {sorted(parts - BELOW_RECORDS)}"
         assert "import_module" not in path.read_text(), path
 
 
@@ -260,7 +260,7 @@ def test_the_documents_name_files_that_exist():
 # Records that only stages make: what does not fit together there is a defect, to be seen with its trace.
 DEFECTS = {
     "records/calibration.py",
-    "records/noise.py",
+    "records/allan_curve.py",
     "records/segments.py",
     "report/findings/wording.py",
     "cli/allan.py",  # caught one line below
@@ -323,17 +323,17 @@ def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
     assert found == CONVERSIONS
 
 
-# Arrows between the rooms of the diagnosis, each once: what stands in a row may import what stands before it.
-ROOMS_OF_THE_DIAGNOSIS = (
+# Arrows between the parts of the diagnosis, each once: what stands in a row may import what stands before it.
+PARTS_OF_THE_DIAGNOSIS = (
     "session", "context", "residuals", "effects", "hypothesis", "candidates", "relations", "bias_strengths",
-    "search", "shared", "sample_evidence", "accepted", "application", "diagnosis", "against", "rest",
+    "search", "shared", "sample_evidence", "accepted", "application", "diagnosis", "against", "static_log",
 )  # fmt: skip
 
 
-def test_the_rooms_of_the_diagnosis_know_only_those_before_them():
-    rank = {name: k for k, name in enumerate(ROOMS_OF_THE_DIAGNOSIS)}
-    rooms = {p.name.removesuffix(".py") for p in (PACKAGE / "diagnose").iterdir() if not p.name.startswith("__")}
-    assert rooms == set(rank)
+def test_the_parts_of_the_diagnosis_know_only_those_before_them():
+    rank = {name: k for k, name in enumerate(PARTS_OF_THE_DIAGNOSIS)}
+    parts = {p.name.removesuffix(".py") for p in (PACKAGE / "diagnose").iterdir() if not p.name.startswith("__")}
+    assert parts == set(rank)
     for path in (PACKAGE / "diagnose").rglob("*.py"):
         own = path.relative_to(PACKAGE / "diagnose").parts[0].removesuffix(".py")
         if own == "__init__":

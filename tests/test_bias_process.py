@@ -5,7 +5,7 @@ import pytest
 
 from bias_sessions import Session, draw, readings_of
 from trihedron import _core
-from trihedron.diagnose.rest.heat import slow_change
+from trihedron.diagnose.static_log.heat import slow_change
 
 
 def dense_covariance(t, length, pose, variance, direction, strengths):

@@ -10,7 +10,7 @@ from scipy import stats
 import trihedron
 from trihedron.api.calibrating import calibrate
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -152,7 +152,7 @@ def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit
 
     with pytest.raises(ValueError, match="broadcast"):
         ends(ValueError("operands could not be broadcast together with shapes (3,) (4,)"))
-    for rejection in (RefusedError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
+    for rejection in (InputError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
         result = ends(rejection)
         assert result.calibration.gyroscope is None
         assert any(str(rejection).rstrip(".") in finding.seen for finding in result.findings)

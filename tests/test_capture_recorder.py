@@ -204,7 +204,7 @@ def test_kill_9_loses_at_most_a_second_and_the_file_reads(tmp_path):
     assert back.n_samples > 300
 
 
-REFUSALS = [
+INPUT_ERRORS = [
     (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
     (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
     (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
@@ -219,7 +219,7 @@ REFUSALS = [
 ]
 
 
-@pytest.mark.parametrize(("words", "sentence"), REFUSALS)
+@pytest.mark.parametrize(("words", "sentence"), INPUT_ERRORS)
 def test_bad_input_is_refused_in_one_sentence_with_status_1(words, sentence, tmp_path, capsys):
     (tmp_path / "empty").write_bytes(b"")
     (tmp_path / "noise").write_bytes(np.random.default_rng(0).bytes(3000))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.channel_facts.at_rest import adc_step, adc_steps
+from trihedron.channel_facts.static_axes import adc_step, adc_steps
 from trihedron.records import Recording
 
 SCALE = 9.80665 / 16384

@@ -57,7 +57,7 @@ def _without_corners():
     """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_poses.py has them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("trihedron.estimate.noise.poses.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
-        patch.setattr("trihedron.channel_facts.at_rest.undisturbed", lambda spectrum, _: spectrum)
+        patch.setattr("trihedron.channel_facts.static_axes.undisturbed", lambda spectrum, _: spectrum)
         yield
 
 

@@ -237,7 +237,7 @@ def test_a_target_of_constants_says_what_the_temperature_is_worth(target):
     known = by_temperature(diagonal_in(np.eye(3), log_of("px4", {}, "raw")))
     text = export_calibration(known, target)
     # 4e-4 rad/s a direction over 20 K is 0.23 deg/s.
-    assert "holds the gyroscope at 25.0 degC" in text
+    assert "contains the gyroscope at 25.0 degC" in text
     assert "0.229 deg/s of bias" in text
 
 

@@ -15,7 +15,7 @@ from trihedron.fleet import find_jobs, running, summarise
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +173,7 @@ def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_pat
     for name in ("fleet.csv", "fleet.html"):
         text = (tmp_path / "out" / name).read_text()
         assert "a\\x1b[2J\\x9b\\u202eb.csv" in text
-        assert printable(text) == text
+        assert escaped(text) == text
     names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
     assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
 

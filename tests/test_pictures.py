@@ -111,7 +111,7 @@ def test_a_bias_of_a_static_log_is_drawn_over_temperature_with_its_curve_through
     values = {"bias_per_kelvin_x": 1e-3, "bias_per_kelvin_y": -2e-3, "bias_per_kelvin2_z": 1e-4}
     parameters = [SimpleNamespace(name=name, value=value) for name, value in values.items()]
     series = {"time_s": [], "temperature_degc": heat.tolist(), "value": (bias - about).tolist(), "pose": pose.tolist()}
-    model = {"variant": "rest-curve", "curve": series | {"unit": "m/s^2"}}
+    model = {"variant": "static-curve", "curve": series | {"unit": "m/s^2"}}
     panels = rest_panels(SimpleNamespace(model=model, parameters=parameters))
     assert [panel.title for panel in panels] == ["X", "Y", "Z"]
     for panel in panels:

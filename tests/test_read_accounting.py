@@ -74,7 +74,7 @@ def test_two_files_account_for_the_rows_of_both(tmp_path):
     assert recording.rows_in_file == recording.rows_read + recording.rows_reported == 330
 
 
-REFUSED = {
+REJECTED = {
     "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
     "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
     "json": (b'{"accel": [[1, 2, 3]]}', "this JSON.*from Python"),
@@ -86,7 +86,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("content, complaint", REFUSED.values(), ids=REFUSED.keys())  # noqa: PT006
+@pytest.mark.parametrize("content, complaint", REJECTED.values(), ids=REJECTED.keys())  # noqa: PT006
 def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint):
     path = tmp_path / "log.bin"
     path.write_bytes(content)

@@ -34,10 +34,10 @@ CASES = {
     ),
     "constant-time": (
         (HEADER + "\n".join(",".join(["1.0", *r.split(",")[1:]]) for r in ROWS)).encode(),
-        "time column 't' holds 1 in every row",
+        "time column 't' contains 1 in every row",
     ),
     "binary": (bytes(range(256)) * 20, "zero byte|no line of numbers"),
-    "zero-bytes-at-the-end": (TEXT.encode() + b"\0" * 512, "line 302 holds binary data"),
+    "zero-bytes-at-the-end": (TEXT.encode() + b"\0" * 512, "line 302 contains binary data"),
     "web-page": (b"<html><body>404 not found</body></html>\n" * 3, "no line of numbers"),
     "truncated-gzip": (gzip.compress(TEXT.encode())[:-900], "gzip data is damaged or ends too early, after about"),
     "damaged-gzip": (b"\x1f\x8b\x08" + b"junk" * 40, "gzip data is damaged"),
@@ -48,7 +48,7 @@ CASES = {
     "ros-bag": (b"#ROSBAG V2.0\n" + bytes(100), "ROS bag|rosbags cannot read this bag"),
     "other-table": (b"sensor,freq\nA,100\nB,200\nC,300\n", "no accelerometer and no gyro"),
     "nine-unnamed-columns": ((",".join("123456789") + "\n").encode() * 9, "9 columns without names"),
-    "all-nan": ((HEADER + "\n".join(f"{i},nan,1,{i},3,{i},5" for i in range(9))).encode(), "holds no finite number"),
+    "all-nan": ((HEADER + "\n".join(f"{i},nan,1,{i},3,{i},5" for i in range(9))).encode(), "contains no finite number"),
 }
 
 

@@ -102,7 +102,7 @@ def test_arrays_make_an_audited_recording_in_their_units():
         (object(), "got object"),
         (np.zeros((4, 4, 4)), r"got shape \(4, 4, 4\)"),
         (np.array(["a", "b"]), "got shape"),
-        (np.array([["a", "b"]]), "holds numbers, got dtype"),
+        (np.array([["a", "b"]]), "contains numbers, got dtype"),
         ({"t": np.arange(5), "ax": np.arange(4)}, "differ in length"),
         ({"acc": np.zeros((3, 500))}, "give its transpose"),
         ({"t": ["x", "y"]}, "no column of numbers"),

@@ -101,5 +101,5 @@ def test_an_axis_without_numbers_is_named(tmp_path):
     words = next(one for one in read.findings if one.code is FindingCode.COLUMN_LEFT_OUT)
     assert "'ay [m/s^2]' contains no numbers (such as north), so the accelerometer" in words.seen
     assert words.severity is Severity.WARNING
-    with pytest.raises(trihedron.RefusedError, match=r"column 'ay' of the accelerometer contains no numbers"):
+    with pytest.raises(trihedron.InputError, match=r"column 'ay' of the accelerometer contains no numbers"):
         trihedron.read(log_of(tmp_path, "t,ax,ay,az", lambda row: [*row[:2], "north", row[3]]))

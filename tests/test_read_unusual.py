@@ -129,7 +129,7 @@ def test_rows_of_two_sensors_in_turn_are_two_logs_joined_on_their_stamps(tmp_pat
 
 def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp_path):
     path, table = in_turn(tmp_path, 1)
-    with pytest.raises(ReadError, match="in turn, and no column holds the time"):
+    with pytest.raises(ReadError, match="in turn, and no column contains the time"):
         read_recording(path, columns="time=none", rate_hz=100.0)
     lost = table.copy()
     lost[np.random.default_rng(3).random(ROWS) < 0.3, 4:] = np.nan

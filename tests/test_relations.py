@@ -39,12 +39,12 @@ def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter():
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
     assert "gyro-bias-repeatability" not in [effect.id for effect in result.effects]
     assert result.verdict == "unexplained"
-    assert result.relations[0].depends_on == ("vector fixed in the room",)
+    assert result.relations[0].depends_on == ("vector fixed in the world frame",)
     angle = next(p for p in result.relations[0].coefficients if p.unit == "deg")
     # The vector may as well point the other way, its coupling being reversed.
     true = np.degrees(np.arccos(-0.5 / np.sqrt(0.98)))
     assert min(abs(angle.value - true), abs(180.0 - angle.value - true)) < 4.0 * angle.std
-    assert "fixed in the room" in to_text(diagnosis_report(result))
+    assert "fixed in the world frame" in to_text(diagnosis_report(result))
 
 
 def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():

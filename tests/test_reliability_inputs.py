@@ -19,12 +19,12 @@ from small_session import made_elsewhere
 from trihedron import _core
 from trihedron.cli import main
 from trihedron.documents import DocumentError, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
 from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
 from trihedron.read import ReadError, open_chunks, read_recording
-from trihedron.sanitise import printable, printable_json
+from trihedron.sanitise import escaped, escaped_json
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.scenario_file import read_scenario
 
@@ -93,9 +93,9 @@ def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_a_calibration_tha
     calibration = read_calibration(tmp_path / "named.json")
     write_calibration(calibration, tmp_path / "again.json")
     text = (tmp_path / "again.json").read_text()
-    assert printable(text) == text
-    assert printable("a\x1b[2J\x9b\u202eb\n\t") == "a\\x1b[2J\\x9b\\u202eb\n\t"
-    assert printable_json('"\x9b"') == '"\\u009b"'
+    assert escaped(text) == text
+    assert escaped("a\x1b[2J\x9b\u202eb\n\t") == "a\\x1b[2J\\x9b\\u202eb\n\t"
+    assert escaped_json('"\x9b"') == '"\\u009b"'
     assert read_calibration(tmp_path / "again.json").recording_source == calibration.recording_source
 
 
@@ -171,7 +171,7 @@ def test_a_session_of_odd_values_is_made_or_refused(tmp_path, kind):
     for key in inspect.signature(SESSIONS[kind]).parameters:
         for value in _ODD:
             path.write_text(f'[session]\nkind = "{kind}"\n{key} = {value}\n')
-            with contextlib.suppress(RefusedError), np.errstate(all="ignore"):
+            with contextlib.suppress(InputError), np.errstate(all="ignore"):
                 read_scenario(path)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report import to_text
 from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel, Points, Scale, Span, Sphere
@@ -72,13 +72,13 @@ def test_what_is_of_another_kind_than_it_should_be_is_refused(path, value):
         place = place[key]
     assert path[-1] in place if isinstance(place, dict) else True
     place[path[-1]] = value
-    with pytest.raises(RefusedError, match="malformed"):
+    with pytest.raises(InputError, match="malformed"):
         report_of(saved)
 
 
 @pytest.mark.parametrize("saved", [[], {}, {"report": 3}, {"report": {"version": 99}}])
 def test_a_result_without_a_report_says_how_to_have_one(saved):
-    with pytest.raises(RefusedError, match="--json FILE"):
+    with pytest.raises(InputError, match="--json FILE"):
         report_of(saved)
 
 

@@ -9,7 +9,7 @@ import pytest
 from trihedron import _core
 
 STUB = ast.parse((Path(_core.__file__).parent / "_core.pyi").read_text())
-REFUSALS = (ValueError, TypeError, OverflowError)
+INPUT_ERRORS = (ValueError, TypeError, OverflowError)
 N_TRIALS = 12
 """Of every function; forty in the slow run."""
 
@@ -136,7 +136,7 @@ def some_instance(rng: np.random.Generator, name: str, n: int) -> object:
         positional, named = arguments(rng, declared, n)
         try:
             return getattr(_core, name)(*positional, **named)
-        except REFUSALS:
+        except INPUT_ERRORS:
             continue
     return object()
 
@@ -161,7 +161,7 @@ def test_any_arguments_are_answered_or_refused_in_words(name, trials):
                 continue
         try:
             target(*positional, **named)
-        except REFUSALS as rejection:
+        except INPUT_ERRORS as rejection:
             sentence = str(rejection)
             assert sentence
 

@@ -139,7 +139,7 @@ def test_a_push_inside_a_hold_is_left_out_and_said():
 def test_a_creeping_hold_stays_a_hold_and_is_said():
     steps = [Pose(8.0)]
     for k, edge in enumerate(EDGES):
-        steps += [MoveTo(edge, 2.0), Pose(10.0, creep_deg=0.3 if k == 3 else 0.0)]
+        steps += [MoveTo(edge, 2.0), Pose(10.0, settling_deg=0.3 if k == 3 else 0.0)]
     segments = segment_recording(simulate(scenario(Motion(tuple(steps)), 0.3), 1)[0])
     assert segments.n_poses == 13
     finding = next(f for f in segments.findings if f.code is FindingCode.POSE_SETTLING)

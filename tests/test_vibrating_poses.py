@@ -8,8 +8,8 @@ import pytest
 
 import trihedron
 from trihedron.records import Pose, Recording, Segments
-from trihedron.session import lines_at_rest
-from trihedron.session.lines_at_rest import means_beside_lines
+from trihedron.session import static_lines
+from trihedron.session.static_lines import means_beside_lines
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
@@ -113,10 +113,10 @@ def test_the_mean_beside_a_shaker_whose_frequency_wanders_is_known_and_its_error
         turned = 2.0 * np.pi * f * t + phase
         wave = rng.uniform(0.3, 3.0) * (np.sin(turned) + 0.4 * np.sin(2.02 * turned))
         part = wave[:, None] * np.array([0.3, 0.4, 0.87]) + rng.normal(size=(len(t), 3)) * sigma
-        lines, has_line = lines_at_rest.find_pose_lines(part)
+        lines, has_line = static_lines.find_pose_lines(part)
         if not lines:
             continue  # a sway of three to five bins looks like what is slower: the plain mean stays
-        mean, error = lines_at_rest._constant_beside(part, lines, np.full(3, sigma))
+        mean, error = static_lines._constant_beside(part, lines, np.full(3, sigma))
         z += (mean / error)[has_line].tolist()
         over_white += (error / (sigma / np.sqrt(len(t))))[has_line].tolist()
     assert len(z) > 150

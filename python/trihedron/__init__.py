@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from trihedron.api.simulating import simulate as simulate
     from trihedron.api.simulating import twin as twin
     from trihedron.api.verifying import verify as verify
-    from trihedron.errors import RefusedError as RefusedError
+    from trihedron.errors import InputError as InputError
     from trihedron.estimate.attitude import integrate_rate as integrate_rate
     from trihedron.estimate.noise.allan import allan_deviation as allan_deviation
     from trihedron.estimate.noise.identify import identify_noise as identify_noise
@@ -121,7 +121,7 @@ _PUBLIC = {
     "api.sessions": "calibrate_sessions",
     "api.simulating": "simulate twin",
     "api.verifying": "verify",
-    "errors": "RefusedError",
+    "errors": "InputError",
     "estimate.attitude": "integrate_rate",
     "estimate.noise.allan": "allan_deviation",
     "estimate.noise.identify": "identify_noise",
@@ -143,10 +143,10 @@ __all__ = [
     "Diagnosis",
     "DiagnosisResult",
     "Finding",
+    "InputError",
     "KalmanResult",
     "Noise",
     "Recording",
-    "RefusedError",
     "Segments",
     "SensorCalibration",
     "SessionsResult",
@@ -233,7 +233,7 @@ answered_by(
 answered_by({"words_of": "trihedron.report.findings.catalogue", "phrase": "trihedron.report.findings.phrases"})
 answered_by(dict.fromkeys(("effect_words", "experiment", "why_not"), "trihedron.report.effects.catalogue"))
 answered_by({"family_words": "trihedron.report.effects.relations", "of_arrays": "trihedron.api.reading"})
-answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.at_rest"})
+answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.static_axes"})
 answered_by({"find_possible_limits": "trihedron.channel_facts.possible_limits"})
 # Before any thread pool starts.
 cap_threads()

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import BoolArray, FloatArray
 
-class RefusedError(ValueError): ...
+class InputError(ValueError): ...
 
 # accelerometer
 ANCHOR: float

@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.sanitise import one_line
 
 if sys.version_info >= (3, 11):
@@ -26,14 +26,14 @@ MOST_DIGITS = 300
 """Most digits of an integer: more do not fit into a float."""
 
 
-class DocumentError(RefusedError):
+class DocumentError(InputError):
     """An error in a file; the message continues a sentence that begins with the file's name."""
 
 
 def read_text(path: str | os.PathLike[str], what: str) -> str:
     """The text of a plain file of limited size; ``what`` it should be ("calibration file") is for error messages.
 
-    Raises ``RefusedError`` when there is no such file, it is no plain file, too large, unreadable, or not text.
+    Raises ``InputError`` when there is no such file, it is no plain file, too large, unreadable, or not text.
     """
     try:
         # Non-blocking: opening a pipe without a writer would block.
@@ -63,7 +63,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
         raise DocumentError(f"this is not a {what} (not text); check the name.") from None
 
 
-def read_json(path: str | os.PathLike[str], what: str, meant: str, rejection: type[RefusedError]) -> Any:
+def read_json(path: str | os.PathLike[str], what: str, meant: str, rejection: type[InputError]) -> Any:
     """The JSON of a file that should be ``what``; ``meant`` describes the expected file in the error message.
 
     Raises ``rejection`` in place of the errors of :func:`read_text` and :func:`parse_json`.
@@ -81,7 +81,7 @@ def read_json(path: str | os.PathLike[str], what: str, meant: str, rejection: ty
 def parse_json(text: str) -> Any:
     """JSON with finite numbers, limited depth and unique keys.
 
-    Raises ``RefusedError`` when it is not; the message gives the line of a syntax error.
+    Raises ``InputError`` when it is not; the message gives the line of a syntax error.
     """
     try:
         document = json.loads(
@@ -100,7 +100,7 @@ def parse_json(text: str) -> Any:
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML of limited depth, with numbers that fit into a float.
 
-    Raises ``RefusedError`` when it is not; the message gives the line of a syntax error.
+    Raises ``InputError`` when it is not; the message gives the line of a syntax error.
     """
     try:
         table = tomllib.loads(text)
@@ -116,7 +116,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 def check_values(document: Any) -> None:
     """Check the values of a parsed document, of any notation.
 
-    Raises ``RefusedError`` for nesting that is too deep, and integers that do not fit into a float.
+    Raises ``InputError`` for nesting that is too deep, and integers that do not fit into a float.
     """
     level = [document]
     for _ in range(MOST_DEPTH):

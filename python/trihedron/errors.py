@@ -2,16 +2,16 @@
 
 A defect raises an ordinary ``ValueError`` of NumPy or Python and must stay visible as one; so must a record built
 inconsistently by a stage (``records/segments.py``, the arrays of a calibration or of an Allan curve). Every error about
-a file, a value or a request is a ``RefusedError``.
+a file, a value or a request is an ``InputError``.
 """
 
 from __future__ import annotations
 
 from numpy.linalg import LinAlgError
 
-from trihedron._core import RefusedError
+from trihedron._core import InputError
 
-__all__ = ["REFUSALS", "RefusedError"]
+__all__ = ["INPUT_ERRORS", "InputError"]
 
-REFUSALS: tuple[type[ValueError], ...] = (RefusedError, LinAlgError)
+INPUT_ERRORS: tuple[type[ValueError], ...] = (InputError, LinAlgError)
 """Errors about the input; a singular system of equations is one of them, since the readings cause it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 EARTH_RATE_RAD_S = 7.292115e-5
 """Rotation of the Earth against inertial space (WGS 84)."""
@@ -35,9 +35,9 @@ def normal_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     9.806198
     """
     if not -90.0 <= latitude_deg <= 90.0:
-        raise RefusedError(f"latitude must be between -90 and 90 degrees, got {latitude_deg}")
+        raise InputError(f"latitude must be between -90 and 90 degrees, got {latitude_deg}")
     if not -1000.0 <= height_m <= 20000.0:
-        raise RefusedError(f"height must be between -1000 and 20000 m, got {height_m}")
+        raise InputError(f"height must be between -1000 and 20000 m, got {height_m}")
     sin2 = math.sin(math.radians(latitude_deg)) ** 2
     k = _POLAR_RADIUS_M * _GRAVITY_POLE_M_S2 / (_EQUATORIAL_RADIUS_M * _GRAVITY_EQUATOR_M_S2) - 1.0
     at_surface = _GRAVITY_EQUATOR_M_S2 * (1.0 + k * sin2) / math.sqrt(1.0 - _ECCENTRICITY2 * sin2)

@@ -13,25 +13,25 @@ _UNSEEN = re.compile(
 )
 
 
-def printable(text: str) -> str:
-    r"""The text with every control character escaped as ``\x1b`` or ``\u202e``; line ends and tabs are kept.
+def escaped(text: str) -> str:
+    r"""The text with every control character as ``\x1b`` or ``\u202e``; line ends and tabs are kept.
 
-    >>> printable("a\x1b[2Jx")
+    >>> escaped("a\x1b[2Jx")
     'a\\x1b[2Jx'
     """
     return _UNSEEN.sub(lambda found: _spelled(found[0], "\\x{:02x}"), text)
 
 
 def one_line(text: str) -> str:
-    r"""As :func:`printable`, with line ends and tabs escaped too: for a name inside a line.
+    r"""As :func:`escaped`, with line ends and tabs escaped too: for a name inside a line.
 
     >>> one_line("a\nb")
     'a\\nb'
     """
-    return printable(text).replace("\n", "\\n").replace("\t", "\\t")
+    return escaped(text).replace("\n", "\\n").replace("\t", "\\t")
 
 
-def printable_json(text: str) -> str:
+def escaped_json(text: str) -> str:
     """JSON text with control characters as JSON escapes: the content of the document is unchanged."""
     return _UNSEEN.sub(lambda found: _spelled(found[0], "\\u{:04x}"), text)
 

@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.calibration import Calibration, Frame, SensorCalibration
 from trihedron.transforms import cross_matrix
 
@@ -34,10 +34,10 @@ def distort(truth: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Direct form → inverse form, or back: ``(S⁻¹, -S⁻¹ b)`` (eq. 3). Raises ``RefusedError`` when S is singular."""
+    """Direct form → inverse form, or back: ``(S⁻¹, -S⁻¹ b)`` (eq. 3). Raises ``InputError`` when S is singular."""
     S = np.asarray(S, dtype=np.float64)
     if np.linalg.cond(S) > 1e12:
-        raise RefusedError("S is singular: two sensor axes are parallel, or one has no scale")
+        raise InputError("S is singular: two sensor axes are parallel, or one has no scale")
     inverse = np.asarray(np.linalg.inv(S), dtype=np.float64)
     return inverse, -inverse @ b
 
@@ -93,7 +93,7 @@ def reframing(S: FloatArray, b: FloatArray, frame: Frame) -> Reframing:
     ``case``: the identity. Where ``det S < 0`` the sign stays on the diagonal: R is the proper rotation nearest to the
     identity.
 
-    Raises ``RefusedError`` when S is singular.
+    Raises ``InputError`` when S is singular.
     """
     S = np.asarray(S, dtype=np.float64)
     b = np.asarray(b, dtype=np.float64)
@@ -109,7 +109,7 @@ def reframing(S: FloatArray, b: FloatArray, frame: Frame) -> Reframing:
         u, _, vt = np.linalg.svd(S)
         q = u @ vt
     else:
-        raise RefusedError(f"frame must be 'lower', 'symmetric' or 'case', got {frame!r}")
+        raise InputError(f"frame must be 'lower', 'symmetric' or 'case', got {frame!r}")
     signs = _nearest_proper(q)
     rotation: FloatArray = (q * signs).T
     new = rotation @ S
@@ -154,13 +154,13 @@ def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibratio
 def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
     """Both sensors in another frame; the uncertainty of the accelerometer's axes also rotates the gyro's (eq. 6).
 
-    Raises ``RefusedError`` when the accelerometer's S is singular, or ``frame`` is ``case``, which poses do not
+    Raises ``InputError`` when the accelerometer's S is singular, or ``frame`` is ``case``, which poses do not
     determine.
     """
     if frame == calibration.frame:
         return calibration
     if frame == "case":
-        raise RefusedError("the case frame is only known from method 1 (six faces of the case)")
+        raise InputError("the case frame is only known from method 1 (six faces of the case)")
     accelerometer = calibration.accelerometer
     change = reframing(accelerometer.S, accelerometer.b, frame)
     n = len(calibration.covariance)

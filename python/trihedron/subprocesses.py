@@ -10,7 +10,7 @@ import os
 import sys
 import threading
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 PATIENCE_S = 2.0
 """Time limit of the trial: milliseconds where polars works, a hundred times as long on a loaded machine."""
@@ -41,7 +41,7 @@ def check_tables() -> None:
     answered = threading.Event()
     threading.Thread(target=_try, args=(answered,), daemon=True).start()
     if not answered.wait(PATIENCE_S):
-        raise RefusedError(f"{SENTENCE}.")
+        raise InputError(f"{SENTENCE}.")
     _is_doubtful = False
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 """Conventional value that defines the unit ``g``; local gravity differs."""
@@ -84,7 +84,7 @@ def ratio_of_units(one: AccelerationUnit | RateUnit, other: AccelerationUnit | R
 def rate_lsb_to_si(text: str) -> float:
     """LSB of a gyro, as in ``0.05 deg/s``, in rad/s.
 
-    Raises ``RefusedError`` when it is not a positive number and a unit.
+    Raises ``InputError`` when it is not a positive number and a unit.
     """
     value, unit = _value_and_unit(text, [u.value for u in _RATE_TO_SI])
     return value * _RATE_TO_SI[RateUnit(unit)]
@@ -93,7 +93,7 @@ def rate_lsb_to_si(text: str) -> float:
 def acceleration_lsb_to_si(text: str) -> float:
     """LSB of an accelerometer, as in ``3.33 mg``, in m/s².
 
-    Raises ``RefusedError`` when it is not a positive number and a unit.
+    Raises ``InputError`` when it is not a positive number and a unit.
     """
     value, unit = _value_and_unit(text, [u.value for u in _ACCELERATION_TO_SI])
     return value * _ACCELERATION_TO_SI[AccelerationUnit(unit)]
@@ -106,7 +106,7 @@ def _value_and_unit(text: str, units: list[str]) -> tuple[float, str]:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise RefusedError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
+        raise InputError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
     return value, unit
 
 

@@ -150,9 +150,16 @@ fn forget(payload: Box<dyn Any + Send>) {
 
 pyo3::create_exception!(
     trihedron._core,
-    RefusedError,
+    InputError,
     PyValueError,
-    "A log, a value or a question that cannot be answered; the message says why and what to do. Never a defect of the program."
+    "An error about the input: a log, a value or a request that allows no result.
+
+The message names the cause and the remedy; it is never a defect of the program.
+
+Examples
+--------
+>>> issubclass(trihedron.InputError, ValueError)
+True"
 );
 
 fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
@@ -162,7 +169,7 @@ fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
         ));
     }
     match out {
-        Ok(answer) => answer.map_err(|error| RefusedError::new_err(error.to_string())),
+        Ok(answer) => answer.map_err(|error| InputError::new_err(error.to_string())),
         Err(Failure::Threads(why)) => Err(no_threads(&why)),
         Err(Failure::Panic) => Err(PyRuntimeError::new_err(format!(
             "the numerical core failed on this input ({}); this is a defect of trihedron, please report it",

@@ -44,8 +44,8 @@ pub(crate) use binding::{run, run_long};
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     binding::keep_panics_quiet();
     module.add(
-        "RefusedError",
-        module.py().get_type::<binding::RefusedError>(),
+        "InputError",
+        module.py().get_type::<binding::InputError>(),
     )?;
     allan::register(module)?;
     attitude::register(module)?;

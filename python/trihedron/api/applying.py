@@ -13,7 +13,7 @@ import numpy as np
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
@@ -40,7 +40,7 @@ AnyCalibration = HasCalibration | Calibration | str | os.PathLike[str]
 def calibration_of(given: AnyCalibration) -> Calibration:
     """The calibration of a result or of a file, or the record itself.
 
-    Raises ``RefusedError`` when it is none of these.
+    Raises ``InputError`` when it is none of these.
     """
     if isinstance(given, Calibration):
         return given
@@ -68,6 +68,11 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
     overwrite : bool
         Replace a file that exists.
 
+    Returns
+    -------
+    None
+        The file at ``path`` is the result; :func:`read_calibration` reads it.
+
     Raises
     ------
     OutputError
@@ -75,7 +80,7 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
 
     Examples
     --------
-    >>> trihedron.write_calibration(result, "calibration.json")  # doctest: +SKIP
+    >>> trihedron.write_calibration(result, "calibration.json", overwrite=True)
     """
     write_file(calibration_of(calibration), path, overwrite=overwrite)
 
@@ -121,7 +126,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
         gyroscope = None
         findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none"))
     if accelerometer is None and gyroscope is None:
-        raise RefusedError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+        raise InputError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
     followed = thermally_corrected(known, recording)
     if followed is None:
         followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
@@ -139,7 +144,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Raw readings with the effects of an extended calibration compensated, so that ``S raw + b`` is valid.
 
-    Raises ``RefusedError`` when the calibration's extensions are not in the form that a diagnosis writes.
+    Raises ``InputError`` when the calibration's extensions are not in the form that a diagnosis writes.
     """
     effects = calibration.extensions.get("effects")
     if not effects:
@@ -149,9 +154,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
 
     references = calibration.extensions.get("references", {})
     if not isinstance(effects, list | tuple) or not isinstance(references, dict | MappingProxyType):
-        raise RefusedError(
-            "the calibration's extensions are not those of a diagnosis: calibrate with --extended again."
-        )
+        raise InputError("the calibration's extensions are not those of a diagnosis: calibrate with --extended again.")
     gyroscope = calibration.gyroscope
     done = compensate(
         recording,
@@ -167,7 +170,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
 def check_units(calibration: Calibration, recording: Recording) -> None:
     """Check that readings are in the units that a calibration was made for.
 
-    Raises ``RefusedError`` when they are not; the message names both units.
+    Raises ``InputError`` when they are not; the message names both units.
     """
     pairs = (
         ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
@@ -175,7 +178,7 @@ def check_units(calibration: Calibration, recording: Recording) -> None:
     )
     for name, readings, unit, sensor in pairs:
         if readings is not None and sensor is not None and unit != sensor.raw_unit:
-            raise RefusedError(
+            raise InputError(
                 f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
                 f"apply it to a log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
             )
@@ -211,7 +214,7 @@ ROWS = 1 << 17
 def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding, ...]:
     """A serious finding where a log was recorded outside the temperatures that a calibration was made for.
 
-    Raises ``RefusedError`` when the calibration's range is not two numbers.
+    Raises ``InputError`` when the calibration's range is not two numbers.
     """
     stated = calibration.extensions.get("valid_range")
     if not isinstance(stated, Mapping) or "temperature_degc" not in stated:
@@ -219,7 +222,7 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
     try:
         low, high = (float(value) for value in stated["temperature_degc"])
     except (TypeError, ValueError):
-        raise RefusedError("the calibration's valid_range is not two temperatures: calibrate again.") from None
+        raise InputError("the calibration's valid_range is not two temperatures: calibrate again.") from None
     T = recording.temperature_degc
     if T is None or not np.isfinite(T).any():
         missing = Finding.of(FindingCode.TEMPERATURE_MISSING, low_degc=low, high_degc=high)

@@ -12,7 +12,7 @@ from importlib import import_module
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
 from trihedron.report.in_python import in_python, result_in_python
 
@@ -50,7 +50,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
     """The argument in the plain type of its annotation (numbers of any library become Python's).
 
-    Raises ``RefusedError`` when it is of another type, not finite, or outside the range of its quantity.
+    Raises ``InputError`` when it is of another type, not finite, or outside the range of its quantity.
     """
     kinds = set(_alternatives(annotation))
     for alias in kinds & set(_ALIASES):
@@ -109,7 +109,7 @@ def _whole(where: str, name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise WrongTypeError(f"{where} is a whole number, not {said(value)}.")
     if not -MOST_WHOLE <= int(value) <= MOST_WHOLE:
-        raise RefusedError(f"{where} is a whole number of at most 19 digits, not {said(value)}.")
+        raise InputError(f"{where} is a whole number of at most 19 digits, not {said(value)}.")
     _check_range(where, name, int(value))
     return int(value)
 
@@ -118,22 +118,22 @@ def _check_range(where: str, name: str, number: float) -> None:
     low, high, what = RANGES.get(name, (-math.inf, math.inf, ""))
     if not low <= number <= high:
         bound = f"at least {low:g}" if number < low else f"at most {high:g}"
-        raise RefusedError(f"{where} is {what}, {bound}, and cannot be {number:g}.")
+        raise InputError(f"{where} is {what}, {bound}, and cannot be {number:g}.")
 
 
 def _text(where: str, _name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise WrongTypeError(f"{where} is a text, not {said(value)}.")
     if len(value) > LONGEST_NAME:
-        raise RefusedError(f"{where} is a text of at most {LONGEST_NAME} characters, not of {len(value)}.")
+        raise InputError(f"{where} is a text of at most {LONGEST_NAME} characters, not of {len(value)}.")
     if "\0" in value:
-        raise RefusedError(f"{where} is a text without a zero byte, not {said(value)}.")
+        raise InputError(f"{where} is a text without a zero byte, not {said(value)}.")
     return value
 
 
 def _word(where: str, name: str, value: Any) -> str:
     if not _text(where, name, value):
-        raise RefusedError(f"{where} is a word of a list, and empty.")
+        raise InputError(f"{where} is a word of a list, and empty.")
     return str(value)
 
 
@@ -157,7 +157,7 @@ def _path(where: str, value: Any) -> Any:
     if not isinstance(text, str):
         raise WrongTypeError(f"{where} is the name of a file, not {said(value)}.")
     if not text or "\0" in text or len(text) > LONGEST_NAME:
-        raise RefusedError(f"{where} is the name of a file, and {said(text)} cannot be one.")
+        raise InputError(f"{where} is the name of a file, and {said(text)} cannot be one.")
     return value
 
 
@@ -219,7 +219,7 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 def asked_in_python(verb: Verb) -> Verb:
     """The verb with its plain arguments checked and its error messages in terms of Python parameters.
 
-    Raises ``RefusedError`` when a number, a text or a switch is of another type.
+    Raises ``InputError`` when a number, a text or a switch is of another type.
     """
     signature = inspect.signature(verb)
 

@@ -18,7 +18,7 @@ from trihedron.api.referring import (
     held_against,
 )
 from trihedron.api.simulating import names_scenario
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.reference.fit import moves_along
 from trihedron.estimate.reference.gyroscope import poses_at_rest
 from trihedron.read.reference.motion import of_recording
@@ -45,7 +45,7 @@ def beside(
 ) -> DiagnosisResult:
     """The ordinary diagnosis with the fit to the reference added, or that fit alone where the log has too few poses.
 
-    Raises ``RefusedError`` as :func:`trihedron.api.referring.held_against`.
+    Raises ``InputError`` as :func:`trihedron.api.referring.held_against`.
     """
     gravity, source, said = settle_gravity(*place, gravity_of(given))
     found = held_against(recording, reference, gravity, columns=columns, given=given)
@@ -53,9 +53,9 @@ def beside(
     try:
         resting = poses_at_rest(segments, found.gyroscope, has_own_bias=found.kind == ANOTHER_UNIT)
         if resting < FEWEST_POSES:
-            raise RefusedError(f"{resting} poses are too few for a model of their own")
+            raise InputError(f"{resting} poses are too few for a model of their own")
         result = ordinary()
-    except REFUSALS as error:
+    except INPUT_ERRORS as error:
         if found.kind == ANOTHER_UNIT:
             # A difference between two gyros may be of either unit: without poses its origin is unknown.
             found = replace(found, findings=(*found.findings, _shared(found)))
@@ -90,13 +90,13 @@ def beside(
 def in_si(log: Recording, gravity: float | None) -> Recording:
     """The log itself where its gyro is in rad/s or deg/s; a log in counts by its own calibration.
 
-    Raises ``RefusedError`` when it is in counts and its poses do not determine a calibration.
+    Raises ``InputError`` when it is in counts and its poses do not determine a calibration.
     """
     if rate_to_si(log.gyroscope_unit) is not None:
         return log
     own = calibrate(log, gravity_m_s2=gravity).calibration
     if own.gyroscope is None or log.gyroscope is None or log.accelerometer is None:
-        raise RefusedError(f"{log.source}: counts of unknown scale.")
+        raise InputError(f"{log.source}: counts of unknown scale.")
     return replace(
         log,
         gyroscope=correct(log.gyroscope, own.gyroscope.S, own.gyroscope.b),
@@ -121,7 +121,7 @@ def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recor
     try:
         known = in_si(other, gravity)
         moves_along(recording, of_recording(known))
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
     return known
 

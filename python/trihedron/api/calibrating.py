@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
@@ -45,6 +45,8 @@ Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
 """Findings that already state the number of poses."""
+FEWEST_POSES = 3
+"""Fewest poses with which a fit is tried."""
 MOST_SETTLING = 0.05
 """Fraction of poses with detected settling that is allowed, since more settle undetected: with one of 18 on a support
 that yields, a fifth of the elements of the gyro's S were outside their 95 % interval."""
@@ -129,7 +131,7 @@ def calibrate(
     True
     """
     if method not in METHODS:
-        raise RefusedError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
+        raise InputError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)
     segments = segments_of(segments, recording, progress)
@@ -137,7 +139,7 @@ def calibrate(
         from trihedron.api.referring import calibration_by, held_against
 
         if turntable_deg_s is not None:
-            raise RefusedError("a turntable's speeds belong to poses and moves: leave them, or the reference, out.")
+            raise InputError("a turntable's speeds belong to poses and moves: leave them, or the reference, out.")
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
@@ -147,19 +149,19 @@ def calibrate(
         wanted: Frame = frame or "case"
     else:
         if faces is not None:
-            raise RefusedError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
+            raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         if loss != "linear" and method == "joint" and recording.gyroscope is not None:
-            raise RefusedError(f"--loss {loss} belongs to --method separate: a fit of both sensors has none.")
+            raise InputError(f"--loss {loss} belongs to --method separate: a fit of both sensors has none.")
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
         try:
             calibration = _by_poses(
                 recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
             )
-        except RefusedError as error:
+        except InputError as error:
             # Serious findings about the log come before the error of the fit.
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
-            raise RefusedError(" ".join((*grave, str(error)))) from None
+            raise InputError(" ".join((*grave, str(error)))) from None
     calibration = in_frame(with_bending(calibration, segments), wanted)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
@@ -201,17 +203,17 @@ def _as_they_weigh(segments: Segments) -> Found:
 
 def _require_poses(recording: Recording, segments: Segments) -> None:
     if recording.accelerometer is None:
-        raise RefusedError(
+        raise InputError(
             f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
             "or name its columns with --columns."
         )
-    if segments.n_poses < 3:
+    if segments.n_poses < FEWEST_POSES:
         of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
         grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
         is_count = grave is not None and grave.code in COUNTS_OF_POSES
         why = [] if is_count else [f"Poses found: {segments.n_poses}."]
         why += [] if grave is None else [grave.seen, *([grave.action] if of_log else [])]
-        raise RefusedError(
+        raise InputError(
             f"{recording.source}: {' '.join(why)} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
             "different poses; `trihedron segment LOG` shows what was seen."
         )
@@ -252,17 +254,15 @@ def _by_poses(
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
+            return replace(both, findings=(*_still_said(found), *both.findings))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
-    except REFUSALS as error:
+    except INPUT_ERRORS as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
 
 
-def _still_said(found: Found, joint: SensorCalibration) -> Found:
-    """Findings of the accelerometer's own fit for the joint fit: excess residual only if that is widened as well."""
-    if joint.quality is None or joint.quality.covariance_scale > 1.0:
-        return found
+def _still_said(found: Found) -> Found:
+    """Findings of the accelerometer's own fit that hold for the joint fit, which states its own excess residual."""
     return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
 
 
@@ -287,7 +287,7 @@ def _by_faces(
         accelerometer, found = calibrate_faces(
             mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
         )
-    except REFUSALS:
+    except INPUT_ERRORS:
         if recording.gyroscope is None or turns_deg is None or segments.norm_sigma is None:
             raise
         # Stated turns about stated faces determine the gyro even without a full accelerometer.
@@ -306,7 +306,7 @@ def _by_faces(
         gyroscope, more = calibrate_turns(
             recording, turns, turn_axes.resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
         )
-    except REFUSALS as error:
+    except INPUT_ERRORS as error:
         if turns_deg is not None:
             raise
         return _without_gyroscope(alone, str(error))

@@ -22,7 +22,7 @@ from trihedron.capture.detection import Found, find_protocol
 from trihedron.capture.protocols import LineColumns, NameColumns
 from trihedron.capture.recorder import Block, Recorder
 from trihedron.capture.sources import Port, Source, list_ports, open_source
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free
 from trihedron.read.clock.unit import TICKS, parse_time_unit, seconds_of
@@ -57,7 +57,7 @@ def open_device(
 ) -> tuple[Source, Found]:
     """Open a source and detect its protocol.
 
-    Raises ``RefusedError`` when it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
+    Raises ``InputError`` when it cannot be opened, sends nothing, or its protocol is unknown; nothing stays open.
     """
     wanted = protocol_of(protocol)
     namer = column_namer(columns, time_unit)
@@ -83,7 +83,7 @@ def capture(
     overwrite: bool = False,
     on_block: Callable[[Block], bool | None] | None = None,
 ) -> Recording:
-    """Record what a board sends into a log, on disk as it comes, then read the log back.
+    """Record what a board sends into a log, written as it arrives, then read the log back.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def capture(
     >>> trihedron.capture("/dev/ttyUSB0", "log.csv", seconds=60)  # doctest: +SKIP
     """
     if seconds is not None and not seconds > 0.0:
-        raise RefusedError(f"seconds is how long to record, not {seconds:g}")
+        raise InputError(f"seconds is how long to record, not {seconds:g}")
     check_free([Path(output)], overwrite=overwrite)
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     recorder = Recorder(
@@ -160,16 +160,21 @@ def stopped_by(recorder: Recorder, *numbers: int) -> Iterator[None]:
 
 
 def ports() -> list[Port]:
-    """The serial ports that are plugged in; takes no arguments and never raises.
+    """The serial ports that are plugged in.
 
     Returns
     -------
     list of Port
-        Each with its name and the system's description of the device.
+        Each with its name and the system's description of the device; empty without one.
+
+    Raises
+    ------
+    CaptureError
+        (a ``ValueError``) when pyserial is not installed.
 
     Examples
     --------
-    >>> [port.name for port in trihedron.ports()]  # doctest: +SKIP
+    >>> names = [port.device for port in trihedron.ports()]
     """
     return list_ports()
 
@@ -183,7 +188,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
         table = Table(Path("the stream"), names, tuple(np.ascontiguousarray(column) for column in cells.T))
         try:
             columns = find_columns(table, mapping, None)
-        except RefusedError:
+        except InputError:
             if mapping is not None:
                 raise
             columns = _by_content(cells) if names is None else Columns()
@@ -201,12 +206,12 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
 def sensor_columns(columns: tuple[str, ...]) -> list[int]:
     """Indices of the accelerometer's columns, then the gyro's, among the columns of a stream.
 
-    Raises ``RefusedError`` when there is no accelerometer.
+    Raises ``InputError`` when there is no accelerometer.
     """
     empty = tuple(np.zeros(1) for _ in columns)
     found = find_columns(Table(Path("the stream"), columns, empty), None, None)
     if found.accelerometer is None:
-        raise RefusedError("the board sends no accelerometer that is recognised; name its columns with --columns.")
+        raise InputError("the board sends no accelerometer that is recognised; name its columns with --columns.")
     return [*found.accelerometer, *(found.gyroscope or ())]
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from trihedron.api.calibrating import calibrate
+from dataclasses import replace
+
+from trihedron.api.calibrating import COUNTS_OF_POSES, FEWEST_POSES, calibrate
 from trihedron.api.reading import AnyRecording, recording_of, segment
-from trihedron.errors import REFUSALS
-from trihedron.records import Finding, FindingCode
+from trihedron.errors import INPUT_ERRORS
+from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
@@ -45,12 +47,16 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
-    except REFUSALS as error:
-        why = words("because", sentence=error)
-        return CheckResult(
-            recording,
-            segments,
-            None,
-            (*recording.findings, *segments.findings, Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)),
-        )
+    except INPUT_ERRORS as error:
+        return CheckResult(recording, segments, None, (*recording.findings, *_why_not(recording, segments, str(error))))
     return CheckResult(recording, segments, result.calibration, result.findings)
+
+
+def _why_not(recording: Recording, segments: Segments, error: str) -> tuple[Finding, ...]:
+    """Findings of the segmentation: serious where they count too few poses, else with the error of the calibration."""
+    if segments.n_poses < FEWEST_POSES and any(one.code in COUNTS_OF_POSES for one in segments.findings):
+        return tuple(
+            replace(one, severity=Severity.SERIOUS) if one.code in COUNTS_OF_POSES else one for one in segments.findings
+        )
+    why = words("because", sentence=error.removeprefix(f"{recording.source}: "))
+    return (*segments.findings, Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2
@@ -16,23 +16,21 @@ def settle_gravity(
 ) -> tuple[float, str, tuple[Finding, ...]]:
     """|g| [m/s²], its source, and findings about it; where nothing is given ``known``, else the standard value.
 
-    Raises ``RefusedError`` when two sources contradict each other, a height has no latitude, or a value is not
+    Raises ``InputError`` when two sources contradict each other, a height has no latitude, or a value is not
     plausible as gravity.
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:
-            raise RefusedError(
-                "gravity is given twice, as a value and by a place: give either --gravity or --latitude."
-            )
+            raise InputError("gravity is given twice, as a value and by a place: give either --gravity or --latitude.")
         if not 1.0 < gravity_m_s2 < 100.0:
-            raise RefusedError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
+            raise InputError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
         return float(gravity_m_s2), "given", ()
     if latitude_deg is not None:
         height = 0.0 if height_m is None else height_m
         value = normal_gravity(latitude_deg, height)
         return value, f"WGS 84 normal gravity at latitude {latitude_deg:g}°, height {height:g} m", ()
     if height_m is not None:
-        raise RefusedError("a height alone does not determine gravity: give --latitude with --height, or --gravity.")
+        raise InputError("a height alone does not determine gravity: give --latitude with --height, or --gravity.")
     if known is not None:
         return *known, ()
     return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from trihedron.api.reading import read, recording_of
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.log import write_recording
 from trihedron.records import Recording
 
@@ -40,10 +40,10 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
 
     Examples
     --------
-    >>> trihedron.convert("flight.bag", "flight.csv")  # doctest: +SKIP
+    >>> written = trihedron.convert(recording, "plain.csv", overwrite=True)
     """
     if options and (isinstance(log, Recording) or hasattr(log, "recording")):
-        raise RefusedError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
+        raise InputError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
     recording = read(log, **options) if options else recording_of(log)
     write_recording(recording, output, overwrite=overwrite)
     return recording

@@ -15,7 +15,7 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
 from trihedron.api.verifying import verify
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
@@ -82,7 +82,7 @@ def demo(
     """
     target = Path(folder)
     if target.exists() and not overwrite:
-        raise RefusedError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
+        raise InputError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
     from trihedron.api.disagreeing import disagree
 
     first = demonstrate(target, overwrite=overwrite)

@@ -11,7 +11,7 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
-from trihedron.api.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
+from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log, model_of_static_log
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.api.referring import AnyReference
@@ -25,7 +25,7 @@ from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
@@ -95,9 +95,9 @@ def diagnose(
     ('consistent', [])
     """
     if calibration is not None and against is not None:
-        raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")
+        raise InputError("two models were given: a calibration or a simulated recording to compare with, not both.")
     if not 0.0 < alpha < 0.5:
-        raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+        raise InputError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     notify = progress or (lambda _fraction, _text: None)
     recording, against = recording_of(recording), _opened(against)
     ordinary = partial(
@@ -134,12 +134,11 @@ def _of_poses(
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
-    resting = None if against is not None else at_rest(recording, segments, known, (gravity, source), calibrated)
-    if resting is not None:
+    stated = (gravity, source)
+    model = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
+    if model is not None:
         notify(0.1, "looking at biases and spectral lines")
-        return diagnosed_at_rest(
-            recording, segments, resting, (gravity, source), tuple(findings), alpha, is_given=known is not None
-        )
+        return diagnosed_static_log(recording, segments, model, stated, (*findings,), alpha, is_given=known is not None)
     simulated: _Free | None = None
     if against is not None:
         simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, notify)
@@ -240,7 +239,7 @@ def _start(
         return calibrated(), True
     try:
         own = calibrated()
-    except REFUSALS:
+    except INPUT_ERRORS:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
     return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
@@ -265,7 +264,7 @@ def _simulated_log(
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         return read(against), None
     if recording.gyroscope is None:
-        raise RefusedError(
+        raise InputError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
             "or compare with a simulated log of your own"
         )
@@ -293,8 +292,8 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     own = gravity if scenario is None else scenario.environment.gravity
     try:
         result = calibrate(recording, gravity_m_s2=own)
-    except REFUSALS as error:
-        raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
+    except INPUT_ERRORS as error:
+        raise InputError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=notify)
     noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)

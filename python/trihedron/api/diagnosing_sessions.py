@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.diagnose import diagnose_recordings
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.segment import resegment
@@ -57,7 +57,7 @@ def diagnose_sessions(
         recording = recording_of(one)
         try:
             result = calibrate(recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
-        except REFUSALS as error:
-            raise RefusedError(f"{recording.source}: {error}") from None
+        except INPUT_ERRORS as error:
+            raise InputError(f"{recording.source}: {error}") from None
         given.append((recording, resegment(recording, result.segments), result.calibration))
     return diagnose_recordings(given, alpha=alpha, progress=progress)

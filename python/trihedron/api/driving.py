@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read
 from trihedron.arrays import FloatArray
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.log import write_recording
 from trihedron.records import Calibration, Recording, Segments
@@ -42,7 +42,7 @@ def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Ca
 
     ``own`` is the recording's own calibration, by which its motion is computed from its readings.
 
-    Raises ``RefusedError`` when the recording lacks a sensor or has no static pose.
+    Raises ``InputError`` when the recording lacks a sensor or has no static pose.
     """
     # Disturbances of poses are repeated: they belong to the recording, not to the instrument.
     motion = twin_motion(recording, resegment(recording, segments), own)
@@ -94,7 +94,7 @@ class MovedAlike:
         log = _sensed(replace(scenario, motion=self._motion), seed)
         try:
             result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
-        except REFUSALS:
+        except INPUT_ERRORS:
             return None, None
         if result.calibration.gyroscope is None:
             return _of_poses(result.calibration), None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from trihedron.api.applying import AnyCalibration, calibration_of
 from trihedron.documents import DocumentError, of_path, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats import ExportOptions, any_calibration, export_files
 from trihedron.files.noise import noise_figures, read_noise
 from trihedron.files.output import check_free, write_whole
@@ -70,7 +70,7 @@ def export(
     True
     """
     if rate_hz is not None and not rate_hz > 0.0:
-        raise RefusedError(f"rate_hz is the number of samples per second, not {rate_hz}")
+        raise InputError(f"rate_hz is the number of samples per second, not {rate_hz}")
     options = ExportOptions(
         rate_hz=rate_hz,
         topic=topic,
@@ -110,4 +110,4 @@ def parameters_text(current: str | os.PathLike[str] | None) -> str:
     try:
         return read_text(Path(current), "file of parameters")
     except DocumentError as error:
-        raise RefusedError(of_path(Path(current), error)) from None
+        raise InputError(of_path(Path(current), error)) from None

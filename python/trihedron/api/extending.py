@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
@@ -44,13 +44,13 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 
     Examples
     --------
-    >>> trihedron.extend(result).calibration.extensions  # doctest: +SKIP
+    >>> effects = trihedron.extend(result).calibration.extensions.get("effects")
     """
     if not isinstance(result, CalibrationResult):
         raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
-        raise RefusedError(
+        raise InputError(
             f"an extended calibration is made in frame lower, not {base.frame}: "
             "use method joint or separate and leave the frame out."
         )

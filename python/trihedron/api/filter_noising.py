@@ -12,9 +12,14 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
-from trihedron.estimate.filter_noise.static_intervals import at_rest, between_intervals, tilt_over_moves, unlike_axes
+from trihedron.estimate.filter_noise.static_intervals import (
+    between_intervals,
+    static_noise,
+    tilt_over_moves,
+    unlike_axes,
+)
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
@@ -113,11 +118,11 @@ def filter_noise(
                 if rate_to_si(recording.gyroscope_unit) is None
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )
-            raise RefusedError(
+            raise InputError(
                 f"{recording.source}: {why}, so it does not show the sensor's own noise; give known motion beside it "
                 "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
             )
-        sensors = tuple(_at_rest(own, sensor, known) for sensor in UNITS if at_rest(own.axes, UNITS[sensor]))
+        sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
         findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC))
@@ -136,11 +141,9 @@ def filter_noise(
 
 def _check(recording: Recording, horizons: Sequence[float], band_hz: float | None) -> None:
     if not horizons or not all(0.0 < h <= 3600.0 for h in horizons):
-        raise RefusedError(
-            "horizons are seconds between 0 and 3600 over which a filter carries on alone, as in 1,10,60."
-        )
+        raise InputError("horizons are seconds between 0 and 3600 over which a filter carries on alone, as in 1,10,60.")
     if band_hz is not None and not 0.0 < band_hz < 0.5 * recording.rate_hz:
-        raise RefusedError(
+        raise InputError(
             f"{recording.source}: vibration cannot be looked for above {band_hz:g} Hz at {recording.rate_hz:.4g} "
             f"samples/s; give --band between 0 and {0.5 * recording.rate_hz:.4g}."
         )
@@ -149,7 +152,7 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
 def _segments(recording: Recording) -> Segments | None:
     try:
         return segment(recording)
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
 
 
@@ -170,7 +173,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
     )
     try:
         found = allan(part)
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
     return found if _sensors(found) else None
 
@@ -178,7 +181,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
 def _sensors(found: Noise | None) -> Static:
     if found is None:
         return {}
-    stated = {sensor: at_rest(found.axes, unit) for sensor, unit in UNITS.items()}
+    stated = {sensor: static_noise(found.axes, unit) for sensor, unit in UNITS.items()}
     return {sensor: one for sensor, one in stated.items() if one is not None}
 
 
@@ -195,7 +198,7 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         )
     known = _sensors(given)
     if not known:
-        raise RefusedError(
+        raise InputError(
             f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG` with --calibration "
             "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )
@@ -207,10 +210,10 @@ def _bounded(figure: NoiseFigure) -> Bounded:
     return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
 
 
-def _at_rest(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
+def _static_sensor(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
     """Filter noise of a sensor from this log's own static interval, with the static values."""
     unit = UNITS[sensor]
-    found = at_rest(own.axes, unit)
+    found = static_noise(own.axes, unit)
     assert found is not None
     return SensorFilterNoise(
         "gyroscope" if sensor == "gyroscope" else "accelerometer", unit, found.N, found.K, known.get(sensor),

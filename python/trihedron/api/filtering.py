@@ -9,8 +9,8 @@ from dataclasses import replace
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_POSE
-from trihedron.errors import RefusedError
+from trihedron.channel_facts.static_axes import SHORTEST as SHORTEST_POSE
+from trihedron.errors import InputError
 from trihedron.estimate.kalman.identified import check_same_adc, check_same_gravity, noise_from_identified
 from trihedron.estimate.kalman.norm_invariant import NormFrame
 from trihedron.estimate.kalman.session import calibrate_session, calibrate_session_without_references
@@ -160,7 +160,7 @@ def _check_adc(given: Sequence[AxisNoise], recording: Recording, segments: Segme
 
 def _identify(rest: Recording) -> Noise:
     if rest.accelerometer is None:
-        raise RefusedError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
+        raise InputError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
     unit = rest.accelerometer_unit.value
     names = ("accelerometer x", "accelerometer y", "accelerometer z")
     return identify_noise(rest.accelerometer, rest.rate_hz, names=names, units=(unit, unit, unit), source=rest.source)

@@ -22,7 +22,7 @@ from trihedron.api.planning_poses import (
 from trihedron.api.reading import segment
 from trihedron.api.verifying import verify
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
@@ -124,7 +124,7 @@ def conclude(
 ) -> tuple[CalibrationResult, VerificationResult | None]:
     """Calibrate from the samples before ``cut_s`` and verify on the later ones.
 
-    Raises ``RefusedError`` when the samples do not determine a calibration.
+    Raises ``InputError`` when the samples do not determine a calibration.
     """
     before = recording if cut_s is None else part_of(recording, -np.inf, cut_s)
     result = calibrate(before, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
@@ -138,7 +138,7 @@ def conclude(
     kept = tuple(finding for finding in segments.findings if finding.code is not FindingCode.FEW_POSES)
     try:
         return result, verify(result.calibration, held_back, segments=replace(segments, findings=kept))
-    except REFUSALS:
+    except INPUT_ERRORS:
         return result, None
 
 
@@ -151,7 +151,7 @@ def _calibration(recording: Recording, segments: Segments, gravity: float) -> Ca
         return None
     try:
         made = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
     return in_frame(made, "lower")
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
@@ -75,15 +75,15 @@ def allan(
 
     Examples
     --------
-    >>> static = {"t": [k / 100 for k in range(6000)], "acc": [[0.0, 0.0, 9.8]] * 6000}
-    >>> found = trihedron.allan(static)  # doctest: +SKIP
-    >>> found.axis("gyro x").terms  # doctest: +SKIP
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.01, (20000, 3))
+    >>> static = trihedron.Recording(np.arange(20000) / 100.0, noise + [0.0, 0.0, 9.81], None, 100.0)
+    >>> white = trihedron.allan(static).axis("accel x").terms["N"].value  # m/s²/√Hz
     """
     recording = recording_of(recording)
     doubts: tuple[Finding, ...] = ()
     if calibration is not None:
         if accelerometer_lsb is not None or gyroscope_lsb is not None:
-            raise RefusedError("the size of a count is given twice: by a calibration and by itself; give one.")
+            raise InputError("the size of a count is given twice: by a calibration and by itself; give one.")
         known = calibration_of(calibration)
         recording, doubts = _in_si(recording, known), doubted(known)
     readings, names, units = readings_of(
@@ -155,7 +155,7 @@ def noise_of_file(
     disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
     continues from it with bit-identical results, and the end removes it.
 
-    Raises ``RefusedError`` when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
+    Raises ``InputError`` when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
     stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
@@ -187,9 +187,7 @@ def noise_of_file(
             source=str(path),
         )
     if exclude_s:
-        raise RefusedError(
-            f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead."
-        )
+        raise InputError(f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead.")
 
     kept = None
     if checkpoint is not None:
@@ -222,7 +220,7 @@ def noise_of_curve(
     ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
     whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
 
-    Raises ``RefusedError`` when the table is not recognised, too short, or does not state the log's rate and length.
+    Raises ``InputError`` when the table is not recognised, too short, or does not state the log's rate and length.
     """
     table = read_allan_table(Path(path))
     rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
@@ -249,7 +247,7 @@ def noise_of_curve(
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:
     """Recording time [s] for a relative uncertainty ``relative`` of each term present, by axis; None beyond a month.
 
-    Raises ``RefusedError`` when ``relative`` is no positive fraction.
+    Raises ``InputError`` when ``relative`` is no positive fraction.
     """
     return {
         axis.name: {term: recording_length_s(axis, term, relative) for term in TermName if axis.terms[term].is_present}

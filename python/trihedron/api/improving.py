@@ -58,7 +58,7 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     Only entries that differ are replaced, with their comment; all else stays. Effects that only the scenario has are
     removed.
 
-    Raises ``RefusedError`` when the file is no scenario, or the diagnosis was not made against one.
+    Raises ``InputError`` when the file is no scenario, or the diagnosis was not made against one.
     """
     given = read_scenario(scenario)
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth
@@ -70,9 +70,9 @@ def plan(
     """
     for name, value in (("turn time", turn_s), ("pose", pose_s), ("accelerometer noise", accelerometer_density)):
         if not value > 0.0:
-            raise RefusedError(f"the {name} must be a positive number, got {value:g}")
+            raise InputError(f"the {name} must be a positive number, got {value:g}")
         if not 1e-15 < value < 1e9:
-            raise RefusedError(f"a {name} of {value:g} is that of no experiment")
+            raise InputError(f"a {name} of {value:g} is that of no experiment")
     turns = design_turns(turns_deg, turn_s, pose_s, gyroscope_density, sigma_turn_rad)
     sigma = accelerometer_density / math.sqrt(pose_s) / gravity_m_s2
     angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))

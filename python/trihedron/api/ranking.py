@@ -13,7 +13,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.api.verifying import own_calibration, same_recording
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, with_bias_of_log
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.formats import any_calibration
@@ -63,10 +63,11 @@ def rank(
 
     Examples
     --------
-    >>> trihedron.rank([result, result], recording).candidates[0].name  # doctest: +SKIP
+    >>> len(trihedron.rank([result, result], recording).candidates)
+    2
     """
     if len(calibrations) < 2:
-        raise RefusedError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")
+        raise InputError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")
     recording = recording_of(recording)
     named = [(_name(given, k), _read(given)) for k, given in enumerate(calibrations)]
     stated = [known.gravity_m_s2 for _, known in named if "maker" not in known.extensions]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron.api.asking import asked_in_python
 from trihedron.arrays import AXES
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
@@ -165,7 +165,7 @@ def _check_even(name: str, given: Any) -> None:
 def recording_of(given: AnyRecording) -> Recording:
     """A recording: the record itself, that of a result, or one read from an input of :func:`read`.
 
-    Raises ``RefusedError`` when it cannot be read, is of another type, or is several recordings.
+    Raises ``InputError`` when it cannot be read, is of another type, or is several recordings.
     """
     if isinstance(given, Recording):
         return given
@@ -184,12 +184,12 @@ def recording_of(given: AnyRecording) -> Recording:
 def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
     """Segments as given, or found in the recording.
 
-    Raises ``RefusedError`` when the given value is not a ``Segments``.
+    Raises ``InputError`` when the given value is not a ``Segments``.
     """
     if given is None:
         return segment(recording, progress=progress)
     if not isinstance(given, Segments):
-        raise RefusedError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
+        raise InputError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
     return given
 
 

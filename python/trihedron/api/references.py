@@ -11,7 +11,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.referring import AnyReference, calibration_by, motion_of
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_references, turns_of_frame
 from trihedron.records import Calibration, Frame, Recording
 from trihedron.records.reference import AgainstReference, FitToReference
@@ -74,7 +74,7 @@ def calibrate_references(
     >>> trihedron.calibrate_references(["a.csv", "b.csv"], ["a-truth.csv", "b-truth.csv"])  # doctest: +SKIP
     """
     if len(recordings) != len(references) or not recordings:
-        raise RefusedError(f"{len(recordings)} logs need as many references, not {len(references)}.")
+        raise InputError(f"{len(recordings)} logs need as many references, not {len(references)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     logs = tuple(recording_of(one) for one in recordings)
     pairs = [(log, motion_of(one, reference_columns)) for log, one in zip(logs, references, strict=True)]

@@ -13,7 +13,7 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_calibration
 from trihedron.diagnose.against.numbers import compare_numbers
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_reference, turns_of_frame
 from trihedron.read import ReadError
 from trihedron.read.reference.motion import of_recording, read_reference
@@ -41,7 +41,7 @@ NOMINAL_SCALE, NOMINAL_BIAS_M_S2 = 0.1, 0.5
 def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
     """A reference from a file of attitude, rate or pose, or from the log of another unit that moved along.
 
-    Raises ``RefusedError`` with the file and what to do.
+    Raises ``InputError`` with the file and what to do.
     """
     if isinstance(reference, ReferenceMotion):
         return reference
@@ -70,7 +70,7 @@ def held_against(
 ) -> AgainstReference:
     """Fit a log to a reference; ``given`` is a calibration whose replay is added for comparison.
 
-    Raises ``RefusedError`` when the two share no time or motion, or the reference does not determine the sensors.
+    Raises ``InputError`` when the two share no time or motion, or the reference does not determine the sensors.
     """
     is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
         recording.source
@@ -88,11 +88,11 @@ def calibration_by(
 ) -> Calibration:
     """Both sensors from the reference, in the lower-triangular frame, or (``case``) in the reference's body.
 
-    Raises ``RefusedError`` when the log has no accelerometer: a calibration file needs both.
+    Raises ``InputError`` when the log has no accelerometer: a calibration file needs both.
     """
     if recording.accelerometer is None:
-        raise RefusedError(
-            f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
+        raise InputError(
+            f"{recording.source}: a calibration contains an accelerometer too, and this log has none; "
             "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
         )
     gyro = found.gyroscope

@@ -14,7 +14,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.capture.guide import Guide
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.records.guiding import Accuracy, Examination, GuideView
 from trihedron.records.results import CalibrationResult, VerificationResult
@@ -82,7 +82,7 @@ def guide(
 def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: OnPose | None = None) -> Replay:
     """Run the guide on a log, block by block, as in a live session.
 
-    Raises ``RefusedError`` when the log has no accelerometer.
+    Raises ``InputError`` when the log has no accelerometer.
     """
     readings = readings_of(recording)
     now_s = 0.0
@@ -114,6 +114,6 @@ def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:
 def readings_of(recording: Recording) -> npt.NDArray[np.float64]:
     """(n, 3) or (n, 6), the accelerometer first."""
     if recording.accelerometer is None:
-        raise RefusedError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
+        raise InputError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
     parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
     return np.hstack(parts)

@@ -14,7 +14,7 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import ALPHA, combine
 from trihedron.arrays import FloatArray
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.records import Frame, Recording, SensorCalibration
 from trihedron.records.progress import Progress
@@ -81,9 +81,9 @@ def calibrate_sessions(
     2
     """
     if by not in BYS:
-        raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
+        raise InputError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
     if labels is not None and len(labels) != len(recordings):
-        raise RefusedError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
+        raise InputError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
     notify = progress or (lambda _fraction, _text: None)
     results: list[CalibrationResult] = []
     groups: list[str] = []
@@ -98,7 +98,7 @@ def calibrate_sessions(
             else:
                 place = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
                 result = calibrate(recording, **place)  # type: ignore[arg-type]
-        except REFUSALS as error:
+        except INPUT_ERRORS as error:
             left_out.append((recording.source, str(error)))
             continue
         why = _unfit(result, results)
@@ -111,7 +111,7 @@ def calibrate_sessions(
         reasons = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
         if len(recordings) > 1 and all(recording_of(given).gyroscope is None for given in recordings):
             reasons = "no log has a gyro: the logs of both sensors of one recording are given with --accel and --gyro"
-        raise RefusedError(f"two recordings at least are needed to see what repeats ({reasons}).")
+        raise InputError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
     return SessionsResult(model, tuple(results))
@@ -140,7 +140,7 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
 def _label(recording: Recording, by: By) -> str:
     if by == "date":
         if recording.start_epoch_s <= 0.0:
-            raise RefusedError(
+            raise InputError(
                 f"{recording.source}: the log does not say on which day it was recorded; give --labels DAY,DAY,..., "
                 "one word for each recording."
             )

@@ -56,7 +56,7 @@ def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tupl
 def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
     """The scenario of a TOML file or of the name of a ready-made one, or the record itself.
 
-    Raises ``RefusedError`` when there is no such scenario.
+    Raises ``InputError`` when there is no such scenario.
     """
     if isinstance(scenario, Scenario):
         return scenario

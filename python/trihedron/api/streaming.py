@@ -17,7 +17,7 @@ import numpy as np
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units
 from trihedron.api.calibrating import calibrate
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_text
 from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.read import ChunkedLog, open_chunks
@@ -105,11 +105,11 @@ def log_on_disk(
 ) -> LogOnDisk:
     """A .npy, Parquet or text log whose columns, rate and units are given, not detected.
 
-    Raises ``RefusedError`` when the file has another format, columns do not fit, or a sensor lacks an axis or the
+    Raises ``InputError`` when the file has another format, columns do not fit, or a sensor lacks an axis or the
     order x y z.
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
+        raise InputError(f"--rate is a positive number of samples per second, not {rate_hz}.")
     log = open_chunks(Path(path), columns)
     triads: dict[str, Triad | None] = {"a": None, "g": None}
     for sensor in triads:
@@ -117,7 +117,7 @@ def log_on_disk(
             wanted = (f"{sensor}x", f"{sensor}y", f"{sensor}z")
             first = log.roles.index(wanted[0]) if wanted[0] in log.roles else 0
             if log.roles[first : first + 3] != wanted:
-                raise RefusedError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
+                raise InputError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
             triads[sensor] = Triad(log, first)
     return LogOnDisk(
         EvenTime(log.n_rows, rate_hz),
@@ -139,7 +139,7 @@ def segment_file(
     With ``checkpoint`` a file stores the state of the pass every half a minute; an interrupted run continues from it
     with bit-identical results, and the end removes it.
 
-    Raises ``RefusedError`` when ``checkpoint`` is a file of another kind.
+    Raises ``InputError`` when ``checkpoint`` is a file of another kind.
     """
     notify = progress or (lambda _fraction, _text: None)
     # The segmentation only reads rows, which these types support.
@@ -264,24 +264,22 @@ def apply_file(
     An interrupted run continues where it stopped: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` has the number of rows
     and a hash of the inputs. Returns the number of rows written in this run.
 
-    Raises ``RefusedError`` when the calibration depends on temperature or has effects, which are not supported here;
+    Raises ``InputError`` when the calibration depends on temperature or has effects, which are not supported here;
     when units differ; when the output exists.
     """
     target = Path(output)
     known = calibration_of(calibration)
     if target.suffix.lower() != ".npy":
-        raise RefusedError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
+        raise InputError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
     if target.exists() and not overwrite:
-        raise RefusedError(f"{target}: this exists and was left alone; choose another name or add --force.")
+        raise InputError(f"{target}: this exists and was left alone; choose another name or add --force.")
     if known.extensions.get("effects") or known.extensions.get("thermal"):
-        raise RefusedError(
-            "this calibration follows temperature or compensates effects: apply it to the log as a whole."
-        )
+        raise InputError("this calibration follows temperature or compensates effects: apply it to the log as a whole.")
     check_units(known, cast("Recording", log))
     sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
     used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]
     if not used:
-        raise RefusedError(f"{log.source}: the calibration holds none of its sensors.")
+        raise InputError(f"{log.source}: the calibration contains none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
     part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
     of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))

@@ -8,7 +8,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.records.progress import Progress
@@ -89,7 +89,7 @@ def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: floa
     """The recording's own calibration; ``None`` where it does not determine one."""
     try:
         return calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
 
 

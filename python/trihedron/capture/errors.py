@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 
-class CaptureError(RefusedError):
+class CaptureError(InputError):
     """A capture cannot start or continue; the message says what failed, where, and what to do."""
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.at_rest import adc_steps
 from trihedron.channel_facts.limits import Extremes, find_limits
 from trihedron.channel_facts.quiet import Windows, look
+from trihedron.channel_facts.static_axes import adc_steps
 from trihedron.records.channel_facts import ChannelFacts, RecordingFacts
 
 __all__ = ["facts_in", "facts_of"]

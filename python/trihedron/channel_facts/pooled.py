@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
@@ -91,7 +91,7 @@ def ratio_of(one: Measured, other: Measured) -> Ratio:
     from scipy.stats import t
 
     if not (one.value > 0.0 and other.value > 0.0):
-        raise RefusedError("only positive figures have a ratio")
+        raise InputError("only positive figures have a ratio")
     squares = (one.sigma_log**2, other.sigma_log**2)
     sigma = math.sqrt(sum(squares))
     parts = sum(s**2 / d for s, d in zip(squares, (one.dof, other.dof), strict=True) if math.isfinite(d))

@@ -42,9 +42,9 @@ from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 # In the order in which they are used.
 COMMANDS = (
@@ -176,7 +176,7 @@ def _sentence(error: BaseException) -> str:
     if isinstance(error, OSError) and error.filename is None and error.errno in _OF_STDOUT:
         silence(sys.stdout)
         return f"standard output could not be written ({error.strerror})."
-    return str(error) if isinstance(error, OSError | RefusedError) else _defect_sentence(error)
+    return str(error) if isinstance(error, OSError | InputError) else _defect_sentence(error)
 
 
 _OF_STDOUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
@@ -261,5 +261,5 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
 
 
 def _reject(sentence: str) -> int:
-    typer.echo(f"trihedron: {printable(sentence)}", err=True)
+    typer.echo(f"trihedron: {escaped(sentence)}", err=True)
     return COULD_NOT_RUN

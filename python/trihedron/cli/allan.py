@@ -25,7 +25,7 @@ OPTIONS = {
         "Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
     ),
     "keep_events": "Exclude nothing automatically: impacts, vibration and jumps of the mean stay in.",
-    "accuracy": ("PERCENT", "How long to record for this uncertainty of each term; --full."),
+    "accuracy": ("PERCENT", "With --full: how long to record for this uncertainty of each term."),
     "plot": ("FILE.png", "Draw the Allan curves (also in the report)."),
     "csv": ("FILE", "Write the Allan curve as a table."),
     "curve": "LOG is a table of Allan deviations (--csv of another run, or published): terms from it.",

@@ -25,18 +25,21 @@ FIRST_SCREEN = 2
 OPTIONS = {
     "method": "joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces.",
     "frame": "Body frame: lower (lower-triangular, X along accelerometer X), symmetric, or case (with --method faces).",
-    "faces": ("LIST", "With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."),
-    "turns": ("LIST", "Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out."),
+    "faces": (
+        "LIST",
+        "With --method faces: axis up in each pose, 1 for +X to -3 for -Z, '1,-1,2,-2,3,-3'; 0 excludes one.",
+    ),
+    "turns": ("LIST", "Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 excludes one."),
     "turntable": (
         "SPEEDS",
-        "Speeds of a turntable in deg/s, the unit on it anyhow: one for all steady turns, or one each, '45,90'.",
+        "Speeds of a turntable in deg/s, the unit mounted in any way: one for all steady turns, or one each, '45,90'.",
     ),
     "turntable_error": ("PERCENT", "Standard error of the turntable's speed, common to all turns."),
-    "axis_signs": ("+++", "Sign with which each raw axis follows its documented direction, e.g. '-++'."),
-    "loss": "How far outlying poses count: linear, huber, soft_l1, cauchy.",
+    "axis_signs": ("+++", "Sign of each raw axis relative to its documented direction, e.g. '-++'."),
+    "loss": "Loss of outlying poses: linear (least squares), huber, soft_l1, cauchy.",
     "gyro_nominal": ("X", "Nominal rad/s per gyro unit, where counts and few moves do not determine it."),
-    "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log; one a log."),
-    "extended": "Diagnose the log too, and store the effects it demands; for apply.",
+    "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log; one for each log."),
+    "extended": "Diagnose the log too and store the accepted effects, which `trihedron apply` then compensates.",
     "by": (
         "HOW",
         "Several logs: by session (each for itself), date, device (every device of an archive), or temperature.",
@@ -71,7 +74,7 @@ def calibrate(
 ) -> None:
     """Calibrate both sensors from a log of poses and moves.
 
-    With several logs of one unit: one model, and how far every parameter repeats.
+    Several logs of one unit give common parameters and the repeatability of each.
     """
     results.check(output, inputs=sources.files)
     needs_stream(checkpoint, stream=stream)

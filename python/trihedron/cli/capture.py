@@ -26,7 +26,7 @@ LOSSES_NOT_TRUSTED = 0.05
 OPTIONS = {
     "port": typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
     "output": ("LOG", "Log to write (text; every command reads it).", "-o"),
-    "protocol": ("NAME", "Protocol, or a .toml that declares a frame; else found."),
+    "protocol": ("NAME", "Protocol, or a .toml that declares a frame; detected otherwise."),
     "baud": typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
     "seconds": typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
     "rate": ("HZ", "Rate of a board that sends no time."),
@@ -64,7 +64,7 @@ def capture(
     list_them: bool = False,
     force: bool = False,
 ) -> None:
-    """Record what a board sends into a log: nothing lost silently, on disk as it comes."""
+    """Record what a board sends into a log, written as it arrives; lost samples are counted and reported."""
     from trihedron.capture.protocols import PROTOCOLS
     from trihedron.capture.recorder import Recorder
 

@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.options import with_options
 from trihedron.cli.output import leave, put, step, style
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 FOLDER = "trihedron-demo"
 
@@ -26,7 +26,7 @@ def demo(folder: Path | None = None, seed: int | None = None, force: bool = Fals
     """Two simulated examples: a calibration compared with the truth; a simulation that a log contradicts."""
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:
-        raise RefusedError(f"{folder}: this exists and was left alone; choose another name or add --force.")
+        raise InputError(f"{folder}: this exists and was left alone; choose another name or add --force.")
     from trihedron.api.demonstrating import demonstrate
     from trihedron.report import to_text
 

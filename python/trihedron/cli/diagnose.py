@@ -41,9 +41,9 @@ def diagnose(
     alpha: float = 0.01,
     results: FullResults,
 ) -> None:
-    """Where a log and its model differ, which effects are missing, and what adding them gains. Status 0 if it ran.
+    """Where a log and its model differ, which effects are missing, and what adding them gains.
 
-    With several logs of one unit: which effects all of them share.
+    With several logs of one unit: which effects all of them share. The exit status is 0 whatever is found.
     """
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")

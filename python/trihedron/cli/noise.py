@@ -37,7 +37,7 @@ def noise(
     output: Path = Path("-"),
     results: FullResults,
 ) -> None:
-    """N and K for your filter: what its errors in motion are made of, beside the values of a static log."""
+    """Noise densities N and K for your filter: those of motion beside those of a static log."""
     horizons = numbers("--horizon", horizon)
     results.check(None if to is None else output, inputs=(*source.files, static, reference))
     recording = source.read()

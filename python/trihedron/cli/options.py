@@ -35,9 +35,12 @@ SHARED: Table = {
     "units state the content. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
     "checkpoint": (
         "FILE",
-        "With --stream: keep how far the pass is in FILE, so that a run that was stopped goes on from there.",
+        "With --stream: store the progress in FILE, so that a stopped run continues from there.",
     ),
 }
+
+
+FORMATS = "text of any layout, .npz, .npy, Parquet, zip; ROS bags, PX4 and others with a package that the error names."
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,7 @@ class LogSource(ReadingOptions):
     gyro: Path | None = None
     OPTIONS: ClassVar[Table] = {
         **ReadingOptions.OPTIONS,
-        "log": typer.Argument(
-            metavar="LOG", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
-        ),
+        "log": typer.Argument(metavar="LOG", help=f"Log: {FORMATS}"),
         "accel": ("F", "Log of the accelerometer, where each sensor has its own."),
         "gyro": ("F", "Log of the gyroscope, where each sensor has its own."),
     }
@@ -121,7 +122,7 @@ class LogsSource(ReadingOptions):
     gyro: list[Path] | None = None
     OPTIONS: ClassVar[Table] = {
         **ReadingOptions.OPTIONS,
-        "log": typer.Argument(metavar="LOG", help="Log, or several of one unit; files and archives as for `read`."),
+        "log": typer.Argument(metavar="LOG", help=f"Log, or several of one unit: {FORMATS}"),
         "accel": ("F", "Log of the accelerometer, where each sensor has its own; once for each log."),
         "gyro": ("F", "Log of the gyroscope, where each sensor has its own; once for each log."),
     }

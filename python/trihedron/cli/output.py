@@ -19,7 +19,7 @@ from trihedron.cli.next_step import with_arguments
 from trihedron.cli.provenance import with_provenance
 from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import check_free, check_report, write_whole
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration, Finding
@@ -194,7 +194,7 @@ def silence(stream: TextIO) -> None:
 
 def say(sentence: str) -> None:
     """Print on stderr what was done; results go to stdout."""
-    text = printable(sentence)
+    text = escaped(sentence)
     if sys.stderr.isatty():
         text = textwrap.fill(text, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)
     with _closed_is_silent(sys.stderr):

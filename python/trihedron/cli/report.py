@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.options import with_options
 from trihedron.cli.output import check_outputs, show, write_report
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 if TYPE_CHECKING:
     from trihedron.report import Document
@@ -38,16 +38,16 @@ def _read(path: Path) -> tuple[Document, dict[str, Any]]:
     try:
         # Opening a pipe without a writer would block.
         if path.exists() and not path.is_file():
-            raise RefusedError(f"{path}: this is no plain file; name a saved result.")
+            raise InputError(f"{path}: this is no plain file; name a saved result.")
         if path.stat().st_size > MOST_BYTES:
-            raise RefusedError(f"{path}: too large for a saved result.")
+            raise InputError(f"{path}: too large for a saved result.")
         saved = json_format.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise RefusedError(f"{path}: there is no such file; check the name and the folder.") from None
-    except RefusedError:
+        raise InputError(f"{path}: there is no such file; check the name and the folder.") from None
+    except InputError:
         raise
     except (OSError, ValueError, RecursionError):
-        raise RefusedError(f"{path}: not a saved result (JSON).") from None
+        raise InputError(f"{path}: not a saved result (JSON).") from None
     if isinstance(saved, dict) and KEY not in saved and "accelerometer" in saved:
         from trihedron.files.calibration import read_calibration
         from trihedron.report.calibration import calibration_report
@@ -55,5 +55,5 @@ def _read(path: Path) -> tuple[Document, dict[str, Any]]:
         return calibration_report(read_calibration(path)), saved
     try:
         return report_of(saved), {key: value for key, value in saved.items() if key != KEY}
-    except RefusedError as error:
-        raise RefusedError(f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -89,18 +89,18 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
         facts += [f"{known.rate_hz:.4g} Hz", *([f"noise {known.noise}"] if known.noise else [])]
     while len(" | ".join(facts)) > inner:
         facts.pop()
-    room = max(height - 21, 1)
-    warned = [Text(line, style=BAD, no_wrap=True) for line in _in_lines(view.warnings, inner - 1, room)]
+    most = max(height - 21, 1)
+    warned = [Text(line, style=BAD, no_wrap=True) for line in _in_lines(view.warnings, inner - 1, most)]
     foot = Text(" | ".join(facts), style=DIM, no_wrap=True)
     title = f"trihedron guide: {view.accuracy.sentence()}"
     return Group(Panel(Group(*lines, Text(""), body, Text(""), *warned, foot), title=title, width=width))
 
 
-def _in_lines(warnings: Sequence[str], width: int, room: int) -> list[str]:
-    """The first warnings in at most ``room`` lines; a cut is marked by dots."""
+def _in_lines(warnings: Sequence[str], width: int, most: int) -> list[str]:
+    """The first warnings in at most ``most`` lines; a cut is marked by dots."""
     lines = [line for text in warnings for line in wrap(f"! {text}", width, subsequent_indent="  ")]
-    if len(lines) > room:
-        lines[room - 1 :] = [f"{lines[room - 1][: width - 4].rstrip()} ..."]
+    if len(lines) > most:
+        lines[most - 1 :] = [f"{lines[most - 1][: width - 4].rstrip()} ..."]
     return lines
 
 
@@ -116,14 +116,14 @@ def _parameters(known: Examination | None, *, tall: bool) -> Text:
     """Uncertainties now, after the next pose and wanted: all parameters if ``tall``, else the worst of each kind."""
     if known is None:
         return Text("after the first poses", style=DIM)
-    room = 32 if tall else 14
-    out = Text(f"{'uncertainty, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
+    columns = 32 if tall else 14
+    out = Text(f"{'uncertainty, %':{columns}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)
     for one in rows:
-        name = f"{'accel' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]
+        name = f"{'accel' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: columns - 1]
         good = one.now is not None and one.now <= one.wanted
         numbers = f"{percent(one.now):>6}{percent(one.after_next):>7}{percent(one.wanted):>6}"
-        out.append(f"{name:{room}s}{numbers} {'ok' if good else ''}\n", style=GOOD if good else "")
+        out.append(f"{name:{columns}s}{numbers} {'ok' if good else ''}\n", style=GOOD if good else "")
     return out
 
 

@@ -15,7 +15,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.draws import NAMES, one_draw_for_all, uniform_for_normal
 from trihedron.diagnose.against.fitted import FittedModel
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
@@ -93,7 +93,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
         si = readings / np.linalg.norm(np.linalg.inv(fitted.S), axis=1)
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
-        except REFUSALS:
+        except INPUT_ERRORS:
             continue  # no pose is long enough: nothing to compare
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]

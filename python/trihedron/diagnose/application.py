@@ -20,7 +20,7 @@ from trihedron.diagnose.effects import by_id
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.records.words import words
 
@@ -30,7 +30,7 @@ N_ITERATIONS = 2
 CHANNELS = {"temperature_degc": "temperature", "supply_v": "supply voltage"}
 
 
-class SignalMissing(RefusedError):
+class SignalMissing(InputError):
     """The recording lacks a channel that an effect depends on."""
 
 
@@ -124,7 +124,7 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
     effect_id = str(entry.get("id", ""))
     model = entry.get("model")
     if not isinstance(model, Mapping) or "values" not in model or "variant" not in model:
-        raise RefusedError(f"effect {effect_id!r} has no model with its variant and values")
+        raise InputError(f"effect {effect_id!r} has no model with its variant and values")
     effect = by_id().get(effect_id)
     if effect is None:
         left_out[effect_id] = words("effect-unknown")
@@ -135,7 +135,7 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
             for variant in effect.variants(context):
                 if variant.label == model["variant"] and variant.distortion.n_parameters == len(model["values"]):
                     return variant
-            raise RefusedError(
+            raise InputError(
                 f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
             )
         except SignalMissing as missing:

@@ -29,7 +29,7 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
 from trihedron.diagnose.shared import shared_effects
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, Verdict
 from trihedron.records.domains import DomainTest, Where
@@ -67,7 +67,7 @@ def diagnose_recordings(
     """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
     all of them (eq. 11.21). Refused with fewer than two."""
     if len(given) < FEWEST_RECORDINGS:
-        raise RefusedError(f"what recordings share needs two or more, got {len(given)}.")
+        raise InputError(f"what recordings share needs two or more, got {len(given)}.")
     notify = progress or _silently
     each = []
     for k, (recording, segments, calibration) in enumerate(given):
@@ -94,7 +94,7 @@ def _diagnosed(
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
     # A test with a false-alarm rate of one half or more carries no information.
     if not 0.0 < alpha < 0.5:
-        raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
+        raise InputError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments, calibration.averaging)
     begin = calibration
     prior = prior_of(obs, calibration) if calibration_is_given else None

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 Form = Literal["matrices", "quaternions", "vectors"]
 """Representation of an attitude."""
@@ -79,11 +79,11 @@ def integrate_rate(
     t = np.asarray(time_s, dtype=np.float64)
     w = np.asarray(rate, dtype=np.float64)
     if t.ndim != 1 or w.shape != (len(t), 3) or len(t) == 0:
-        raise RefusedError(f"time_s must have shape (n,) and rate (n, 3), n at least 1; got {t.shape} and {w.shape}")
+        raise InputError(f"time_s must have shape (n,) and rate (n, 3), n at least 1; got {t.shape} and {w.shape}")
     if form not in _FORMS:
-        raise RefusedError(f"form must be one of {', '.join(_FORMS)}, got {form!r}")
+        raise InputError(f"form must be one of {', '.join(_FORMS)}, got {form!r}")
     if between not in _DEGREES:
-        raise RefusedError(f"between must be one of {', '.join(_DEGREES)}, got {between!r}")
+        raise InputError(f"between must be one of {', '.join(_DEGREES)}, got {between!r}")
     initial = None if start is None else _quaternion(np.asarray(start, dtype=np.float64))
     return _core.integrate_rate(t, w, _DEGREES[between], _FORMS[form], last_only, initial)
 
@@ -92,17 +92,17 @@ def _quaternion(start: FloatArray) -> FloatArray:
     """Unit quaternion (4,) x y z w of an attitude: rotation matrix (3, 3), rotation vector (3,) or quaternion (4,)."""
     if start.shape == (3, 3):
         if not np.abs(start.T @ start - np.eye(3)).max() < _ORTHOGONAL or np.linalg.det(start) < 0.0:
-            raise RefusedError("the start is no attitude: its columns are not orthogonal unit vectors of a right hand")
+            raise InputError("the start is no attitude: its columns are not orthogonal unit vectors of a right hand")
         start = _core.vector_from_rotation(start[np.newaxis])[0]
     if start.shape == (3,):
         if not np.isfinite(start).all():
-            raise RefusedError("the start is no attitude: its rotation vector is not finite")
+            raise InputError("the start is no attitude: its rotation vector is not finite")
         angle = float(np.linalg.norm(start))
         # np.sinc(x) is sin(πx)/(πx).
         return np.append(0.5 * np.sinc(0.5 * angle / np.pi) * start, np.cos(0.5 * angle))
     if start.shape == (4,) and abs(float(np.linalg.norm(start)) - 1.0) < _ORTHOGONAL:
         return start / np.linalg.norm(start)
-    raise RefusedError(
+    raise InputError(
         "the start must be a rotation matrix (3, 3), a unit quaternion x y z w (4,) or a rotation vector (3,), "
         f"got shape {start.shape}"
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.session.start import denies_cut
@@ -45,12 +45,12 @@ def verify_calibration(
     """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
 
     Parameters are compared with ``own``, the calibration of that recording; without it only the gyro bias is. Raises
-    ``RefusedError`` when the recording has no accelerometer or no pose.
+    ``InputError`` when the recording has no accelerometer or no pose.
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
-        raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
+        raise InputError("verification needs the accelerometer: gravity is what a calibration is tested against")
     if segments.n_poses == 0:
-        raise RefusedError("verification needs poses, and none was found: keep the sensor still for some seconds")
+        raise InputError("verification needs poses, and none was found: keep the sensor still for some seconds")
     accelerometer = calibration.accelerometer
     noise = _variance(segments.norm_sigma, segments.n_poses)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)

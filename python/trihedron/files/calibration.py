@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.documents import read_json
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.output import write_whole
 from trihedron.records import (
     PARAMETER_NAMES,
@@ -30,7 +30,7 @@ from trihedron.records import (
     SensorCalibration,
 )
 from trihedron.records.plain import as_plain, from_plain
-from trihedron.sanitise import printable_json
+from trihedron.sanitise import escaped_json
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1
@@ -49,7 +49,7 @@ FRAME_MEANING = {
 }
 
 
-class CalibrationFileError(RefusedError):
+class CalibrationFileError(InputError):
     """A calibration file that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 
@@ -84,7 +84,9 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
     Examples
     --------
-    >>> trihedron.read_calibration("calibration.json").gyroscope.b  # doctest: +SKIP
+    >>> trihedron.write_calibration(result, "calibration.json", overwrite=True)
+    >>> trihedron.read_calibration("calibration.json").gyroscope.si_unit
+    'rad/s'
     """
     path = Path(path)
     meant = "name a calibration file written by `trihedron calibrate -o` (it comes before the log)"
@@ -94,13 +96,13 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def calibration_text(calibration: Calibration) -> str:
     """The content of a calibration file."""
-    return printable_json(_folded(calibration_document(calibration))) + "\n"
+    return escaped_json(_folded(calibration_document(calibration))) + "\n"
 
 
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """A calibration as plain JSON types.
 
-    Raises ``RefusedError`` when a sensor's covariance differs from its block of the full one: the file stores each
+    Raises ``InputError`` when a sensor's covariance differs from its block of the full one: the file stores each
     number once.
     """
     sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
@@ -109,7 +111,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
             continue
         block = calibration.covariance[12 * k : 12 * k + 12, 12 * k : 12 * k + 12]
         if not np.array_equal(block, sensor.covariance):
-            raise RefusedError(f"the {name}'s covariance is not its block of the full covariance")
+            raise InputError(f"the {name}'s covariance is not its block of the full covariance")
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -135,7 +137,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
 def calibration_from_document(document: object, source: str = "document") -> Calibration:
     """The calibration in a document; ``source`` is its name in error messages.
 
-    Raises ``RefusedError`` when it does not follow the schema or its content is invalid.
+    Raises ``InputError`` when it does not follow the schema or its content is invalid.
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(
@@ -246,10 +248,10 @@ def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> Se
 def _from_checked(document: dict[str, Any]) -> Calibration:
     covariance = np.array(document["covariance"], dtype=np.float64)
     if document["parameter_order"] != _parameter_order(document["gyroscope"] is not None):
-        raise RefusedError("parameter_order is not S row by row, then b, accelerometer first")
+        raise InputError("parameter_order is not S row by row, then b, accelerometer first")
     n = 12 if document["gyroscope"] is None else 24
     if covariance.shape != (n, n):
-        raise RefusedError(f"covariance must be {n} x {n}, got {' x '.join(map(str, covariance.shape))}")
+        raise InputError(f"covariance must be {n} x {n}, got {' x '.join(map(str, covariance.shape))}")
     return Calibration(
         accelerometer=_sensor(document["accelerometer"], covariance[:12, :12]),
         gyroscope=None if n == 12 else _sensor(document["gyroscope"], covariance[12:, 12:]),

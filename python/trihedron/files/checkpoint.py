@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.output import write_whole
 
 EVERY_S = 30.0
@@ -43,7 +43,7 @@ class Checkpoint:
     def load(self) -> tuple[int, dict[str, FloatArray]]:
         """Number of rows processed and the state after them; 0 and an empty state where there is no file.
 
-        Raises ``RefusedError`` when the file is no checkpoint, or one of another log or other options; it is not
+        Raises ``InputError`` when the file is no checkpoint, or one of another log or other options; it is not
         changed.
         """
         if not self.path.exists():
@@ -52,16 +52,16 @@ class Checkpoint:
             # Checkpoints are stored uncompressed: a compressed file is another program's and may unpack to any size.
             with zipfile.ZipFile(self.path) as archive:
                 if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
-                    raise RefusedError("packed")
+                    raise InputError("packed")
             with np.load(self.path, allow_pickle=False) as held:
                 found = {name: held[name] for name in held.files}
             of, rows = str(found.pop(_MADE_OF)), int(found.pop(_ROWS))
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
-            raise RefusedError(
+            raise InputError(
                 f"{self.path}: this is no checkpoint and was left alone; name another file with --checkpoint."
             ) from None
         if of != self.made_of:
-            raise RefusedError(
+            raise InputError(
                 f"{self.path}: this checkpoint is of another log, or of other columns, units or rate; remove it to "
                 "begin anew, or name another file with --checkpoint."
             )

@@ -7,31 +7,31 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import read_json
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import plain, schema_of, violation
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
 
 
-class DiagnosisFileError(RefusedError):
+class DiagnosisFileError(InputError):
     """A diagnosis that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """A diagnosis as plain JSON types, valid against the schema; a number that is not finite is ``null``.
 
-    Raises ``RefusedError`` when it does not follow the schema: a defect of this program.
+    Raises ``InputError`` when it does not follow the schema: a defect of this program.
     """
     document: dict[str, Any] = plain(diagnosis.to_dict())
     complaint = complaint_about(document)
     if complaint:
-        raise RefusedError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
+        raise InputError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
     return document
 
 
 def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read and check a diagnosis written by ``trihedron diagnose --json``.
 
-    Raises ``RefusedError`` when the file is missing, is no JSON, or does not follow the schema.
+    Raises ``InputError`` when the file is missing, is no JSON, or does not follow the schema.
     """
     path = Path(path)
     meant = "name a file written by `trihedron diagnose --json`"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, of_path, parse_toml, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.frame_declaration import (
     CHECKSUM_SIZES,
     CHECKSUMS,
@@ -26,21 +26,21 @@ _CHECKSUM_KEYS = {"kind", "at", "from", "to"}
 def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     """The frame that a TOML file declares.
 
-    Raises ``RefusedError`` when a key is wrong or missing; the message names the file and the key.
+    Raises ``InputError`` when a key is wrong or missing; the message names the file and the key.
     """
     path = Path(path)
     try:
         table = parse_toml(read_text(path, "declaration of a frame"))
     except DocumentError as error:
-        raise RefusedError(of_path(path, error)) from None
+        raise InputError(of_path(path, error)) from None
     try:
         return _declaration(table, path.stem)
     except OverflowError:
-        raise RefusedError(f"{path}: a length or a place is not a finite number of bytes.") from None
+        raise InputError(f"{path}: a length or a place is not a finite number of bytes.") from None
     except (KeyError, TypeError) as error:
-        raise RefusedError(f"{path}: {_said(error)}; keys and an example: capture.md of the documentation.") from None
+        raise InputError(f"{path}: {_said(error)}; keys and an example: capture.md of the documentation.") from None
     except ValueError as error:
-        raise RefusedError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
 
 
 def _said(error: Exception) -> str:
@@ -50,7 +50,7 @@ def _said(error: Exception) -> str:
 def _known(table: dict[str, Any], allowed: set[str], where: str) -> None:
     for key in table:
         if key not in allowed:
-            raise RefusedError(f"{where} has no key '{key}'; there are {', '.join(sorted(allowed))}.")
+            raise InputError(f"{where} has no key '{key}'; there are {', '.join(sorted(allowed))}.")
 
 
 def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
@@ -58,10 +58,10 @@ def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
     try:
         sync = bytes.fromhex(str(table["sync"]).replace("0x", "").replace(",", " "))
     except ValueError:
-        raise RefusedError(f'sync = "{table["sync"]}" is not hexadecimal; write for example "AA 55".') from None
+        raise InputError(f'sync = "{table["sync"]}" is not hexadecimal; write for example "AA 55".') from None
     endian = table.get("endian", "little")
     if endian not in ("little", "big"):
-        raise RefusedError(f"endian is 'little' or 'big', not '{endian}'.")
+        raise InputError(f"endian is 'little' or 'big', not '{endian}'.")
     fields: list[FrameField] = []
     at = len(sync)
     for entry in table["field"]:
@@ -71,7 +71,7 @@ def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
     _known(check, _CHECKSUM_KEYS, "[checksum]")
     kind = check["kind"]
     if kind not in CHECKSUMS:
-        raise RefusedError(f"there is no checksum '{kind}'; choose one of {', '.join(CHECKSUMS)}.")
+        raise InputError(f"there is no checksum '{kind}'; choose one of {', '.join(CHECKSUMS)}.")
     size = CHECKSUM_SIZES[kind]
     length = int(table.get("length", at + size))
     place = int(check.get("at", length - size))
@@ -92,14 +92,14 @@ def _field(entry: dict[str, Any], at: int) -> FrameField:
     _known(entry, _FIELD_KEYS, "a [[field]]")
     name, kind, unit = str(entry["name"]), entry["type"], str(entry.get("unit", ""))
     if kind not in FIELD_TYPES:
-        raise RefusedError(f"field {name} has no type '{kind}'; choose one of {', '.join(FIELD_TYPES)}.")
+        raise InputError(f"field {name} has no type '{kind}'; choose one of {', '.join(FIELD_TYPES)}.")
     usual: dict[str, Role] = {"counter": "counter", "time": "clock", "clock": "clock"}
     role: Role = entry.get("role") or usual.get(name, "value")
     if role not in ("value", "counter", "clock"):
-        raise RefusedError(f"field {name} has no role '{role}'; choose value, counter or clock.")
+        raise InputError(f"field {name} has no role '{role}'; choose value, counter or clock.")
     tick = float(entry.get("tick_s", _TICKS.get(unit, 0.0) * float(entry.get("scale", 1.0))))
     if role == "clock" and not tick > 0:
-        raise RefusedError(f'the clock {name} needs its step: unit = "us", "ms" or "s", or tick_s = 0.0001.')
+        raise InputError(f'the clock {name} needs its step: unit = "us", "ms" or "s", or tick_s = 0.0001.')
     if role != "value" and kind in ("f32", "f64"):
-        raise RefusedError(f"the {role} {name} must be a whole number, not {kind}.")
+        raise InputError(f"the {role} {name} must be a whole number, not {kind}.")
     return FrameField(name, kind, int(entry.get("at", at)), float(entry.get("scale", 1.0)), unit, role, tick)

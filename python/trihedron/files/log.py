@@ -30,7 +30,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 
     ``-`` is CSV on stdout.
 
-    Raises ``RefusedError`` when the ending is none of .csv, .npz, .parquet, or the file exists and may not be
+    Raises ``InputError`` when the ending is none of .csv, .npz, .parquet, or the file exists and may not be
     replaced.
     """
     if str(path) != "-":

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from trihedron.documents import read_json
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
 from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, TermName
 
@@ -18,7 +18,7 @@ _OF_A_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
 
 
-class NoiseFileError(RefusedError):
+class NoiseFileError(InputError):
     """Noise that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 
@@ -27,7 +27,7 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 
     For a term that was not detected the value is the upper limit from the log.
 
-    Raises ``RefusedError`` when the file is missing or is not what ``trihedron allan --json`` writes, or its readings
+    Raises ``InputError`` when the file is missing or is not what ``trihedron allan --json`` writes, or its readings
     are not in SI.
     """
     return noise_figures(read_json(path, "file of noise terms", MEANT, NoiseFileError), str(Path(path)))
@@ -36,7 +36,7 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
 def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:
     """As :func:`read_noise`, from the JSON document itself; ``source`` is its name in error messages.
 
-    Raises ``RefusedError`` when it contains no noise terms, or its readings are not in SI.
+    Raises ``InputError`` when it contains no noise terms, or its readings are not in SI.
     """
     try:
         axes = document["axes"]
@@ -48,7 +48,7 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
         rate = float(document["rate_hz"])
     except (KeyError, TypeError, ValueError, IndexError, ArithmeticError):
         raise NoiseFileError(
-            f"{source}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
+            f"{source}: this JSON contains no noise terms; name a file written by `trihedron allan --json`."
         ) from None
     if not out:
         raise NoiseFileError(
@@ -61,7 +61,7 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
 def read_noise_axes(path: str | os.PathLike[str]) -> tuple[NoiseAxis, ...]:
     """The axes of a file that ``trihedron allan --json`` writes, in their unit; none where it is another JSON object.
 
-    Raises ``RefusedError`` when the file is missing or no JSON, or its axes lack values.
+    Raises ``InputError`` when the file is missing or no JSON, or its axes lack values.
     """
     document = read_json(path, "file of noise terms", MEANT, NoiseFileError)
     if not isinstance(document, dict) or "axes" not in document:

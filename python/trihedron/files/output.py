@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 if sys.platform != "win32":
     import fcntl
@@ -130,14 +130,14 @@ def _lock(descriptor: int, *, wait: bool = True) -> bool:
     return True
 
 
-class OutputError(RefusedError):
+class OutputError(InputError):
     """A file that cannot be written. One sentence: which file, why, what to do."""
 
 
 def check_report(path: Path) -> None:
     """Reject a report whose ending is not that of a format.
 
-    Raises ``RefusedError`` when the ending is unknown; the message lists the valid ones.
+    Raises ``InputError`` when the ending is unknown; the message lists the valid ones.
     """
     if path.suffix.lower() not in (".html", ".txt", ".json"):
         raise OutputError(f"{path}: the file's ending selects the format of a report; give .html, .txt or .json.")
@@ -150,7 +150,7 @@ def check_free(
 
     ``inputs`` are the files that the outputs are made from: none of them is overwritten, even with ``overwrite``.
 
-    Raises ``RefusedError`` when a file exists and may not be replaced, is an input or read-only, its folder is missing
+    Raises ``InputError`` when a file exists and may not be replaced, is an input or read-only, its folder is missing
     or not writable, or one name is given twice.
     """
     read = {identity: Path(path) for path in inputs if path is not None and (identity := _identity(path))}
@@ -219,7 +219,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
 
     A link is followed. Temporary files of killed processes in the folder are deleted.
 
-    Raises ``RefusedError`` as :func:`check_free`, or when the system rejects.
+    Raises ``InputError`` as :func:`check_free`, or when the system rejects.
     """
     target = Path(path)
     check_free([target], overwrite=overwrite)

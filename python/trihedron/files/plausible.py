@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Calibration, SensorCalibration
 
 LARGEST_CONDITION = 100.0
@@ -23,23 +23,23 @@ ROUNDING = 1e-9
 def require_plausible(calibration: Calibration) -> Calibration:
     """The calibration, if it is plausible for a sensor.
 
-    Raises ``RefusedError`` when S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger
+    Raises ``InputError`` when S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger
     than any sensor's, or a covariance is invalid (a negative variance, correlations beyond one).
     """
     for name, sensor in named_sensors(calibration):
         largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))
         if not largest < LARGEST_NUMBER:
-            raise RefusedError(f"the {name} holds {largest:.3g} among S and b: the file is damaged; calibrate again.")
+            raise InputError(f"the {name} contains {largest:.3g} among S and b: the file is damaged; calibrate again.")
         lengths = np.linalg.norm(sensor.S, axis=0)
         if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
-            raise RefusedError(
+            raise InputError(
                 f"the {name}'s S is singular or nearly so (two of its axes are parallel): this is no sensor's "
                 "calibration; calibrate again with more poses."
             )
         if sensor.raw_unit == sensor.si_unit:
             sizes = np.linalg.svd(sensor.S, compute_uv=False)
             if sizes[0] > LARGEST_SI_FACTOR or sizes[-1] < 1.0 / LARGEST_SI_FACTOR:
-                raise RefusedError(
+                raise InputError(
                     f"the {name}'s S turns {sensor.raw_unit} into {sensor.si_unit} by a factor of "
                     f"{sizes[0] if sizes[0] > LARGEST_SI_FACTOR else sizes[-1]:.3g}: the unit of the readings was "
                     "mistaken; calibrate again with their unit said."
@@ -64,12 +64,12 @@ def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration
 def _require_covariance(name: str, covariance: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
     variance = np.diag(covariance)
     if np.any(variance < 0.0):
-        raise RefusedError(f"the {name} covariance has a negative variance: the file is damaged; calibrate again.")
+        raise InputError(f"the {name} covariance has a negative variance: the file is damaged; calibrate again.")
     known = variance > 0.0
     sigma = np.sqrt(variance[known])
     correlation = covariance[np.ix_(known, known)] / np.outer(sigma, sigma)
     if known.any() and np.linalg.eigvalsh(correlation)[0] < -ROUNDING * len(sigma):
-        raise RefusedError(
+        raise InputError(
             f"the {name} covariance is none (its correlations contradict one another): the file is damaged; "
             "calibrate again."
         )

@@ -13,7 +13,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Item
 
 from trihedron.documents import DocumentError, of_path, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.output import write_whole
 
 TEMPLATE = """# A simulation to begin with: an ordinary sensor that reads m/s² and rad/s, turned by hand.
@@ -75,9 +75,9 @@ def improved_scenario(
     try:
         document = tomlkit.parse(_under_own_head(read_text(path, "scenario file"), os.path.basename(path)))
     except DocumentError as error:
-        raise RefusedError(of_path(path, error)) from None
+        raise InputError(of_path(path, error)) from None
     except (TOMLKitError, RecursionError) as error:
-        raise RefusedError(f"{path}: this is not a TOML file: {error}") from None
+        raise InputError(f"{path}: this is not a TOML file: {error}") from None
     for name, values in tables.items():
         if values:
             _merge(document, name, values)
@@ -100,7 +100,7 @@ def improved_scenario(
 
 
 def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write an improved scenario to a file. Raises ``RefusedError`` when the file exists and may not be replaced."""
+    """Write an improved scenario to a file. Raises ``InputError`` when the file exists and may not be replaced."""
     write_whole(path, text, overwrite=overwrite)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.output import OutputError, write_whole
 from trihedron.records.truth import TrueSegment, Truth
 
@@ -51,7 +51,7 @@ def check_truth_suffix(path: Path) -> None:
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the truth; ``.npz`` contains everything, ``.json`` all but the arrays per sample.
 
-    Raises ``RefusedError`` when the ending is another one, or the file exists and may not be replaced.
+    Raises ``InputError`` when the ending is another one, or the file exists and may not be replaced.
     """
     target = Path(path)
     check_truth_suffix(target)
@@ -68,14 +68,14 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
 def read_truth(path: str | os.PathLike[str]) -> Truth:
     """Read a truth file that :func:`write_truth` wrote as ``.npz``.
 
-    Raises ``RefusedError`` when the file is not such a file.
+    Raises ``InputError`` when the file is not such a file.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
             header = json.loads(str(archive["header"]))
             arrays = {name: archive[name] for name in _ARRAYS if name in archive.files}
     except (KeyError, ValueError) as error:
-        raise RefusedError(f"{path}: this is not a truth file written as .npz ({error})") from None
+        raise InputError(f"{path}: this is not a truth file written as .npz ({error})") from None
     segments = tuple(TrueSegment(**{**entry, "axis": tuple(entry["axis"])}) for entry in header.pop("segments"))
     effects = {name: MappingProxyType(values) for name, values in header.pop("effects").items()}
     noise = {

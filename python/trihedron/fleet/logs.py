@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read import devices_of
 
 ENDINGS = (
@@ -51,21 +51,21 @@ def find_jobs(
     ``serial`` is a regular expression whose first group, found in a log's path, names its device; without it devices
     are those of an archive, or else the log's folder. ``apart_from`` is excluded: the output of the fleet.
 
-    Raises ``RefusedError`` when there is no log, a named log is missing, or the expression does not match.
+    Raises ``InputError`` when there is no log, a named log is missing, or the expression does not match.
     """
     paths = [
         path for path in _paths(source) if apart_from is None or apart_from.resolve() not in path.resolve().parents
     ]
     if not paths:
-        raise RefusedError(
+        raise InputError(
             f"{source}: no log was found there; name a folder with logs, or a pattern such as 'logs/*.csv'."
         )
     try:
         pattern = None if serial is None else re.compile(serial)
     except re.error as error:
-        raise RefusedError(f"--serial {serial!r} is not a regular expression ({error}).") from None
+        raise InputError(f"--serial {serial!r} is not a regular expression ({error}).") from None
     if pattern is not None and pattern.groups != 1:
-        raise RefusedError(
+        raise InputError(
             f"--serial {serial!r} needs one group in parentheses: the part of the path that is the device."
         )
     root = os.path.commonpath([str(path.parent.resolve()) for path in paths])
@@ -84,9 +84,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         return [path for one in source for path in _paths(one)]
     if not os.fspath(source):
         # An unset shell variable gives an empty name, which must not mean every log below the current folder.
-        raise RefusedError(
-            "the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here)."
-        )
+        raise InputError("the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here).")
     path = Path(source)
     try:
         os.stat(source)
@@ -94,7 +92,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         pass
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise RefusedError(f"{source}: this cannot be opened ({why}); check the name.") from None
+        raise InputError(f"{source}: this cannot be opened ({why}); check the name.") from None
     if path.is_dir():
         below = [p for p in path.rglob("*") if not p.name.startswith(".")]
         files = [p for p in below if not p.is_dir()]
@@ -108,7 +106,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         return [path]
     matched = sorted(Path(name) for name in glob.glob(str(source), recursive=True))
     if not matched and not glob.has_magic(str(source)):
-        raise RefusedError(f"{source}: there is no such file or folder; check the name.")
+        raise InputError(f"{source}: there is no such file or folder; check the name.")
     return [path for one in matched for path in (_paths(one) if one.is_dir() else [one]) or [one]]
 
 
@@ -116,7 +114,7 @@ def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, roo
     if pattern is not None:
         found = pattern.search(str(path))
         if found is None:
-            raise RefusedError(f"{path}: --serial {pattern.pattern!r} does not fit this path.")
+            raise InputError(f"{path}: --serial {pattern.pattern!r} does not fit this path.")
         return found.group(1)
     if device is not None:
         return f"device {device}"

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import plain
 from trihedron.files.output import write_whole
 from trihedron.fleet.logs import Job, find_jobs
@@ -95,12 +95,12 @@ def fleet(
         "diagnose": diagnose,
     }
     if workers is not None and workers < 0:
-        raise RefusedError(f"--workers is 0 or more, not {workers}.")
+        raise InputError(f"--workers is 0 or more, not {workers}.")
     notify = progress or (lambda _fraction, _text: None)
     notify(0.0, "looking at logs")
     jobs = find_jobs(logs, options, serial=serial, apart_from=folder)
     if folder.exists() and not folder.is_dir():
-        raise RefusedError(f"{folder}: this is a file; name a folder for the results.")
+        raise InputError(f"{folder}: this is a file; name a folder for the results.")
     (folder / RESULTS).mkdir(parents=True, exist_ok=True)
     rows = {job.key: kept for job in jobs if (kept := _kept(folder, job)) is not None}
     todo = list({job.key: job for job in jobs if job.key not in rows}.values())
@@ -174,12 +174,12 @@ def _why(error: BaseException | None) -> str:
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """A Dask client of the given scheduler, or of a cluster of processes on this machine.
 
-    Raises ``RefusedError`` when Dask is not installed, or the scheduler does not answer.
+    Raises ``InputError`` when Dask is not installed, or the scheduler does not answer.
     """
     try:
         dask, distributed = import_module("dask"), import_module("distributed")
     except ModuleNotFoundError:
-        raise RefusedError(
+        raise InputError(
             "several workers need Dask, which is not installed: pip install 'trihedron[fleet]', or say --workers 0 to "
             "do one log after the other in this process."
         ) from None
@@ -198,11 +198,11 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     with dask.config.set(settings):
         if scheduler is not None:
             if re.search(r"(^\w+://.|:\d+$)", scheduler) is None:
-                raise RefusedError(f"{scheduler}: this is no address of a Dask scheduler; say tcp://HOST:8786.")
+                raise InputError(f"{scheduler}: this is no address of a Dask scheduler; say tcp://HOST:8786.")
             try:
                 client = distributed.Client(scheduler, timeout="15s", set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:
-                raise RefusedError(f"{scheduler}: no Dask scheduler answers there ({error}).") from None
+                raise InputError(f"{scheduler}: no Dask scheduler answers there ({error}).") from None
             with client:
                 yield client
             return

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from trihedron.files.output import write_whole
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 if TYPE_CHECKING:
     import polars
@@ -65,7 +65,7 @@ def _cell(row: dict[str, Any], name: str) -> Any:
     if name in ("warnings", "serious"):
         return " ".join(row.get(name) or ())
     value = row.get(name)
-    return printable(value) if isinstance(value, str) else value
+    return escaped(value) if isinstance(value, str) else value
 
 
 def _number(row: dict[str, Any], k: int) -> float | None:

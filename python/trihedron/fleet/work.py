@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.fleet.logs import program
 from trihedron.records.checked import WrongTypeError
 
 Row = dict[str, Any]
-REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)
+REJECTED: tuple[type[Exception], ...] = (*INPUT_ERRORS, WrongTypeError, OSError)
 """Exceptions that mean an unusable log, file or option, not a defect."""
 
 
@@ -29,7 +29,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     row: Row = {"version": program(), "worker": os.getpid()}
     try:
         row |= {"status": "done", "reason": "", **_calibrated(path, device, options)}
-    except REFUSED as error:
+    except REJECTED as error:
         row |= {"status": "rejected", "reason": str(error)}
     except MemoryError:
         row |= {"status": "crashed", "reason": "there was not enough memory for this log"}
@@ -51,7 +51,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
     place: dict[str, Any] = {key: options.get(key) for key in ("gravity_m_s2", "latitude_deg", "height_m")}
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
-        raise RefusedError(f"{path}: this is {kind}, not a file.")
+        raise InputError(f"{path}: this is {kind}, not a file.")
     recording = reading.read(path, device=device, **stated)
     diagnosis = None
     if options.get("diagnose", True):
@@ -59,7 +59,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         if found.calibration is None:
             grave = [f.seen for f in found.findings if f.severity.value != "note"]
             why = grave[0] if grave else "its poses determine no calibration."
-            raise RefusedError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
+            raise InputError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
         result = CalibrationResult(found.calibration, found.segments, recording)
         diagnosis = {
             "verdict": found.verdict,

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib import format as npy_format
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line, from_os_error
 from trihedron.read.memory import check_memory, check_unpacked
@@ -62,7 +62,9 @@ def read_npy(path: Path) -> Table:
     except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
-        raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({first_line(error)}).") from None
+        raise ReadError(
+            f"{path}: this .npy file is damaged or contains Python objects ({first_line(error)})."
+        ) from None
     return _from_arrays(path, {"data": array}, None)
 
 
@@ -73,9 +75,9 @@ def header(stream: Any, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]
     read = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
     shape, by_columns, dtype = read(stream)
     if dtype.hasobject:
-        raise RefusedError("objects of Python are not read")
+        raise InputError("objects of Python are not read")
     if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != size - stream.tell():
-        raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
+        raise InputError(f"its header says {dtype} of shape {shape}, and it has another length")
     return shape, bool(by_columns), dtype
 
 
@@ -90,7 +92,9 @@ def read_npz(path: Path, device: int | None) -> Table:
     except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
-        raise ReadError(f"{path}: this .npz file is damaged or holds Python objects ({first_line(error)}).") from None
+        raise ReadError(
+            f"{path}: this .npz file is damaged or contains Python objects ({first_line(error)})."
+        ) from None
     return _from_arrays(path, arrays, device)
 
 
@@ -109,11 +113,11 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: 
     n_units = block.shape[1]
     if device is None:
         raise ReadError(
-            f"{path}: array '{name}' holds {n_units} devices (shape {block.shape}); "
+            f"{path}: array '{name}' contains {n_units} devices (shape {block.shape}); "
             f"choose one with --device, 1 to {n_units}."
         )
     if not 1 <= device <= n_units:
-        raise ReadError(f"{path}: there is no device {device}; array '{name}' holds devices 1 to {n_units}.")
+        raise ReadError(f"{path}: there is no device {device}; array '{name}' contains devices 1 to {n_units}.")
     return block[:, device - 1, :]
 
 
@@ -151,10 +155,10 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
         names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
         columns += list(array.T)
     if device is not None and not used_device:
-        raise ReadError(f"{path}: a device was given, but the file holds one device only; leave --device out.")
+        raise ReadError(f"{path}: a device was given, but the file contains one device only; leave --device out.")
     if not columns:
         raise ReadError(
-            f"{path}: there is no numeric array of rows in this file (it holds {', '.join(arrays) or 'nothing'})."
+            f"{path}: there is no numeric array of rows in this file (it contains {', '.join(arrays) or 'nothing'})."
         )
     numbers = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in columns)
     return Table(path, tuple(names) if any(names) else None, numbers, file_sha256(path), metadata)

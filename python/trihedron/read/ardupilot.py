@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 
@@ -44,7 +44,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     try:
         from pymavlink import DFReader
     except ImportError:
-        raise missing_extra(path, "an ArduPilot .bin log", "pymavlink", "ardupilot") from None
+        raise missing_package(path, "an ArduPilot .bin log", "pymavlink") from None
     rows: dict[tuple[str, str], list[list[float]]] = {}
     names: dict[tuple[str, str], list[str]] = {}
     held = Parameters(_PARAMETERS)
@@ -118,7 +118,7 @@ def _keep(
     if key not in names:
         timestamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
         if not timestamp:
-            raise RefusedError(f"{message.get_type()} has no timestamp")
+            raise InputError(f"{message.get_type()} has no timestamp")
         names[key] = [f"{timestamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
         rows[key] = []
     plain = [names[key][0].split(" ")[0], *names[key][1:]]

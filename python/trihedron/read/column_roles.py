@@ -43,6 +43,6 @@ def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
         has_file=bool(file_name),
         file=file_name,
         roles=roles,
-        has_rest=bool(rest),
-        rest=rest[:24],
+        has_others=bool(rest),
+        others=rest[:24],
     )

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.subprocesses import check_tables
 
 
@@ -39,7 +39,7 @@ def panics_unprinted() -> Iterator[None]:
                 os.write(2, said)
 
 
-class ReadError(RefusedError):
+class ReadError(InputError):
     """A file that cannot become a recording. The message is one sentence: which file, which line, what to do."""
 
 

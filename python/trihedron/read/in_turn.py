@@ -46,7 +46,7 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
     if chosen.time is None:
         raise ReadError(
             f"{table.path}: rows hold the accelerometer ({len(rows[0])}) or the gyro ({len(rows[1])}) in turn, and no "
-            "column holds the time that would join them; log a time in each row, or both sensors in one row."
+            "column contains the time that would join them; log a time in each row, or both sensors in one row."
         )
     left = int(np.count_nonzero(~(acc | gyr)))
     note = Finding.of(

@@ -17,7 +17,7 @@ from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
 from trihedron.read.memory import columns_table, frame_columns
-from trihedron.read.ros import Stream, choice_note, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
 
 _AXES = {"x", "y", "z"}
@@ -34,7 +34,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     try:
         from matio import load_from_mat
     except ImportError:
-        raise missing_extra(path, "a MATLAB file of tables or timetables", "mat-io", "matlab") from None
+        raise missing_package(path, "a MATLAB file of tables or timetables", "mat-io") from None
     try:
         with warnings.catch_warnings():
             # SciPy, which mat-io uses, warns about internal data of the objects.
@@ -48,7 +48,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     if not found:
         held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
         raise ReadError(
-            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it holds {held[:300]}."
+            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it contains {held[:300]}."
         )
     sha256 = file_sha256(path)
     if choice.topic is None:

@@ -159,7 +159,7 @@ def table_of(data: object) -> Table:
             "of columns."
         )
     if array.dtype.kind not in "iufb":
-        raise ReadError(f"an array of readings holds numbers, got dtype {array.dtype}.")
+        raise ReadError(f"an array of readings contains numbers, got dtype {array.dtype}.")
     columns = tuple(_floats("array", f"column {k + 1}", array[:, k]) for k in range(array.shape[1]))
     return _table("array", None, columns)
 
@@ -287,7 +287,7 @@ def _floats(kind: str, name: str, array: npt.NDArray[Any]) -> FloatArray:
         elif plain.dtype.kind == "m":
             values = _seconds(plain.astype("timedelta64[ns]"))
         elif plain.dtype.kind == "c":
-            raise ReadError(f"{kind}: '{name}' holds complex numbers; readings are real.")
+            raise ReadError(f"{kind}: '{name}' contains complex numbers; readings are real.")
         else:
             values = np.array(plain, dtype=np.float64)
     except (TypeError, ValueError) as error:

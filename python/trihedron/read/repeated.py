@@ -29,12 +29,12 @@ def reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[int
             continue  # not constant: the other rows need no check
         finite = triad[np.isfinite(triad[:, k]), k]
         if len(finite) == 0:
-            raise ReadError(f"{table.path}: column {table.label(column)} of the {name} holds no finite number.")
+            raise ReadError(f"{table.path}: column {table.label(column)} of the {name} contains no finite number.")
         if finite[0] == finite[-1] and np.all(finite == finite[0]):
             if table.n_rows < TOO_FEW_TO_JUDGE:
                 raise ReadError(
-                    f"{table.path}: the file holds {table.n_rows} rows of numbers only, too few for a recording; log "
-                    "for a minute or more."
+                    f"{table.path}: the file contains {table.n_rows} rows of numbers only, too few for a recording; "
+                    "log for a minute or more."
                 )
             raise ReadError(
                 f"{table.path}: column {table.label(column)} of the {name} is {finite[0]:.6g} in all {len(finite)} "

@@ -85,9 +85,9 @@ def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Findin
     return (chosen(words("this-container", kind=kind), taken.name, listed(streams), 0),)
 
 
-def missing_extra(path: Path, what: str, package: str, extra: str) -> ReadError:
+def missing_package(path: Path, what: str, package: str) -> ReadError:
     """The error for a library that is not installed."""
-    return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install 'trihedron[{extra}]'.")
+    return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install {package}.")
 
 
 _IMU = "sensor_msgs/msg/Imu"
@@ -107,7 +107,7 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise missing_extra(path, "a ROS bag or MCAP file", "rosbags", "ros") from None
+        raise missing_package(path, "a ROS bag or MCAP file", "rosbags") from None
     # rosbags recognises the format by the ending of the name, which may be another one.
     with tempfile.TemporaryDirectory() as folder:
         named = path
@@ -137,7 +137,7 @@ def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) 
     streams = [Stream(topic, count) for topic, count in sorted(counts.items())]
     if not streams:
         raise ReadError(
-            f"{path}: no topic of type sensor_msgs/Imu in this bag; it holds {', '.join(others[:12]) or '0 messages'}."
+            f"{path}: no topic of type sensor_msgs/Imu in this bag; there are {', '.join(others[:12]) or '0 messages'}."
         )
     sha256 = file_sha256(path) if path.is_file() else ""
     pair = _pair(streams) if choice.topic is None else None

@@ -58,7 +58,7 @@ def parse_rate_unit(text: str | RateUnit) -> RateUnit:
         ) from None
 
 
-def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
+def static_norm(readings: FloatArray, windows: Windows | None) -> float:
     """Median norm of single accelerometer readings in quiet windows, raw unit.
 
     Single readings are used so that a table of pose means, with one pose per row, gives the same result.
@@ -72,7 +72,7 @@ def judge_accelerometer(
     readings: FloatArray, windows: Windows | None, named: str, given: str | AccelerationUnit | None
 ) -> Judged:
     """Unit of the accelerometer: as given, else as named, else from |a| in quiet windows."""
-    norm = rest_norm(readings, windows)
+    norm = static_norm(readings, windows)
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
@@ -84,9 +84,9 @@ def judge_accelerometer(
         if _is_near(norm, 1000.0):
             return Judged(
                 found,
-                (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", rest_norm=norm),),
+                (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm),),
             )
-        return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", rest_norm=norm),))
+        return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm),))
     lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
     nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
     if _is_near(norm, lengths[nearest]):
@@ -94,15 +94,15 @@ def judge_accelerometer(
         is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
             return Judged(
-                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", rest_norm=norm, unit=nearest.value),)
+                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", static_norm=norm, unit=nearest.value),)
             )
-        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", rest_norm=norm, unit=nearest.value)
+        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=nearest.value)
         return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
-        return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, rest_norm=norm),))
+        return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm),))
     return Judged(
         AccelerationUnit.COUNTS,
-        (Finding.of(FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", rest_norm=norm),),
+        (Finding.of(FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", static_norm=norm),),
     )
 
 
@@ -122,7 +122,7 @@ def _contradiction_accelerometer(unit: AccelerationUnit, norm: float, *, is_give
         "accelerometer",
         unit=unit.value,
         is_given=is_given,
-        rest_norm=norm,
+        static_norm=norm,
         gravities=si / STANDARD_GRAVITY_M_S2,
     )
 
@@ -199,7 +199,7 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
         unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
     return Judged(
         unit,
-        (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", rest=rest, largest=largest, unit=unit.value),),
+        (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", static=rest, largest=largest, unit=unit.value),),
     )
 
 

@@ -104,7 +104,7 @@ def _triad(
         values = table.columns[column]
         if not len(values):
             raise ReadError(
-                f"{table.path}: column {table.label(column)} holds words, not numbers; name another column."
+                f"{table.path}: column {table.label(column)} contains words, not numbers; name another column."
             )
         out[:, k] = values if rows is None else values[rows]
     return out
@@ -123,7 +123,9 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     if not table.is_chosen:
         table = one_device(table, options.choice, chosen)
     if table.n_rows < 2:
-        raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
+        raise ReadError(
+            f"{path}: the file contains one row of numbers only ({table.place(0)}); a recording needs many."
+        )
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
     findings = [*table.findings, *chosen.findings, *columns_of_words(table, chosen)]

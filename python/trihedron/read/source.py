@@ -75,7 +75,7 @@ def read_table(path: Path) -> Table:
     """
     tables = read_tables(path, Choice())
     if len(tables) > 1:
-        raise ReadError(f"{path}: the file holds one table per sensor, and one table is wanted here.")
+        raise ReadError(f"{path}: the file contains one table per sensor, and one table is wanted here.")
     return tables[0]
 
 

@@ -70,8 +70,8 @@ def reject_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_
         is_clock = not has_time and _CLOCK.search(example) is not None
         if is_clock or parse_name(table.names[i]).role == "time":
             raise ReadError(
-                f"{table.path}: column {table.label(i)} holds {example[:40]!r}, which is no time known here; write it "
-                "in seconds or as 2024-03-01 12:00:00.000, or read with --columns time=none --rate HZ."
+                f"{table.path}: column {table.label(i)} contains {example[:40]!r}, which is no time known here; write "
+                "it in seconds or as 2024-03-01 12:00:00.000, or read with --columns time=none --rate HZ."
             )
     if rate_hz is not None or mapping is not None:
         return

@@ -19,7 +19,7 @@ from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
 from trihedron.read.matlab import read_objects
 from trihedron.read.memory import columns_table
-from trihedron.read.ros import Stream, choice_note, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
 
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
@@ -37,7 +37,7 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     try:
         import h5py
     except ImportError:
-        raise missing_extra(path, "an HDF5 (or MATLAB 7.3) file", "h5py", "hdf5") from None
+        raise missing_package(path, "an HDF5 (or MATLAB 7.3) file", "h5py") from None
     groups: Groups = {}
 
     def visit(name: str, node: Any) -> None:
@@ -118,7 +118,9 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
         return Table(path, None, columns, file_sha256(path))
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
-        raise ReadError(f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it holds {held[:300]}.")
+        raise ReadError(
+            f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains {held[:300]}."
+        )
     streams = [Stream(name, table.n_rows) for name, table in tables.items()]
     taken = pick(path, streams, choice, what)
     chosen = tables[taken.topic]

@@ -23,7 +23,7 @@ from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, first_line
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, missing_extra, pick
+from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.records.onboard import Stage
@@ -74,7 +74,7 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     try:
         from pyulog import ULog
     except ImportError:
-        raise missing_extra(path, "a PX4 ULog", "pyulog", "px4") from None
+        raise missing_package(path, "a PX4 ULog", "pyulog") from None
     _check_definitions(path)
     try:
         # pyulog prints messages on stdout, which is reserved for results.

@@ -84,7 +84,9 @@ def _chosen(path: Path, members: list[str], topic: str | None) -> list[str]:
         return []
     found = [n for n in members if topic.lower() in (n.lower(), PurePosixPath(n).stem.lower())]
     if len(found) != 1:
-        raise ReadError(f"{path}: there is no member {topic!r}; the archive holds {', '.join(members) or 'no texts'}.")
+        raise ReadError(
+            f"{path}: there is no member {topic!r}; the archive contains {', '.join(members) or 'no texts'}."
+        )
     return found
 
 

@@ -3,6 +3,7 @@
 One file per subject. A stage takes records and returns records; it never imports another stage.
 """
 
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.calibration import (
     PARAMETER_NAMES,
     Calibration,
@@ -24,7 +25,6 @@ from trihedron.records.kalman import (
     PoseTable,
 )
 from trihedron.records.noise import (
-    AllanCurve,
     GaussMarkov,
     Noise,
     NoiseAxis,

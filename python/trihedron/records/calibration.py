@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
@@ -92,6 +92,11 @@ class SensorCalibration(Frozen):
         Units before and after, and how S and b were found.
     quality, observability : FitQuality, Observability or None
         Residuals pose by pose or move by move, and what the motion determined.
+
+    Examples
+    --------
+    >>> result.accelerometer.S.shape, result.accelerometer.sigma_b.shape
+    ((3, 3), (3,))
     """
 
     S: FloatArray
@@ -162,6 +167,11 @@ class Calibration(Presented):
     averaging : float
         0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
         11.6d); fractions between them are estimates from the rotations.
+
+    Examples
+    --------
+    >>> result.calibration.covariance.shape
+    (24, 24)
     """
 
     accelerometer: SensorCalibration
@@ -193,7 +203,7 @@ class Calibration(Presented):
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
         if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
-            raise RefusedError(f"gravity must be in m/s², got {self.gravity_m_s2}")
+            raise InputError(f"gravity must be in m/s², got {self.gravity_m_s2}")
         freeze(self)
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.frozen import Frozen
 from trihedron.records.pose_noise import Measured
 
@@ -98,8 +98,8 @@ class RecordingFacts(Frozen):
         return RecordingFacts(*(one and one.moved(to) for one in (self.accelerometer, self.gyroscope)))
 
     def of(self, sensor: str) -> ChannelFacts:
-        """The channel properties of one sensor. Raises ``RefusedError`` when the recording lacks that sensor."""
+        """The channel properties of one sensor. Raises ``InputError`` when the recording lacks that sensor."""
         facts = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}[sensor]
         if facts is None:
-            raise RefusedError(f"the recording has no {sensor}")
+            raise InputError(f"the recording has no {sensor}")
         return facts

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 LONGEST_SHOWN = 60
 """Longest text of a wrong value that an error message repeats, in characters."""
@@ -38,7 +38,7 @@ def said(value: Any) -> str:
 def numbers_of(name: str, value: Any) -> npt.NDArray[Any]:
     """An array of real numbers of any shape; masked entries become NaN (missing).
 
-    Raises ``RefusedError`` when it is not an array of numbers.
+    Raises ``InputError`` when it is not an array of numbers.
     """
     try:
         array = np.ma.filled(value.astype(np.float64), np.nan) if np.ma.isMaskedArray(value) else np.asarray(value)
@@ -59,14 +59,14 @@ def number_of(name: str, value: Any) -> float:
     except (OverflowError, ValueError):
         number = math.inf
     if not math.isfinite(number):
-        raise RefusedError(f"{name} is a finite number, not {said(value)}.")
+        raise InputError(f"{name} is a finite number, not {said(value)}.")
     return number
 
 
 def word_of(name: str, value: Any, kind: type[Word]) -> Word:
     """A member of the enumeration ``kind``.
 
-    Raises ``RefusedError`` when it is not a member; the message lists the members while the list is short.
+    Raises ``InputError`` when it is not a member; the message lists the members while the list is short.
     """
     with suppress(ValueError, TypeError):
         return kind(value)

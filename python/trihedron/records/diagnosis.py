@@ -242,6 +242,11 @@ class Diagnosis(Frozen, Plain):
         A given model's parameters and noise beside the recording's; empty without one.
     relations, stages : tuple of Relation, tuple of Stage
         Empirical relations in residuals that no effect explains; prediction errors stage by stage.
+
+    Examples
+    --------
+    >>> trihedron.diagnose(recording, latitude_deg=60.0).alpha
+    0.01
     """
 
     verdict: Verdict

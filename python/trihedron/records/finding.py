@@ -171,6 +171,11 @@ class Finding(Frozen, Plain):
         One sentence with number and place; the likely cause; what to do next.
     numbers : mapping of name to float
         The figures of the sentence for machines (SI units, the unit ends the key: ``gap_s``).
+
+    Examples
+    --------
+    >>> all(finding.seen.endswith(".") for finding in result.findings)
+    True
     """
 
     code: FindingCode

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 FieldType = Literal["u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64"]
 FIELD_TYPES: tuple[FieldType, ...] = get_args(FieldType)
@@ -67,18 +67,18 @@ class FrameDeclaration:
 
     def __post_init__(self) -> None:
         if not self.sync:
-            raise RefusedError(f'{self.name}: a frame needs at least one sync byte, for example sync = "AA 55".')
+            raise InputError(f'{self.name}: a frame needs at least one sync byte, for example sync = "AA 55".')
         if not len(self.sync) < self.length <= 4096:
-            raise RefusedError(f"{self.name}: length {self.length} is not between {len(self.sync) + 1} and 4096 bytes.")
+            raise InputError(f"{self.name}: length {self.length} is not between {len(self.sync) + 1} and 4096 bytes.")
         for field in self.fields:
             if field.at < len(self.sync) or field.at + SIZES[field.type] > self.length:
-                raise RefusedError(f"{self.name}: field {field.name} at byte {field.at} does not fit into the frame.")
+                raise InputError(f"{self.name}: field {field.name} at byte {field.at} does not fit into the frame.")
         if not any(field.role == "value" for field in self.fields):
-            raise RefusedError(f"{self.name}: no field holds a reading; add [[field]] tables with a name and a type.")
+            raise InputError(f"{self.name}: no field holds a reading; add [[field]] tables with a name and a type.")
         if self.checksum != "none":
             end = self.checksum_at + CHECKSUM_SIZES[self.checksum]
             if end > self.length or not 0 <= self.covers_from < self.covers_to <= self.length:
-                raise RefusedError(f"{self.name}: the checksum does not fit into a frame of {self.length} bytes.")
+                raise InputError(f"{self.name}: the checksum does not fit into a frame of {self.length} bytes.")
 
     @property
     def values(self) -> tuple[FrameField, ...]:

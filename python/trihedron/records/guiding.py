@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 LEAST_POSES = 12
 """Nine parameters of the accelerometer and three poses more: residuals with three degrees of freedom."""
@@ -27,7 +27,7 @@ class Accuracy:
     def parse(cls, text: str) -> Accuracy:
         """From ``"accel 0.05 %, gyro 0.1 %"``; a sensor that is not named keeps its default.
 
-        Raises ``RefusedError`` when a part is not understood.
+        Raises ``InputError`` when a part is not understood.
         """
         chosen: dict[str, float] = {}
         for part in (piece.strip() for piece in text.split(",") if piece.strip()):
@@ -37,7 +37,7 @@ class Accuracy:
             except ValueError:
                 size = 0.0
             if found is None or not 0.0 < size < 0.2:
-                raise RefusedError(
+                raise InputError(
                     f"--accuracy: '{part}' is not understood; write for example \"accel 0.05 %, gyro 0.1 %\"."
                 )
             chosen["accelerometer" if found.group(1).startswith("acc") else "gyroscope"] = size

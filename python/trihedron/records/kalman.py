@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
@@ -42,7 +42,7 @@ class AxisNoise:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (np.isfinite(value) and value >= 0):
-                raise RefusedError(f"noise coefficient {name} must be zero or positive, got {value}")
+                raise InputError(f"noise coefficient {name} must be zero or positive, got {value}")
 
     def scaled(self, factor: float) -> AxisNoise:
         """The same noise in another unit, or with every amplitude multiplied."""
@@ -108,9 +108,9 @@ class PoseTable:
             np.atleast_1d(np.asarray(roll_deg, dtype=float)),
         )
         if pitch.ndim != 1 or roll.ndim != 1 or (len(pitch) != len(roll) and 1 not in (len(pitch), len(roll))):
-            raise RefusedError(f"pitch and roll must have one entry per pose each, got {pitch.shape} and {roll.shape}")
+            raise InputError(f"pitch and roll must have one entry per pose each, got {pitch.shape} and {roll.shape}")
         if not (np.isfinite(gravity_m_s2) and gravity_m_s2 > 0):
-            raise RefusedError(f"gravity must be positive, got {gravity_m_s2} m/s²")
+            raise InputError(f"gravity must be positive, got {gravity_m_s2} m/s²")
         theta, phi = np.broadcast_arrays(radians_from_degrees(1.0) * pitch, radians_from_degrees(1.0) * roll)
         f = np.column_stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
         return cls(gravity_m_s2 * f, sigma_m_s2=gravity_m_s2 * radians_from_degrees(sigma_angle_deg), source=source)
@@ -118,18 +118,18 @@ class PoseTable:
     def __post_init__(self) -> None:
         f = np.array(self.specific_force, dtype=np.float64)
         if f.ndim != 2 or f.shape[1] != 3 or len(f) == 0:
-            raise RefusedError(f"specific_force must have shape (n, 3) with n ≥ 1, got {f.shape}")
+            raise InputError(f"specific_force must have shape (n, 3) with n ≥ 1, got {f.shape}")
         if not np.all(np.isfinite(f)):
             row = int(np.flatnonzero(~np.isfinite(f).all(axis=1))[0])
-            raise RefusedError(f"pose {row + 1} of the reference table is not finite")
+            raise InputError(f"pose {row + 1} of the reference table is not finite")
         if not (np.isfinite(self.sigma_m_s2) and self.sigma_m_s2 >= 0):
-            raise RefusedError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
+            raise InputError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
         f.setflags(write=False)
         object.__setattr__(self, "specific_force", f)
         for name in ("pose", "start_s", "stop_s"):
             column = getattr(self, name)
             if column is not None and np.shape(column) != (len(f),):
-                raise RefusedError(f"{name} must have one entry per pose ({len(f)}), got shape {np.shape(column)}")
+                raise InputError(f"{name} must have one entry per pose ({len(f)}), got shape {np.shape(column)}")
 
     def __len__(self) -> int:
         return len(self.specific_force)

@@ -1,24 +1,22 @@
-"""Records of noise: the Allan curve, and the noise terms of an axis with their uncertainties."""
+"""Records of noise: the terms of an axis with their uncertainties, and the noise of a log."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
-
-AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
 
 class TermName(str, Enum):
@@ -29,78 +27,6 @@ class TermName(str, Enum):
     BIAS_INSTABILITY = "B"
     RATE_RANDOM_WALK = "K"
     RATE_RAMP = "R"
-
-
-_PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AllanCurve(Presented):
-    """Allan deviations of one or more channels against averaging time. For a single series all arrays are (k,).
-
-    Attributes
-    ----------
-    clusters, tau_s : (k,)
-        Readings per cluster, and the same in seconds.
-    deviation, lower, upper : (k, channels)
-        In the readings' unit, NaN without readings, with the chi-square interval of ``confidence`` (0 to 1).
-    edf, n_terms, weight : (k, channels)
-        Equivalent degrees of freedom; number of terms summed, and the sum of their weights (equal without gaps).
-    kind, rate_hz, n_samples, names, units
-        The estimator (overlapping or not) and the log; ``names`` and ``units`` by channel. ``stride`` is the distance
-        in readings between the starts of clusters: 1, except for long clusters of a streamed log.
-    """
-
-    kind: AllanKind
-    rate_hz: float
-    n_samples: int
-    clusters: npt.NDArray[np.int64]
-    deviation: FloatArray
-    n_terms: npt.NDArray[np.int64]
-    weight: FloatArray
-    edf: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    confidence: float = 0.95
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    stride: int = 1
-
-    def __post_init__(self) -> None:
-        shape = (len(self.clusters), *self.deviation.shape[1:])
-        if len(shape) > 2:
-            raise ValueError(f"deviation must have shape (k,) or (k, channels), got {self.deviation.shape}")
-        for name in _PER_CHANNEL:
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {getattr(self, name).shape}")
-        freeze(self)
-
-    @property
-    def tau_s(self) -> FloatArray:
-        """(k,) averaging times, s."""
-        return np.asarray(self.clusters / self.rate_hz, dtype=np.float64)
-
-    @property
-    def variance(self) -> FloatArray:
-        """(k, channels) squared deviations."""
-        return np.square(self.deviation)
-
-    @property
-    def n_channels(self) -> int:
-        """Number of channels."""
-        return int(self.deviation.shape[1]) if self.deviation.ndim == 2 else 1
-
-    def of_one_series(self) -> AllanCurve:
-        """The curve of one channel with arrays (k,) instead of (k, 1); a ``ValueError`` for several channels."""
-        if self.n_channels > 1:
-            raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
-        flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
-        return replace(self, **flat)
-
-    def __repr__(self) -> str:
-        span = f"{self.tau_s[0]:.4g} to {self.tau_s[-1]:.4g} s" if len(self.clusters) else "no averaging time"
-        channels = f"{self.n_channels} channel{'s' if self.n_channels > 1 else ''}"
-        return f"<AllanCurve {self.kind}: {channels}, {len(self.clusters)} averaging times from {span}>"
 
 
 @dataclass(frozen=True)
@@ -206,7 +132,7 @@ class NoiseAxis(Frozen):
     def __post_init__(self) -> None:
         missing = [term.value for term in TermName if term not in self.terms]
         if missing:
-            raise RefusedError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
+            raise InputError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
         freeze(self)
 
     def value(self, symbol: TermName | str) -> float:
@@ -257,11 +183,11 @@ class NoiseAxis(Frozen):
         for one bias that is fitted to all poses.
         """
         if not window_s > 0:
-            raise RefusedError(f"a window must last longer than 0 s, got {window_s}")
+            raise InputError(f"a window must last longer than 0 s, got {window_s}")
         if session_s is None:
             return float(self.allan_variance(window_s)[0])
         if session_s < window_s:
-            raise RefusedError(f"a session of {session_s} s holds no window of {window_s} s")
+            raise InputError(f"a session of {session_s} s holds no window of {window_s} s")
         Q, N, B, K, R = (self.fitted(term) for term in TermName)
         t, d = window_s, session_s
         total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)
@@ -316,6 +242,12 @@ class Noise(Presented):
         Intervals [s] that were excluded; instants [s] where the level jumped and the fit starts anew.
     source, findings
         The log and its findings.
+
+    Examples
+    --------
+    >>> found = trihedron.identify_noise(recording.gyroscope[:2000, 0], recording.rate_hz)
+    >>> len(found.axes), found.curve.rate_hz == recording.rate_hz
+    (1, True)
     """
 
     axes: tuple[NoiseAxis, ...]

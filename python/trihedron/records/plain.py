@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_origin
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.frozen import thawed
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
     try:
         return _converter().structure(document, kind)
     except ForbiddenExtraKeysError as error:
-        raise RefusedError(f"{kind.__name__} has no {', '.join(sorted(error.extra_fields))}") from None
+        raise InputError(f"{kind.__name__} has no {', '.join(sorted(error.extra_fields))}") from None
 
 
 @cache

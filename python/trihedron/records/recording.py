@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from trihedron.answers import ask
 from trihedron.arrays import CORE_MEMORY, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
@@ -42,7 +42,7 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
         want is not None and got != want for got, want in zip(out.shape, shape, strict=True)
     ):
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
-        raise RefusedError(f"{name} must have shape {wanted}, got {out.shape}")
+        raise InputError(f"{name} must have shape {wanted}, got {out.shape}")
     out.setflags(write=False)
     return out
 
@@ -112,6 +112,12 @@ class Recording(Presented):
     ------
     ValueError
         When shapes disagree or time runs backward.
+
+    Examples
+    --------
+    >>> static = trihedron.Recording(np.arange(200) / 100.0, np.tile([0.0, 0.0, 9.81], (200, 1)), None, 100.0)
+    >>> static.n_samples, static.duration_s
+    (200, 2.0)
     """
 
     time_s: FloatArray
@@ -136,13 +142,13 @@ class Recording(Presented):
         time_s = _readonly(self.time_s, "time_s", (None,))
         n = len(time_s)
         if n == 0:
-            raise RefusedError("a recording needs at least one sample")
+            raise InputError("a recording needs at least one sample")
         # A non-decreasing sequence between finite ends has no NaN and no infinity.
         if not (np.isfinite(time_s[0]) and np.isfinite(time_s[-1]) and np.all(time_s[1:] >= time_s[:-1])):
-            raise RefusedError("time_s must be finite and non-decreasing")
+            raise InputError("time_s must be finite and non-decreasing")
         object.__setattr__(self, "time_s", time_s)
         if self.accelerometer is None and self.gyroscope is None:
-            raise RefusedError("a recording needs an accelerometer or a gyroscope")
+            raise InputError("a recording needs an accelerometer or a gyroscope")
         for name in ("accelerometer", "gyroscope"):
             value = getattr(self, name)
             if value is not None:
@@ -152,7 +158,7 @@ class Recording(Presented):
             if value is not None:
                 object.__setattr__(self, name, _readonly(value, name, (n,)))
         if number_of("rate_hz", self.rate_hz) <= 0.0:
-            raise RefusedError(f"rate_hz must be a positive number, got {self.rate_hz}")
+            raise InputError(f"rate_hz must be a positive number, got {self.rate_hz}")
         number_of("start_epoch_s", self.start_epoch_s)
         units = (("accelerometer_unit", AccelerationUnit), ("gyroscope_unit", RateUnit))
         for name, kind in units:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
 
@@ -40,9 +40,9 @@ class ReferenceMotion:
     def __post_init__(self) -> None:
         n = len(self.time_s)
         if n < 2 or not np.all(np.isfinite(self.time_s)) or np.any(np.diff(self.time_s) <= 0.0):
-            raise RefusedError("a reference needs at least two rows with times that increase")
+            raise InputError("a reference needs at least two rows with times that increase")
         if self.attitude is None and self.rate is None:
-            raise RefusedError("a reference needs attitude or rate")
+            raise InputError("a reference needs attitude or rate")
         for name, shape in (
             ("attitude", (n, 3, 3)),
             ("rate", (n, 3)),
@@ -51,7 +51,7 @@ class ReferenceMotion:
         ):
             value = getattr(self, name)
             if value is not None and value.shape != shape:
-                raise RefusedError(f"{name} must have shape {shape}, got {value.shape}")
+                raise InputError(f"{name} must have shape {shape}, got {value.shape}")
 
     @property
     def kind(self) -> str:

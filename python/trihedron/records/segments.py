@@ -96,6 +96,12 @@ class Segments(Presented):
         Unit vectors in raw units along which |f| grows fastest, and the standard error of the mean along them, NaN
         where only those of the axes are known: a settling body rotates gravity, which leaves |f| unchanged. None where
         the vertical is unknown.
+
+    Examples
+    --------
+    >>> segments = trihedron.segment(recording)
+    >>> len(segments.moves) == segments.n_poses - 1
+    True
     """
 
     poses: tuple[Pose, ...]

@@ -62,6 +62,12 @@ class Truth(Frozen):
         Scenario and seed; both together reproduce the log.
     kept : (n,) of int
         For every row the index of the sample instant it came from: gaps are lost samples.
+
+    Examples
+    --------
+    >>> simulated, truth = trihedron.simulate("hand-session", 3)
+    >>> truth.specific_force_m_s2.shape == simulated.accelerometer.shape
+    True
     """
 
     accelerometer_time_s: FloatArray

@@ -88,4 +88,4 @@ def axes_of(sensor: SensorCalibration) -> Axes:
 
 def term_in_print(term: str) -> str:
     """A term of compared noise and sampling: figures of the poses are distinct from those of the whole log."""
-    return {"bandwidth": "bandwidth in the poses", "jitter": "timestamp error"}.get(term, term)
+    return {"bandwidth": "-3 dB bandwidth in the poses", "jitter": "timestamp scatter"}.get(term, term)

@@ -226,8 +226,8 @@ def _reach(values: list[FloatArray], scale: Scale) -> tuple[float, float]:
         return (1.0, 10.0) if scale.is_log else (0.0, 1.0)
     low, high = float(every.min()), float(every.max())
     if scale.is_log:
-        room = max(1.3, (high / low) ** 0.06)
-        return low / room, high * room
-    room = 0.06 * (high - low) or 0.5 * abs(high) or 0.5
+        margin = max(1.3, (high / low) ** 0.06)
+        return low / margin, high * margin
+    margin = 0.06 * (high - low) or 0.5 * abs(high) or 0.5
     # For a quantity that is never negative the axis starts at 0.
-    return (0.0 if low == 0.0 else low - room), (0.0 if high == 0.0 and low < 0.0 else high + room)
+    return (0.0 if low == 0.0 else low - margin), (0.0 if high == 0.0 and low < 0.0 else high + margin)

@@ -105,6 +105,17 @@ def _distrust(diagnosis: Diagnosis) -> str:
     return f" The calibration without effects is not to be trusted: {opening(serious[0])}." if serious else ""
 
 
+def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Both figures of the time error side by side, where the timestamps scatter about an even clock."""
+    recording = getattr(diagnosis, "recording", None)
+    timing = next((one for one in diagnosis.domains if one.domain == "timing"), None)
+    scatter_s = 0.0 if recording is None else recording.sampling.timestamp_error_s
+    if timing is None or scatter_s == 0.0:
+        return ()
+    head = ("time error", "timestamps about an even clock", "samples about that clock, seen in motion")
+    return (Table(head, (("rms", size_in_words(scatter_s, timing.unit), rms_in_words(timing)),)),)
+
+
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     after = {d.domain: d for d in diagnosis.remaining}
     # Most important columns first: on a narrow terminal the others move below.
@@ -122,7 +133,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
     caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
-    blocks: list[Block] = [Table(head, tuple(rows), caption)]
+    blocks: list[Block] = [Table(head, tuple(rows), caption), *_time_errors(diagnosis)]
     # Parameters that differ have a section of their own.
     places = tuple(
         (MEANING[d.domain], place)

@@ -44,8 +44,8 @@ def before_after_chart(residuals: DomainResiduals, *, has_effects: bool, lines: 
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")
     times = np.concatenate([np.ravel(time_s) for _, time_s, *_ in sides])
     start, end = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
-    room = 0.02 * (end - start) or 1.0
-    x = Scale("time [s]", "s", limits=(max(start - room, min(start, 0.0)), end + room))
+    margin = 0.02 * (end - start) or 1.0
+    x = Scale("time [s]", "s", limits=(max(start - margin, min(start, 0.0)), end + margin))
     y = Scale(f"{residuals.quantity} [{unit}]", unit, limits=(low, high))
     panels = []
     for title, time_s, value, sigma, names in sides:

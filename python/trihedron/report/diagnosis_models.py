@@ -50,13 +50,13 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             if corner is not None:
                 words += f"; bias random walk beyond {plain_number(float(corner))} s"
             facts.append((f"{name} noise", words))
-        hidden = diagnosis.noise.get(f"{name}_bias")
-        if hidden:
-            bound = ", at its upper bound" if hidden["is_at_edge"] else ""
-            words = f"changes {size_in_words(hidden['rms'], si)} RMS between poses (random walk{bound})"
-            words += f"; uncertainty of a pose's mean {size_in_words(hidden['noise'], si)}"
-            if "flicker" in hidden:
-                words += f", {size_in_words(hidden['flicker'], si)} of it flicker noise seen inside poses"
+        changes = diagnosis.noise.get(f"{name}_bias")
+        if changes:
+            bound = ", at its upper bound" if changes["is_at_edge"] else ""
+            words = f"changes {size_in_words(changes['rms'], si)} RMS between poses (random walk{bound})"
+            words += f"; uncertainty of a pose's mean {size_in_words(changes['noise'], si)}"
+            if "flicker" in changes:
+                words += f", {size_in_words(changes['flicker'], si)} of it flicker noise seen inside poses"
             facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)

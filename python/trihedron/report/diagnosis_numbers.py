@@ -204,9 +204,9 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
     kept = {stage.stage for stage in stages}
     same = [stage.stage for stage in diagnosis.stages if stage.stage not in kept]
     caption = "Cross-validated rms after each stage, with χ²/dof (1 by noise and uncertainty alone) in brackets"
-    caption += f"; no change by {' and '.join(same)}" if same else ""
+    caption += f"; stages without change: {', '.join(same)}" if same else ""
     unchanged = [size.get(d, d) for d in units if d not in changed]
-    caption += f"; {' and '.join(unchanged)}: no change in any stage" if unchanged else ""
+    caption += f"; the same in every stage: {', '.join(unchanged)}" if unchanged else ""
     return (Table(("rms", *(stage.stage.replace("-", " ") for stage in stages)), rows, caption),)
 
 

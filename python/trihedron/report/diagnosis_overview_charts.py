@@ -27,7 +27,7 @@ BESIDE = 0.15
 """Offset of the dots without effects above the middle of a row, and with effects below it, in rows."""
 FEWEST_DOMAINS = 2
 """Fewest domains for which the chart is drawn; for one the table is enough."""
-ROOM = 1.6
+MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
 WINDOW_S = 6.0
@@ -64,7 +64,7 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     with_them = np.array([after.get(d.domain, math.nan) for d in tests])
     limit = np.array([d.limit or math.nan for d in tests])
     seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
-    low, high = float(seen.min()) / ROOM, float(seen.max()) * ROOM
+    low, high = float(seen.min()) / MARGIN, float(seen.max()) * MARGIN
     tips = [f"{what}: agrees up to χ²/dof {plain_number(v)}" for what, v in zip(names, limit, strict=True)]
     base = np.full(len(tests), low)
     marks: list[Mark] = [Level(x=1.0, name="noise alone", is_dashed=True)]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.report.document import Picture
 
 
-class NoFiguresError(RefusedError):
+class NoFiguresError(InputError):
     """Figures are requested, but matplotlib is not installed."""
 
 
@@ -31,6 +31,6 @@ def figures() -> ModuleType:
 
 def png_of(picture: Picture) -> bytes:
     """A figure as the bytes of a PNG file; raises as :func:`figures` does."""
-    room = figures()
-    made: bytes = room.png(room.draw_chart(picture.chart))
+    library = figures()
+    made: bytes = library.png(library.draw_chart(picture.chart))
     return made

@@ -111,7 +111,7 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
-    room = max(around[0], _letters(y_ticks))
+    label_width = max(around[0], _letters(y_ticks))
     dense = " dense" if sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS else ""
     words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
     notes = "".join(_note(note, at) for note in words)
@@ -127,7 +127,7 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
         spec += f' data-xnames="{escape("|".join(panel.x.names))}"'
     spec += f' data-ynames="{escape("|".join(panel.y.names))}"' if panel.y.names else ""
     return (
-        f'<div class="panel" {spec} style="--room:{room}ch;--high:{panel.height_px}px">{title}'
+        f'<div class="panel" {spec} style="--labels:{label_width}ch;--high:{panel.height_px}px">{title}'
         f'<div class="ylabel">{escape(panel.y.label)}</div>'
         f'<div class="yticks" aria-hidden="true">{y_words}</div>'
         f'<div class="plot"><svg role="img" aria-label="{escape(about)}" viewBox="0 0 {UNITS} {UNITS}" '

@@ -194,9 +194,9 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
 def rest_panels(effect: AcceptedEffect) -> list[Panel]:
     """Of a static log: bias about its mean and its polynomial of temperature, axis by axis, or its drift over time."""
     variant, series = effect.model.get("variant"), effect.model.get("curve", {})
-    if variant == "rest-curve" and "temperature_degc" in series:
+    if variant == "static-curve" and "temperature_degc" in series:
         return _over_temperature(effect)
-    return [_over_time(effect)] if variant == "rest-drift" else []
+    return [_over_time(effect)] if variant == "static-drift" else []
 
 
 def _over_temperature(effect: AcceptedEffect) -> list[Panel]:

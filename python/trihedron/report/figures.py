@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.report.chart import (
     Band,
     Bars,
@@ -83,7 +83,7 @@ def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
     if len(axes) == 1:
         laid_out = laid_out[:1]
     if len(axes) != len(laid_out):
-        raise RefusedError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
+        raise InputError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
     for axis, panel in zip(axes, laid_out, strict=True):
         _draw_any(axis, panel)
         if isinstance(panel, Panel):

@@ -16,7 +16,7 @@ from trihedron.report.document import Block, Document, Facts, Headline, Picture,
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
 from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 from trihedron.units import degrees_from_radians
 
 OF_SENSOR = {
@@ -60,7 +60,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",
-        subtitle=printable(found.source),
+        subtitle=escaped(found.source),
         verdict=verdict_of(found.findings, _good(found), "Usable", "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
@@ -134,7 +134,7 @@ def _factor(value: Bounded, static: Bounded | None) -> str:
 def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
     facts = []
     if found.reference_source:
-        facts.append(("reference", printable(found.reference_source)))
+        facts.append(("reference", escaped(found.reference_source)))
     for one in found.sensors:
         if one.bias.kind == "gauss-markov":
             sigma, tau = plain_number(one.bias.sigma), plain_number(one.bias.correlation_time_s)

@@ -103,7 +103,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     usable = [log for log in summary.logs if _is_usable(log)]
     again = [log.name for log in summary.logs if not _is_usable(log)]
     opened = [log.name for log in usable if log.verdict in OPEN]
-    steps = [f"state the units if {_first(moved)} holds several ({BY_FILE})"] if moved else []
+    steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"record again {_first(again)}"] if again else []
     steps += [f"diagnose {_first(opened)}"] if opened else []
     steps += [f"look at {_first(strays)}"] if strays else []
@@ -206,7 +206,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
     said += "departures from 90°."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
-    return [Paragraph(said), Table(tuple(head), tuple(rows), "Scatter between devices and of one device")]
+    return [Paragraph(said), Table(tuple(head), tuple(rows), "Standard deviations between devices and of one device")]
 
 
 def _outliers(summary: FleetSummary) -> list[Block]:

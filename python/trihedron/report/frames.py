@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import AXES
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import (
     PARAMETER_NAMES,
     AllanCurve,
@@ -40,11 +40,11 @@ def made_by(library: str, columns: Columns) -> Any:
         When the library is another one, or not installed.
     """
     if library not in {"polars", "pandas"}:
-        raise RefusedError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
+        raise InputError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
     try:
         frames = import_module(library)
     except ModuleNotFoundError:
-        raise RefusedError(f"{library} is not installed: pip install {library}.") from None
+        raise InputError(f"{library} is not installed: pip install {library}.") from None
     # Copies: polars warns about read-only NumPy arrays, and both libraries then own the data.
     owned = {name: np.array(of) if isinstance(of, np.ndarray) else list(of) for name, of in columns.items()}
     return frames.DataFrame(owned)

@@ -11,7 +11,7 @@ from trihedron.records.published import published_figures
 from trihedron.records.sessions import Session, SessionsModel
 from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import channels_record
-from trihedron.sanitise import printable_json
+from trihedron.sanitise import escaped_json
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def recording_record(recording: Recording) -> dict[str, Any]:
 
 def json_text(machine: dict[str, Any]) -> str:
     """Strict JSON; non-finite numbers are ``null``."""
-    return printable_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+    return escaped_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def curve_record(curve: AllanCurve) -> dict[str, Any]:

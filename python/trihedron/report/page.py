@@ -20,7 +20,7 @@ from trihedron.report.document import Block, Code, Document, Facts, FindingList,
 from trihedron.report.drawn import drawn
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import how_many
-from trihedron.sanitise import one_line, printable
+from trihedron.sanitise import escaped, one_line
 
 KINDS: dict[type, str] = {
     Paragraph: "paragraph",
@@ -66,7 +66,7 @@ def to_html(document: Document) -> str:
         script=Markup(script),
         policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
     )
-    return printable(page)
+    return escaped(page)
 
 
 def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:

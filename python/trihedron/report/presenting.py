@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import write_whole
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
@@ -169,20 +169,20 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
 
     Examples
     --------
-    >>> trihedron.plot(result, "residuals").savefig("residuals.png")  # doctest: +SKIP
+    >>> trihedron.plot(result, "residuals").savefig("residuals.png")
     """
     there = pictures(result)
     chosen = next(iter(there), None) if name is None else name
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
-        raise RefusedError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
+        raise InputError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
     chart = there[chosen].chart
     if ax is None:
         made: Figure = figures().draw_chart(chart)
         return made
     axes = list(ax) if isinstance(ax, Iterable) else [ax]
     if not all(hasattr(one, "fill_between") for one in axes):
-        raise RefusedError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
+        raise InputError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
     drawn_on: Figure = figures().draw_onto(chart, axes)
     return drawn_on
 

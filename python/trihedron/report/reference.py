@@ -16,7 +16,7 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark,
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope
 from trihedron.report.numbers import each_with_sigma, engineering_exponent, plain_number, power_of_ten, with_sigma
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
@@ -99,7 +99,7 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
         ("reference", "its slow error", "gyro bias [°/s]", "clock rate [ppm]"),
         tuple(
             (
-                printable(one.source),
+                escaped(one.source),
                 _slow(one.error) + (", not independent" if one.error.signs else ""),
                 ", ".join(each_with_sigma(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), DEGREES)),
                 "–" if one.clock_rate_ppm is None else with_sigma(*one.clock_rate_ppm),
@@ -111,7 +111,7 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
     effects = tuple(_effect(ident, one) for ident, one in references[0].effects.items())
     drawn = [error_picture(one, f"reference-error-{k}") for k, one in enumerate(references, 1)]
     pictures = [
-        replace(picture, caption=f"{printable(one.source)}. {picture.caption}")
+        replace(picture, caption=f"{escaped(one.source)}. {picture.caption}")
         for picture, one in zip(drawn, references, strict=True)
         if picture is not None
     ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.output import check_report
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.plain import is_array
@@ -30,7 +30,7 @@ DIGITS = 6
 """Significant digits of a drawn value: a 4k screen shows four."""
 
 
-class NotAReportError(RefusedError):
+class NotAReportError(InputError):
     """A saved result without a report, or with one of another program."""
 
 

@@ -28,7 +28,10 @@ DRIFTING = {
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = "Use the common parameters (`... -o common.json` writes them): their uncertainty is that of the next recording."
+NEXT = (
+    "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`. Their uncertainty is that "
+)
+NEXT += "of the next recording."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -59,7 +62,7 @@ def sessions_report(model: SessionsModel) -> Document:
         parameters = listed(list(dict.fromkeys(change.id for change in changed)))
         usable = f"{how_many(n, 'recording')} of which {parameters} changed"
     return Document(
-        title="Many recordings",
+        title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
         verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
-from trihedron.sanitise import one_line, printable
+from trihedron.sanitise import escaped, one_line
 
 WIDTH = 100
 """Columns of a report in a file, a pipe or a notebook."""
@@ -25,7 +25,7 @@ _FEWEST, _FEWEST_OF_HEADS = 16, 9
 # The sixteen ANSI colours, which follow the terminal's theme.
 _COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
 _BOLD, _DIM = "1", "2"
-Grid = list[list[list[str]]]
+InLines = list[list[list[str]]]
 """Rows of cells, each of one line or more; the first row is the head."""
 
 
@@ -43,7 +43,7 @@ class Style:
 
     def plain(self, text: str) -> str:
         """The text with control characters escaped, since names in logs are untrusted, and in ASCII if needed."""
-        return printable(ascii_of(text) if self.is_ascii else text)
+        return escaped(ascii_of(text) if self.is_ascii else text)
 
 
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
@@ -101,8 +101,8 @@ def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
     # A command that fits in a line is not broken, so that it can be copied.
-    room = width - max(len(first), len(rest)) - 1
-    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= room else found[0], text)
+    most = width - max(len(first), len(rest)) - 1
+    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= most else found[0], text)
     lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )
@@ -137,47 +137,47 @@ def _table(table: Table, style: Style) -> list[str]:
     """The first layout in which all columns fit, else the one with the fewest parts."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
     found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
-    grid, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
-    widths = _widths(grid)
+    in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
+    widths = _widths(in_lines)
     out = _wrap(style.plain(table.caption), style.width) if table.caption else []
     for n, part in enumerate(_parts(widths, style.width, gap)):
         if n:
             names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[1:])
             out += ["", *_wrap(f"(continued: {names})", style.width)]
-        head, *body = (_line(row, part, widths, (style.width, gap)) for row in grid)
+        head, *body = (_line(row, part, widths, (style.width, gap)) for row in in_lines)
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
         out += [line for row in body for line in row]
     return out
 
 
-def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     return [[[cell] for cell in row] for row in rows], _GAP
 
 
-def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     """Heads wrapped to the width of their columns."""
-    grid, gap = _as_it_is(rows)
-    return [_heads(rows[0], grid[1:]), *grid[1:]], gap
+    in_lines, gap = _as_it_is(rows)
+    return [_heads(rows[0], in_lines[1:]), *in_lines[1:]], gap
 
 
-def _heads(heads: Sequence[str], below: Grid) -> list[list[str]]:
-    room = _widths(below) if below else [0] * len(heads)
-    return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, room, strict=True)]
+def _heads(heads: Sequence[str], below: InLines) -> list[list[str]]:
+    widest = _widths(below) if below else [0] * len(heads)
+    return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, widest, strict=True)]
 
 
-def _stacked(rows: Sequence[Sequence[str]]) -> tuple[Grid, int]:
+def _stacked(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
     """Heads wrapped, uncertainties below their values, and narrower gaps."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
     return [_heads(rows[0], low), *low], _NARROW_GAP
 
 
-def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[Grid, int]:
+def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[InLines, int]:
     """As :func:`_stacked`, with row names wrapped to the remaining width."""
-    grid, gap = _stacked(rows)
-    room = columns - sum(width + gap for width in _widths(grid)[1:])
-    for row, cells in zip(grid, rows, strict=True):
-        row[0] = _wrap(cells[0], max(room, _FEWEST))
-    return grid, gap
+    in_lines, gap = _stacked(rows)
+    most = columns - sum(width + gap for width in _widths(in_lines)[1:])
+    for row, cells in zip(in_lines, rows, strict=True):
+        row[0] = _wrap(cells[0], max(most, _FEWEST))
+    return in_lines, gap
 
 
 def _in_lines(text: str, most: int) -> list[str]:
@@ -193,13 +193,13 @@ def _below(cell: str) -> list[str]:
     return [value, f"± {rest}"] if sign and value.strip() else [cell]
 
 
-def _widths(grid: Grid) -> list[int]:
-    return [max(_width(line) for row in grid for line in row[k]) for k in range(len(grid[0]))]
+def _widths(in_lines: InLines) -> list[int]:
+    return [max(_width(line) for row in in_lines for line in row[k]) for k in range(len(in_lines[0]))]
 
 
-def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], room: tuple[int, int]) -> list[str]:
-    """One row of a part; ``room`` is (columns, gap); a last cell that is too long is wrapped."""
-    columns, gap = room
+def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], space: tuple[int, int]) -> list[str]:
+    """One row of a part; ``space`` is (columns, gap); a last cell that is too long is wrapped."""
+    columns, gap = space
     high = max(len(row[k]) for k in chosen)
     lines = []
     for n in range(high):

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.channel_facts.at_rest import adc_steps, probe_stride
+from trihedron.channel_facts.static_axes import adc_steps, probe_stride
 from trihedron.records import Recording
 
 BLOCK_S = 0.1

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
 from trihedron.records.recording import Recording
@@ -97,7 +97,7 @@ def measure_noise(
         or segments.accelerometer_sigma_mean is None
         or segments.accelerometer_mean is None
     ):
-        raise RefusedError("the segments state no uncertainty of their pose means")
+        raise InputError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
     sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]

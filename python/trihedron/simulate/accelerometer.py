@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.noise import NoiseTerms
 from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Smoother, Triple, sense_axes
 from trihedron.units import AccelerationUnit
@@ -39,7 +39,7 @@ class ProofMass:
 
     def __post_init__(self) -> None:
         if any(not v > 0.0 for v in (*self.resonance_hz, *self.quality, *self.gap_m)):
-            raise RefusedError("resonance_hz, quality and gap_m of a proof mass must be positive")
+            raise InputError("resonance_hz, quality and gap_m of a proof mass must be positive")
 
     @property
     def deflection(self) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
@@ -137,7 +137,7 @@ def list_scenarios() -> dict[str, str]:
 
 
 def scenario_by_name(name: str) -> Scenario:
-    """A ready-made scenario; raises ``RefusedError`` when no scenario has that name."""
+    """A ready-made scenario; raises ``InputError`` when no scenario has that name."""
     if name not in _SCENARIOS:
-        raise RefusedError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
+        raise InputError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
     return replace(_SCENARIOS[name][1](), name=name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.motion.plan import Label
 from trihedron.simulate.readout import NONE, Triple
 
@@ -33,12 +33,12 @@ class NoiseTerms:
         for name in "QNBKR":
             values = getattr(self, name)
             if any(not np.isfinite(v) or (v < 0.0 and name != "R") for v in values):
-                raise RefusedError(f"noise term {name} must hold three numbers that are not negative, got {values}")
+                raise InputError(f"noise term {name} must hold three numbers that are not negative, got {values}")
 
 
 def _sequence(seed: int, stage: str) -> np.random.SeedSequence:
     if seed < 0:
-        raise RefusedError(f"the seed must not be negative, got {seed}")
+        raise InputError(f"the seed must not be negative, got {seed}")
     return np.random.SeedSequence([seed, zlib.crc32(stage.encode())])
 
 

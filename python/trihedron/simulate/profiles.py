@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer, ProofMass
 from trihedron.simulate.gyroscope import Gyroscope
@@ -173,7 +173,7 @@ PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACT
 
 
 def profile_by_name(name: str) -> Profile:
-    """A class of IMU; raises ``RefusedError`` when no profile has that name."""
+    """A class of IMU; raises ``InputError`` when no profile has that name."""
     if name not in PROFILES:
-        raise RefusedError(f"no profile is called {name!r}{meant(name, PROFILES)}; there are {', '.join(PROFILES)}")
+        raise InputError(f"no profile is called {name!r}{meant(name, PROFILES)}; there are {', '.join(PROFILES)}")
     return PROFILES[name]

@@ -12,7 +12,7 @@ from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]
@@ -28,13 +28,13 @@ def triple(value: Values) -> Triple:
     if isinstance(value, (int, float)):
         return (float(value), float(value), float(value))
     if len(value) != 3:
-        raise RefusedError(f"three numbers, one per axis, are wanted, got {list(value)}")
+        raise InputError(f"three numbers, one per axis, are wanted, got {list(value)}")
     return (float(value[0]), float(value[1]), float(value[2]))
 
 
 def matrix3(rows: Sequence[Values] | FloatArray) -> Matrix:
     if len(rows) != 3:
-        raise RefusedError(f"three rows are wanted, got {len(rows)}")
+        raise InputError(f"three rows are wanted, got {len(rows)}")
     return (triple(rows[0]), triple(rows[1]), triple(rows[2]))
 
 
@@ -114,7 +114,7 @@ class Filter:
 
     def __post_init__(self) -> None:
         if not (self.cutoff_hz >= 0.0 and 1 <= self.order <= 8):
-            raise RefusedError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
+            raise InputError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3); the filter starts in its steady state."""
@@ -142,7 +142,7 @@ class Smoother:
 
     def __post_init__(self) -> None:
         if not (self.corner_hz >= 0.0 and 1 <= self.order <= 6):
-            raise RefusedError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
+            raise InputError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
 
     def feedback(self, dt: float) -> FloatArray:
         """(order + 1,) denominator in powers of 1/z."""
@@ -219,11 +219,11 @@ class Electronics:
 def sense_axes(S: Matrix, name: str) -> tuple[FloatArray, FloatArray]:
     """Unit sensitive directions (3, 3), row by row, and gains (3,) raw per SI: ``S^-1 = diag(gain) · directions``.
 
-    Raises ``RefusedError`` when S cannot be inverted.
+    Raises ``InputError`` when S cannot be inverted.
     """
     matrix = np.asarray(S, dtype=np.float64)
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or np.linalg.cond(matrix) > 1e12:
-        raise RefusedError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
+        raise InputError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
     inverse = np.linalg.inv(matrix)
     gain: FloatArray = np.linalg.norm(inverse, axis=1)
     return inverse / gain[:, None], gain

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.simulate.accelerometer import Accelerometer
@@ -31,7 +31,7 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     """Simulate the motion and the readings of both sensors; return the recording and, separately, the truth.
 
     Every stage draws from its own random stream keyed by ``seed`` and the stage's name: switching one stage on or off,
-    or changing its size, does not change any sample of the others. Raises ``RefusedError`` when the scenario is
+    or changing its size, does not change any sample of the others. Raises ``InputError`` when the scenario is
     impossible; the message names the value in one sentence.
     """
     plan = plan_motion(scenario.motion, stream(seed, "motion"))
@@ -39,7 +39,7 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     accel, gyro = scenario.accelerometer, scenario.gyroscope
     n = len(clock.instants_s) or int(np.floor(plan.duration_s * clock.true_rate_hz + 1e-9))
     if n < 1:
-        raise RefusedError(f"the motion lasts {plan.duration_s:g} s, less than one sample at {clock.rate_hz:g} Hz")
+        raise InputError(f"the motion lasts {plan.duration_s:g} s, less than one sample at {clock.rate_hz:g} Hz")
     true_s = _sample_instants(clock, n, seed)
     gyro_s = true_s + clock.gyroscope_offset_s
 
@@ -168,7 +168,7 @@ def _kept(clock: Clock, true_s: FloatArray, seed: int) -> BoolArray:
     if clock.loss_probability > 0.0:
         kept &= stream(seed, "clock/loss").random(len(true_s)) >= clock.loss_probability
     if not kept.any():
-        raise RefusedError("every sample is lost: lower the losses")
+        raise InputError("every sample is lost: lower the losses")
     return kept
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_north_up, normal_gravity
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
@@ -141,15 +141,13 @@ class Clock:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate_hz < 1e6:
-            raise RefusedError(f"rate_hz must be a positive number, got {self.rate_hz}")
+            raise InputError(f"rate_hz must be a positive number, got {self.rate_hz}")
         if not (0.0 <= self.loss_probability < 1.0 and self.jitter_s >= 0.0 and self.timestamp_jitter_s >= 0.0):
-            raise RefusedError(
-                "loss_probability must be in [0, 1); jitter_s and timestamp_jitter_s must not be negative"
-            )
+            raise InputError("loss_probability must be in [0, 1); jitter_s and timestamp_jitter_s must not be negative")
         if np.any(np.diff(self.instants_s) < 0.0):
-            raise RefusedError("instants_s must not run backward")
+            raise InputError("instants_s must not run backward")
         if not -0.5 < self.rate_error < 0.5:
-            raise RefusedError(f"rate_error is a fraction, got {self.rate_error}")
+            raise InputError(f"rate_error is a fraction, got {self.rate_error}")
 
     @property
     def true_rate_hz(self) -> float:

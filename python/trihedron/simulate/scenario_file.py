@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, of_path, parse_toml, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
@@ -38,21 +38,21 @@ _KEYS = (*_TOP, "accelerometer", "gyroscope", "effect")
 def read_scenario(path: str | Path) -> Scenario:
     """Read a scenario file.
 
-    Raises ``RefusedError`` when the file is not TOML or a table, key or name in it does not exist; the message names
+    Raises ``InputError`` when the file is not TOML or a table, key or name in it does not exist; the message names
     table and key.
     """
     path = Path(path)
     try:
         table = parse_toml(read_text(path, "scenario file"))
     except DocumentError as error:
-        raise RefusedError(of_path(path, error)) from None
+        raise InputError(of_path(path, error)) from None
     try:
         return scenario_from_table(table, path.stem)
     except (TypeError, OverflowError, LookupError):
         kinds = "unit is a whole number, table_tilt_deg two numbers, an effect a table"
-        raise RefusedError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
+        raise InputError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
     except ValueError as error:
-        raise RefusedError(f"{path.name}: {error}") from None
+        raise InputError(f"{path.name}: {error}") from None
 
 
 _TABLES = {"clock": Clock, "environment": Environment, "accelerometer": Accelerometer, "gyroscope": Gyroscope}
@@ -78,11 +78,11 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
     )
     effects = table.get("effect", [])
     if not isinstance(effects, list):
-        raise RefusedError("effects are written as [[effect]], each with its id")
+        raise InputError("effects are written as [[effect]], each with its id")
     for effect in effects:
         size = dict(effect)
         if "id" not in size:
-            raise RefusedError('an [[effect]] needs its id, such as id = "gyro-g-sensitivity"')
+            raise InputError('an [[effect]] needs its id, such as id = "gyro-g-sensitivity"')
         scenario = with_effect(scenario, str(size.pop("id")), **size)
     return scenario
 
@@ -97,14 +97,14 @@ def _environment(table: Any) -> Environment:
 
 def _motion(table: Mapping[str, Any]) -> Motion:
     if "step" in table and "session" in table:
-        raise RefusedError("give either a session or [[step]] tables, not both")
+        raise InputError("give either a session or [[step]] tables, not both")
     if "step" in table:
         steps = []
         for k, entry in enumerate(table["step"]):
             values = dict(entry)
             kind = str(values.pop("kind", ""))
             if kind not in _STEPS:
-                raise RefusedError(f"step {k} is of kind {kind!r}; there are {', '.join(_STEPS)}")
+                raise InputError(f"step {k} is of kind {kind!r}; there are {', '.join(_STEPS)}")
             steps.append(_made(_STEPS[kind], values, f"step {k} ({kind})"))
         start = attitude_with_up(table["start_up"]) if "start_up" in table else LEVEL
         motion = Motion(tuple(steps), start)
@@ -112,19 +112,19 @@ def _motion(table: Mapping[str, Any]) -> Motion:
         values = dict(table.get("session", {"kind": "hand"}))
         kind = str(values.pop("kind", "hand"))
         if kind not in SESSIONS:
-            raise RefusedError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
+            raise InputError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
         values = {key: _tupled(value) for key, value in values.items()}
         for key, value in values.items():
             if isinstance(value, int) and abs(value) > _MOST_POSES:
-                raise RefusedError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
+                raise InputError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
         known = list(inspect.signature(SESSIONS[kind]).parameters)
         for key in values:
             if key not in known:
-                raise RefusedError(f"session {kind}: there is no {key!r}; there are kind, {', '.join(known)}")
+                raise InputError(f"session {kind}: there is no {key!r}; there are kind, {', '.join(known)}")
         try:
             motion = SESSIONS[kind](**values)
         except TypeError as error:
-            raise RefusedError(f"session {kind}: {str(error).split('() ', 1)[-1]}") from None
+            raise InputError(f"session {kind}: {str(error).split('() ', 1)[-1]}") from None
     if "table_tilt_deg" in table:
         a, b = table["table_tilt_deg"]
         motion = dataclasses.replace(motion, table_tilt_deg=(float(a), float(b)))
@@ -141,13 +141,13 @@ def _reject_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: st
             tables = ("clock", "environment", "accelerometer", "gyroscope") if where == "the file" else ()
             homes = [t for t in tables if key in {f.name for f in dataclasses.fields(_TABLES[t])}]
             hint = f" (it belongs in {' or '.join(f'[{t}]' for t in homes)})" if homes else meant(key, known)
-            raise RefusedError(f"{where} has no key {key!r}{hint}; it knows {', '.join(known)}")
+            raise InputError(f"{where} has no key {key!r}{hint}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
     """The dataclass ``base`` with some fields replaced by values of a table."""
     if not isinstance(values, Mapping):
-        raise RefusedError(f"{where} must be a table, got {values!r}")
+        raise InputError(f"{where} must be a table, got {values!r}")
     return dataclasses.replace(base, **_fields(type(base), values, base, where))
 
 
@@ -156,7 +156,7 @@ def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
     try:
         return cls(**_fields(cls, values, None, where))
     except TypeError as error:
-        raise RefusedError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
+        raise InputError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
 
 
 def _fields(cls: type[Any], values: Mapping[str, Any], base: Any, where: str) -> dict[str, Any]:
@@ -176,21 +176,21 @@ def _value(hint: Any, value: Any, base: Any, where: str) -> Any:
         try:
             return hint(value)
         except ValueError:
-            raise RefusedError(f"{where} is one of {', '.join(m.value for m in hint)}, got {value!r}") from None
+            raise InputError(f"{where} is one of {', '.join(m.value for m in hint)}, got {value!r}") from None
     if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value)
     if hint in (bool, int, str) and type(value) is hint:
         return value
-    raise RefusedError(f"{where} must be {getattr(hint, '__name__', hint)}, got {value!r}")
+    raise InputError(f"{where} must be {getattr(hint, '__name__', hint)}, got {value!r}")
 
 
 def _tuple_value(items: tuple[Any, ...], value: Any, where: str) -> Any:
     if len(items) == 2 and items[1] is Ellipsis:
         if not isinstance(value, list):
-            raise RefusedError(f"{where} must be a list, got {value!r}")
+            raise InputError(f"{where} must be a list, got {value!r}")
         return tuple(_value(items[0], v, None, where) for v in value)
     if isinstance(value, (int, float)) and all(item is float for item in items):
         return tuple(float(value) for _ in items)
     if not isinstance(value, list) or len(value) != len(items):
-        raise RefusedError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
+        raise InputError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
     return tuple(_value(item, v, None, where) for item, v in zip(items, value, strict=True))

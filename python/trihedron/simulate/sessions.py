@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.motion.attitude import attitude_with_up
 from trihedron.simulate.motion.steps import Motion, MoveTo, Pose, Step, Turn
 from trihedron.simulate.noise import stream
@@ -46,7 +46,7 @@ def hand_session(
     of the moves, lies ``arm_m`` behind the case (along -X).
     """
     if not (isinstance(n_poses, int) and n_poses >= 1):
-        raise RefusedError(f"n_poses must be a whole number of at least 1 pose, got {n_poses!r}")
+        raise InputError(f"n_poses must be a whole number of at least 1 pose, got {n_poses!r}")
     rng = stream(layout, "hand session")
     fixed = [*FACES, *(EDGES[i] for i in rng.permutation(len(EDGES)))]
     directions = [np.array(d) for d in fixed[:n_poses]]
@@ -83,7 +83,7 @@ def poses_in_order(
 ) -> Motion:
     """One pose for each body direction in ``ups``, pointing up; ``arrive`` adds a move before the first pose."""
     if len(ups) == 0:
-        raise RefusedError("a session of poses needs at least one direction that is held up")
+        raise InputError("a session of poses needs at least one direction that is held up")
     steps: list[Step] = []
     for count, up in enumerate(ups):
         if count or arrive:
@@ -95,7 +95,7 @@ def poses_in_order(
 def six_faces(repeats: int = 1, pose_s: float = 5.0, move_s: float = 3.0) -> Motion:
     """The cube on each of its six faces in turn, ``repeats`` times."""
     if not (isinstance(repeats, int) and repeats >= 1):
-        raise RefusedError(f"repeats must be a whole number of at least 1 round, got {repeats!r}")
+        raise InputError(f"repeats must be a whole number of at least 1 round, got {repeats!r}")
     return poses_in_order(FACES * repeats, pose_s, move_s)
 
 
@@ -112,9 +112,9 @@ def table_turns(
     ``error_deg`` is the standard deviation of the true angle from the stated one, seeded by ``layout``.
     """
     if len(faces) == 0:
-        raise RefusedError("turns on a table need at least one face that the case stands on")
+        raise InputError("turns on a table need at least one face that the case stands on")
     if not speed_deg_s > 0.0:
-        raise RefusedError(f"speed_deg_s must be positive, got {speed_deg_s!r}")
+        raise InputError(f"speed_deg_s must be positive, got {speed_deg_s!r}")
     rng = stream(layout, "table turns")
     steps: list[Step] = [Pose(10.0, name="static")]
     for count, face in enumerate(faces):

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
@@ -36,12 +36,12 @@ _KNOT_S = 0.01
 def twin_motion(recording: Recording, segments: Segments, calibration: Calibration) -> Motion:
     """The poses and moves of a recording.
 
-    Raises ``RefusedError`` when the recording lacks a sensor or has no pose, or the calibration has no gyro.
+    Raises ``InputError`` when the recording lacks a sensor or has no pose, or the calibration has no gyro.
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
-        raise RefusedError("a digital twin needs both sensors in the recording and in the calibration")
+        raise InputError("a digital twin needs both sensors in the recording and in the calibration")
     if not segments.poses:
-        raise RefusedError("a digital twin needs at least one pose; the recording has none")
+        raise InputError("a digital twin needs at least one pose; the recording has none")
     facts = recording.facts
     # Motion that exceeded a sensor's range must exceed it again.
     force = unclipped(_filled(recording.accelerometer), facts.of("accelerometer"))
@@ -50,7 +50,7 @@ def twin_motion(recording: Recording, segments: Segments, calibration: Calibrati
 
 
 def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
-    """A scenario whose simulation repeats a recording; raises ``RefusedError`` as :func:`twin_motion`."""
+    """A scenario whose simulation repeats a recording; raises ``InputError`` as :func:`twin_motion`."""
     motion = twin_motion(recording, segments, calibration)
     assert calibration.gyroscope is not None  # twin_motion checks it
     poses = [(pose.start, pose.stop) for pose in segments.poses]

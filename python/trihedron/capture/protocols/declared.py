@@ -6,7 +6,7 @@ import struct
 
 from trihedron.capture.protocols.contract import Frame
 from trihedron.capture.protocols.framing import CHECKSUM_OF, FramedDecoder
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 
 _CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}
@@ -31,7 +31,7 @@ class DeclaredDecoder(FramedDecoder):
         layout, at = order, 0
         for field in ordered:
             if field.at < at:
-                raise RefusedError(f"{self.name}: field {field.name} overlaps the one before it.")
+                raise InputError(f"{self.name}: field {field.name} overlaps the one before it.")
             layout += f"{field.at - at}x{_CODES[field.type]}"
             at = field.at + SIZES[field.type]
         self._struct = struct.Struct(layout)

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
@@ -96,7 +96,7 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     fit = diagnosis.extended if with_effects else diagnosis.baseline
     tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
-        raise RefusedError("a diagnosis is compared by its covariance, and this one carries none")
+        raise InputError("a diagnosis is compared by its covariance, and this one carries none")
     covariance = np.array(fit.covariance)
     widened = np.ones(len(covariance))
     widened[:12] = np.sqrt(_excess(tests, "static-accel"))

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
-from trihedron.diagnose.relations.signals import NOT_TURNED, ROOM_VECTOR
+from trihedron.diagnose.relations.signals import NOT_TURNED, WORLD_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.domains import Domain, HeldOut
@@ -16,7 +16,7 @@ from trihedron.records.words import relation_experiment, relation_resembles, wor
 OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 AT_REST: dict[str, Domain] = {"gyroscope": "static-gyro", "accelerometer": "static-accel"}
 IN_MOTION: dict[str, Domain] = {"gyroscope": "moves", "accelerometer": "dynamics"}
-ROOM_SIGMAS = 3.0
+WORLD_SIGMAS = 3.0
 """Standard uncertainties within which a coupling is that of Earth rate."""
 
 
@@ -29,8 +29,8 @@ def records(found: Related) -> tuple[Relation, ...]:
         value, covariance = found.model.value(first + k)
         domain = (IN_MOTION if one.signal.is_motion else AT_REST)[one.signal.sensor]
         held = next((h for h in held_out_records(before, after) if h.domain == domain), None)
-        is_room = one.signal.family == "room"
-        out.append(_of_room(value, covariance, held) if is_room else _of_signal(one, value, covariance, held))
+        is_world = one.signal.family == "world"
+        out.append(_of_world_vector(value, covariance, held) if is_world else _of_signal(one, value, covariance, held))
     return tuple(sorted(out, key=lambda relation: -relation.share))
 
 
@@ -70,7 +70,7 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
     )  # fmt: skip
 
 
-def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
+def _of_world_vector(value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
     """``bias = K Rᵀ m``: the coefficients are the products of K with the one vector m along the level axes."""
     coupling, inclination = _coupling(value.reshape(9, 3))
     rng = np.random.default_rng(0)
@@ -78,12 +78,12 @@ def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) ->
     sigma = np.std([k for k, _ in drawn], axis=0)
     spread = float(np.std([angle for _, angle in drawn]))
     away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
-    family = "earth" if away < ROOM_SIGMAS else "room"
+    family = "earth" if away < WORLD_SIGMAS else "world"
     share = _share(held)
     return Relation(
         sensor="gyroscope",
-        depends_on=(ROOM_VECTOR,),
-        form=words("relation-form-room"),
+        depends_on=(WORLD_VECTOR,),
+        form=words("relation-form-world"),
         coefficients=(
             *(
                 EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
@@ -97,7 +97,7 @@ def _of_room(value: FloatArray, covariance: FloatArray, held: HeldOut | None) ->
         resembles=relation_resembles(family),
         experiment=relation_experiment(family),
         statement=words(
-            "relation-follows-room", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
+            "relation-follows-world", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
         ),
     )  # fmt: skip
 

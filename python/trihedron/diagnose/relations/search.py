@@ -13,7 +13,7 @@ from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
-from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, ROOM_VECTOR, Signal, room, signals
+from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, WORLD_VECTOR, Signal, signals, world_vector
 
 ALL_AXES = (0, 1, 2)
 ANY_BY_ANY = ("rate", HISTORY, "rate products")
@@ -127,7 +127,7 @@ Leader = tuple[float, Signal, Way, float]
 
 def _ways(signal: Signal) -> list[Way]:
     """Each variable on each axis and on all of them; of vectors three together, as any axis by any axis."""
-    if signal.family == "room":
+    if signal.family == "world":
         return [(tuple(range(len(signal.names))), ALL_AXES)]
     always = tuple(k for k, name in enumerate(signal.names) if name == NOT_TURNED)
     n = len(signal.names) - len(always)
@@ -146,7 +146,7 @@ def _families(context: Context) -> Iterator[Follows]:
         units = tuple(unit for one in own for unit in one.units)
         together = replace(own[0], names=names, units=units, values=np.hstack([one.values for one in own]))
         yield _follows(context, together, ALL_AXES)
-    yield from _room(context)
+    yield from _world_vector(context)
 
 
 def _part(context: Context, whole: Signal, way: Way, scale: float, cost: float) -> Follows:
@@ -169,12 +169,12 @@ def _follows(context: Context, signal: Signal, axes: tuple[int, ...]) -> Follows
     return Follows(signal, axes, Term(EMPIRICAL, variant, EMPIRICAL.sizes(context, variant)))
 
 
-def _room(context: Context) -> Iterator[Follows]:
-    """Rates that depend on a vector fixed in the room, each gyro separately.
+def _world_vector(context: Context) -> Iterator[Follows]:
+    """Rates that depend on a vector fixed in the world frame, each gyro separately.
 
     Its vertical part alone is a g-sensitivity, an effect of the catalogue: the horizontal parts must add to it.
     """
-    seen = room(context) if context.obs.raw_rate is not None else None
+    seen = world_vector(context) if context.obs.raw_rate is not None else None
     if seen is not None:
-        names = tuple(f"{ROOM_VECTOR} {AXES[j]}{h}" for j in range(3) for h in range(3))
-        yield _follows(context, Signal("gyroscope", "room", names, seen.reshape(len(seen), -1), ("1",) * 9), ALL_AXES)
+        names = tuple(f"{WORLD_VECTOR} {AXES[j]}{h}" for j in range(3) for h in range(3))
+        yield _follows(context, Signal("gyroscope", "world", names, seen.reshape(len(seen), -1), ("1",) * 9), ALL_AXES)

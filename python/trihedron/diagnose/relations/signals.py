@@ -17,7 +17,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 
 Sensor = Literal["accelerometer", "gyroscope"]
-ROOM_VECTOR = "vector fixed in the room"
+WORLD_VECTOR = "vector fixed in the world frame"
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
 """Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
 
@@ -99,7 +99,7 @@ def _warming(context: Context) -> list[Column]:
     return [] if speed is None else [("dT/dt", speed, "K/s")]
 
 
-def room(context: Context) -> FloatArray | None:
+def world_vector(context: Context) -> FloatArray | None:
     """(points, 3, 3) axes of the level frame in body coordinates: two horizontal ones, then the vertical one.
 
     ``None`` where a chain of moves is broken.

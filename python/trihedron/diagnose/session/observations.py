@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
-from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.model import Prior, SessionReadings
 from trihedron.session.noise import along_gradient, measure_noise
+from trihedron.session.static_lines import means_beside_lines
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
@@ -171,9 +171,9 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     recording = recording.with_distinct_timestamps()
     segments, swing = means_beside_lines(recording, segments)
     if recording.accelerometer is None or segments.accelerometer_mean is None:
-        raise RefusedError("a diagnosis needs accelerometer readings: this recording has none")
+        raise InputError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_poses < 2:
-        raise RefusedError(
+        raise InputError(
             f"a diagnosis compares the model with static poses: {segments.n_poses} found, at least 2 are needed"
         )
     t = recording.time_s

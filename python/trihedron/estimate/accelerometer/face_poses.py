@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.segments import Segments
@@ -127,7 +127,7 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     """Face (n,) of each mean reading (n, 3): the axis with the largest reading about the common centre; 0 for none.
 
     The centre is that of the sphere through the readings, so that bias and scale need not be known. With too few poses
-    for a sphere, readings in a physical unit are taken about 0. Raises ``RefusedError`` when the readings determine no
+    for a sphere, readings in a physical unit are taken about 0. Raises ``InputError`` when the readings determine no
     sphere and are in counts.
     """
     centred = _about_centre(means)
@@ -135,7 +135,7 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
         return _nearest(centred)
     if acceleration_to_si(raw_unit) is not None:
         return _nearest(means)
-    raise RefusedError(
+    raise InputError(
         f"{len(means)} poses in counts are too few to identify the faces: record all six faces, or state which "
         "face is up in each pose"
     )
@@ -170,21 +170,21 @@ def _nearest(centred: FloatArray) -> IntArray:
 def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
     """Face (n,) of each mean reading (n, 3): ``up`` where given, else identified from the readings.
 
-    Raises ``RefusedError`` when there are no poses, or as :func:`identify` and :func:`given`.
+    Raises ``InputError`` when there are no poses, or as :func:`identify` and :func:`given`.
     """
     if len(means) == 0:
-        raise RefusedError("no pose was found: keep each of the six faces up and still for some seconds")
+        raise InputError("no pose was found: keep each of the six faces up and still for some seconds")
     return identify(means, raw_unit) if up is None else given(up, len(means))
 
 
 def given(up: Sequence[int], n: int) -> IntArray:
     """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to exclude.
 
-    Raises ``RefusedError`` when ``up`` is not n such numbers.
+    Raises ``InputError`` when ``up`` is not n such numbers.
     """
     faces = np.asarray(up)
     if faces.shape != (n,) or not np.all(np.isin(faces, (0, *FACES))):
-        raise RefusedError(
+        raise InputError(
             f"faces must be {n} numbers, each ±1, ±2 or ±3 (axis up or down) or 0 (left out), got {list(up)}"
         )
     return faces.astype(np.int64)
@@ -193,13 +193,13 @@ def given(up: Sequence[int], n: int) -> IntArray:
 def check_sufficient(faces: IntArray) -> None:
     """Check for four faces of all three axes, which the twelve parameters need.
 
-    Raises ``RefusedError`` naming the missing faces.
+    Raises ``InputError`` naming the missing faces.
     """
     present = {int(face) for face in faces if face}
     missing = [face for face in FACES if face not in present]
     axes = {abs(face) for face in present}
     if len(axes) < 3 or len(present) < 4:
-        raise RefusedError(
+        raise InputError(
             "these faces do not determine the accelerometer's twelve parameters; missing: "
             + ", ".join(face_in_words(face) for face in missing)
         )

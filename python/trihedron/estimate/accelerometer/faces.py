@@ -81,7 +81,7 @@ def calibrate_faces(
 
     ``up`` (n,) of ±1, ±2, ±3 is the axis of the case that points up in each pose (0: the pose is excluded). Without it
     the axis with the largest reading is taken, and a positive reading is taken as up: handedness is then not tested.
-    Raises ``RefusedError`` when shapes do not fit, or naming the faces that are missing.
+    Raises ``InputError`` when shapes do not fit, or naming the faces that are missing.
     """
     values, noise = inputs.pose_means(means, sigma_means)
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
@@ -101,7 +101,7 @@ def calibrate_norm(
 
     When the poses do not determine nine parameters, these have a prior of 10 % about the sphere through the readings,
     which is the uncertainty of undetermined directions, and a SERIOUS finding names the poses to add. Raises
-    ``RefusedError`` when shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the
+    ``InputError`` when shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the
     same.
     """
     values, noise = inputs.pose_means(means, sigma_means)
@@ -121,19 +121,19 @@ def calibrate_norm(
 
 def _settings(g: float, frame: str, loss: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
-        raise RefusedError(
+        raise InputError(
             f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
             "they do not determine the case"
         )
     if loss not in _LOSSES:
-        raise RefusedError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
+        raise InputError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
     number, scale = _LOSSES[loss]
     return _core.NormSettings(g, symmetric=frame == "symmetric", loss=number, loss_scale=scale)
 
 
 def _enough(values: FloatArray) -> None:
     if len(values) < 3:
-        raise RefusedError(
+        raise InputError(
             f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )

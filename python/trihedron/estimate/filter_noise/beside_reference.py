@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.left_over import PER_KELVIN, Left, beside_temperature, left_over, of_temperature
 from trihedron.estimate.filter_noise.strengths import (
@@ -72,10 +72,10 @@ class Request:
 def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Request) -> tuple[SensorFilterNoise, ...]:
     """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude.
 
-    Raises ``RefusedError`` when the reference has no attitude, or log and reference share less than ``LEAST_S``.
+    Raises ``InputError`` when the reference has no attitude, or log and reference share less than ``LEAST_S``.
     """
     if motion.attitude is None:
-        raise RefusedError(f"{motion.source}: the reference holds rates; give attitudes, whose errors do not add up.")
+        raise InputError(f"{motion.source}: the reference holds rates; give attitudes, whose errors do not add up.")
     side = laid_beside(recording, motion, asked.gravity_m_s2)
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
@@ -134,7 +134,7 @@ def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: Sta
 def _reject_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
     shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
     if shared < LEAST_S:
-        raise RefusedError(
+        raise InputError(
             f"{motion.source}: log and reference share {shared:.0f} s without a gap; give at least {LEAST_S:.0f} s."
         )
 

@@ -17,7 +17,7 @@ LONGEST_MOVE_S = 60.0
 """Longest move that is used: over more than a minute the bias may drift arbitrarily."""
 
 
-def at_rest(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
+def static_noise(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
     """Static N and K, rms over the axes with this unit, with 95 % intervals; None where no axis has the unit."""
     own = [axis for axis in axes if axis.unit == unit]
     return StaticNoise(_pooled(own, TermName.WHITE), _pooled(own, TermName.RATE_RANDOM_WALK)) if own else None

@@ -30,7 +30,7 @@ def bridge_clipping(recording: Recording) -> Clipped | None:
     """Replace the gyro's clipped runs by the cubic that continues the slopes on both sides; ``None`` without a limit.
 
     A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T`` has the area ``T² (s₁ − s₂)/12`` above the
-    chord; its standard uncertainty is ``DOUBT`` of it. Raises ``RefusedError`` when the recording has no gyroscope.
+    chord; its standard uncertainty is ``DOUBT`` of it. Raises ``InputError`` when the recording has no gyroscope.
     """
     facts, gyroscope = recording.facts.of("gyroscope"), recording.gyroscope
     if gyroscope is None or not facts.limits:

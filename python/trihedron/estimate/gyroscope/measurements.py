@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dependence, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.turn_rounding import resting_ends
@@ -112,7 +112,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     elif count:
         variance = sums / count
     else:
-        raise RefusedError("the poses are too short to measure the gyro's noise: keep each pose for at least a second")
+        raise InputError("the poses are too short to measure the gyro's noise: keep each pose for at least a second")
     converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
     return np.sqrt(np.maximum(variance, converter))
 
@@ -123,12 +123,12 @@ def measure_moves(
     """Collect pose means, moves and noise; clipped gyro readings are bridged if ``is_bridged``.
 
     A significant dependence of the bias on specific force is subtracted sample by sample: interpolation between two
-    poses would be wrong in the middle of a move. Raises ``RefusedError`` when a sensor is missing or there is no move
+    poses would be wrong in the middle of a move. Raises ``InputError`` when a sensor is missing or there is no move
     between two poses.
     """
     gyroscope, raw_force = recording.gyroscope, recording.accelerometer
     if gyroscope is None or raw_force is None:
-        raise RefusedError(f"the recording has no {'gyroscope' if gyroscope is None else 'accelerometer'}")
+        raise InputError(f"the recording has no {'gyroscope' if gyroscope is None else 'accelerometer'}")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
     assert segments.accelerometer_sigma_mean is not None
     assert segments.gyroscope_sigma_mean is not None
@@ -202,11 +202,11 @@ def measure_moves(
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
     if not moves:
-        raise RefusedError(
+        raise InputError(
             "no move between two poses was found: turn the sensor by hand between poses and keep each for some seconds"
         )
     if moves[-1].stop > recording.n_samples or segments.poses[-1].stop > recording.n_samples:
-        raise RefusedError("the segments reach beyond the recording: they belong to another log")
+        raise InputError("the segments reach beyond the recording: they belong to another log")
     return moves
 
 
@@ -238,7 +238,7 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
-        raise RefusedError("moves need the pose means of both sensors: segment a recording that has both")
+        raise InputError("moves need the pose means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
 
 

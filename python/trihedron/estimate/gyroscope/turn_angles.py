@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron._core import block_differences, integrate_raw_rate
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
@@ -48,11 +48,11 @@ class Turn:
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
-            raise RefusedError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
+            raise InputError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
         if self.angle_rad is not None and not math.isfinite(self.angle_rad):
-            raise RefusedError("the angle of a turn must be finite")
+            raise InputError("the angle of a turn must be finite")
         if not 0.99 < math.hypot(*self.direction) < 1.01:
-            raise RefusedError("the direction of a turn must be a unit vector")
+            raise InputError("the direction of a turn must be a unit vector")
 
     @property
     def axis(self) -> int:
@@ -103,15 +103,15 @@ class MeasuredTurns:
 def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
     """Integrate turns and static intervals; the noise is measured in the static intervals.
 
-    Raises ``RefusedError`` when there is no gyro, no turn, or no static interval, or these are too short to measure the
+    Raises ``InputError`` when there is no gyro, no turn, or no static interval, or these are too short to measure the
     noise.
     """
     if recording.gyroscope is None:
-        raise RefusedError("the recording has no gyroscope")
+        raise InputError("the recording has no gyroscope")
     if not turns:
-        raise RefusedError("--method faces needs turns: none were given and none were found")
+        raise InputError("--method faces needs turns: none were given and none were found")
     if not static:
-        raise RefusedError("--method faces needs a stretch without rotation: keep the sensor still for some seconds")
+        raise InputError("--method faces needs a stretch without rotation: keep the sensor still for some seconds")
     gyroscope, step_s, quantum = recording.gyroscope, 1.0 / recording.rate_hz, recording.facts.of("gyroscope").step
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
@@ -121,7 +121,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[
         gyroscope, static_edges, np.arange(len(static_edges)), max(1, round(BLOCK_S / step_s))
     )
     if count < 4:
-        raise RefusedError(
+        raise InputError(
             "the stretches without rotation are too short to measure the gyro's noise: keep still for some seconds"
         )
     # At least the variance of rounding, which also covers codes that a turn passes through.
@@ -146,7 +146,7 @@ def nominal_matrix(
     """Nominal scale (3, 3), rad/s per raw unit: from stated turns, else as given, else from the unit.
 
     Stated turns have precedence. Turns of unknown size determine no scale: any divisor of their angles would fit.
-    Raises ``RefusedError`` with the question to the user, when readings are counts and neither angles nor a scale are
+    Raises ``InputError`` with the question to the user, when readings are counts and neither angles nor a scale are
     known.
     """
     stated = scale_of_stated(measured, turns)
@@ -155,12 +155,12 @@ def nominal_matrix(
     if nominal_scale is not None:
         value = np.asarray(nominal_scale, dtype=np.float64)
         if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
-            raise RefusedError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
+            raise InputError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
         return value * np.eye(3) if value.ndim == 0 else value
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
         return unit * np.eye(3)
-    raise RefusedError(AMBIGUOUS)
+    raise InputError(AMBIGUOUS)
 
 
 def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.gravity_circle import gravity_circle
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records.calibration import SensorCalibration
@@ -45,7 +45,7 @@ def _stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]
     if len(angles_deg) != len(moves):
         times = ", ".join(f"{recording.time_s[move.start]:.0f}" for move in moves[:12])
         where = f" (at {times}{' ...' if len(moves) > 12 else ''} s)" if moves else ""
-        raise RefusedError(
+        raise InputError(
             f"{len(angles_deg)} turns were stated and {len(moves)} were found between poses of the same tilt{where}: "
             "give one angle in degrees for each, 0 to leave it out."
         )
@@ -75,7 +75,7 @@ def stated_turns(
     """The turns about the vertical by the angles that the user states, positive counter-clockwise seen from above.
 
     The axis of a turn is the table's normal in the body frame, by the centre of gravity's circle. Raises
-    ``RefusedError`` when the numbers of turns and angles differ; the message states when each turn was found.
+    ``InputError`` when the numbers of turns and angles differ; the message states when each turn was found.
     """
     moves = moves_about_vertical(segments, accelerometer, gravity_m_s2)
     return [

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.plan import TurnPlan
 from trihedron.transforms import cross_matrix
 
@@ -22,15 +22,15 @@ def design_turns(
     With ``v = N² Δt + σ_turn²``, ``Q = Σ φ²/v``, ``P = Σ φ Δt/v`` about one axis and ``T = Σ Δt²/v + Δt_0/N²`` of all:
     ``var S = 1/Q + (P/Q)² var b``. By all rows at once ``var b = 1/(T - 3 P²/Q)`` (the manual's problem 4); with
     ``b_w = φ'_0/Δt_0`` from the static interval first, ``var b = N²/Δt_0`` (problem 3). With the noise in rad/s/√Hz the
-    scale is relative and the bias in rad/s. Raises ``RefusedError`` when there is no turn or a figure is not positive.
+    scale is relative and the bias in rad/s. Raises ``InputError`` when there is no turn or a figure is not positive.
     """
     if not 1e-30 < noise_density < 1e30:
-        raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
+        raise InputError(f"a noise density of {noise_density:g} is that of no gyro")
     if sigma_turn_rad < 0.0 or turn_s <= 0.0 or static_s <= 0.0:
-        raise RefusedError("noise and durations must be positive")
+        raise InputError("noise and durations must be positive")
     angles = np.radians([angle for angle in angles_deg if angle != 0.0])
     if not len(angles):
-        raise RefusedError("no turn about any axis: give angles other than 0")
+        raise InputError("no turn about any axis: give angles other than 0")
     weight = 1.0 / (noise_density**2 * turn_s + sigma_turn_rad**2)
     q, p = weight * float(angles @ angles), weight * turn_s * float(np.sum(angles))
     of_static = static_s / noise_density**2

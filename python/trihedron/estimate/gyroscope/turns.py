@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
     SCALE_TOLERANCE,
@@ -49,7 +49,7 @@ def calibrate_turns(
     error of each of m independent errors that all turns share. White rate noise ``N`` [unit/√Hz] gives
     ``var δφ = N² Δt``. The result is the direct form ``ω = S raw + b`` in the frame of the turns' axes.
 
-    Raises ``RefusedError`` when usable turns do not span three axes or there is no static interval; or, with the
+    Raises ``InputError`` when usable turns do not span three axes or there is no static interval; or, with the
     question to the user, when readings are counts and neither the angles nor a nominal scale are given.
     """
     measured = measure_turns(recording, turns, static)
@@ -98,8 +98,8 @@ def _require_every_axis(known: Sequence[KnownTurn], used: BoolArray, recording_i
     if spans_three_axes(np.array([one.turn.direction for one in known])[used]):
         return
     if recording_is_counts and any(turn.is_ambiguous for turn in known):
-        raise RefusedError(AMBIGUOUS)
-    raise RefusedError(
+        raise InputError(AMBIGUOUS)
+    raise InputError(
         f"the {np.count_nonzero(used)} usable turns, of {len(known)}, are about fewer than three directions that are "
         "not in one plane: turn the sensor on a table by known angles on three of its sides, there and back, or give "
         "the angle of each turn"

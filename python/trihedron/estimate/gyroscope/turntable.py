@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
@@ -150,15 +150,15 @@ def on_turntable(
 
     ``speeds_deg_s`` is one for all steady turns, or one a turn in the order of the log; 0 excludes a turn, signs do not
     matter. ``relative_sigma`` is the standard error of the table's speed, common to all turns (0.001: one part in a
-    thousand). Raises ``RefusedError`` when there is no gyro, no steady turn, or another number of them than of speeds.
+    thousand). Raises ``InputError`` when there is no gyro, no steady turn, or another number of them than of speeds.
     """
     if not 0.0 <= number_of("turntable_sigma", relative_sigma) < 0.5:
-        raise RefusedError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")
+        raise InputError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")
     if speeds_deg_s is None:
-        raise RefusedError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
+        raise InputError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
     gyro = calibration.gyroscope
     if gyro is None or recording.gyroscope is None:
-        raise RefusedError("a turntable calibrates the gyro, and this log has none; log poses and moves as well.")
+        raise InputError("a turntable calibrates the gyro, and this log has none; log poses and moves as well.")
     found = plateaus(recording, segments)
     speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0
@@ -196,14 +196,12 @@ def _with(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray)
 def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
     n, given = len(found.spans), np.abs(np.radians(np.asarray(speeds_deg_s, dtype=np.float64)))
     if not np.isfinite(given).all() or not np.any(given > 0.0):
-        raise RefusedError(
-            "speeds of a turntable are numbers in °/s: one for all turns, or one each; 0 leaves one out."
-        )
+        raise InputError("speeds of a turntable are numbers in °/s: one for all turns, or one each; 0 leaves one out.")
     if n == 0:
-        raise RefusedError("no steady turn of a second or longer was found: let the table run at its speed for 5 s.")
+        raise InputError("no steady turn of a second or longer was found: let the table run at its speed for 5 s.")
     if len(given) not in (1, n):
         at = ", ".join(f"{begin / rate_hz:.1f}-{end / rate_hz:.1f}" for begin, end in found.spans[:40])
-        raise RefusedError(
+        raise InputError(
             f"{len(given)} speeds were given and {n} steady turns were found (seconds {at}): "
             "give one for all, or one a turn; 0 leaves a turn out."
         )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import AXES
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
 from trihedron.records.noise import NoiseAxis
@@ -32,7 +32,7 @@ def noise_from_identified(
     """Noise of the three accelerometer axes among the identified ones, in the raw unit of the log to be calibrated.
 
     The axes with a unit of acceleration are used; where there is none (counts), the first three. Raises
-    ``RefusedError`` when there are not three such axes, or their unit cannot be converted to the raw unit.
+    ``InputError`` when there are not three such axes, or their unit cannot be converted to the raw unit.
     """
     out = [_one(axis, AccelerationUnit(raw_unit)) for axis in _accelerometer_axes(axes)]
     return out[0], out[1], out[2]
@@ -43,7 +43,7 @@ def _accelerometer_axes(axes: Sequence[NoiseAxis]) -> list[NoiseAxis]:
     chosen = [axis for axis in axes if axis.unit in units] or list(axes[:3])
     if len(chosen) != 3:
         names = ", ".join(axis.name for axis in axes)
-        raise RefusedError(f"noise of three accelerometer axes is needed, and was identified for {names}")
+        raise InputError(f"noise of three accelerometer axes is needed, and was identified for {names}")
     return chosen
 
 
@@ -51,13 +51,13 @@ def check_same_gravity(axes: Sequence[NoiseAxis], accelerometer: SensorCalibrati
     """Check that a static log measures gravity under the session's calibration, so that its noise applies.
 
     Twice the range halves the noise in counts, which densities do not distinguish from a quieter place. Raises
-    ``RefusedError`` with the gravity that the static log reads, and the remedy.
+    ``InputError`` with the gravity that the static log reads, and the remedy.
     """
     raw_unit = AccelerationUnit(accelerometer.raw_unit)
     mean = np.array([axis.mean * _factor(axis, raw_unit) for axis in _accelerometer_axes(axes)])
     seen = float(np.linalg.norm(accelerometer.S @ mean + accelerometer.b))
     if abs(seen - gravity_m_s2) > LARGEST_MISS_OF_GRAVITY * gravity_m_s2:
-        raise RefusedError(
+        raise InputError(
             f"the static log reads {seen:.3g} m/s² of gravity ({gravity_m_s2:.4g}) as this session is calibrated: "
             "another ADC, range or unit; record the static log with the range, rate and output of the session"
         )
@@ -87,7 +87,7 @@ def _factor(axis: NoiseAxis, raw_unit: AccelerationUnit) -> float:
     is_known = axis.unit in {unit.value for unit in AccelerationUnit}
     has, wanted = acceleration_to_si(AccelerationUnit(axis.unit)) if is_known else None, acceleration_to_si(raw_unit)
     if has is None or wanted is None:
-        raise RefusedError(
+        raise InputError(
             f"the noise of {axis.name} is in {axis.unit or 'an unknown unit'} and the log in {raw_unit.value}: "
             "identify the noise from a log in the same unit"
         )
@@ -104,14 +104,14 @@ def check_same_adc(
     """Check that the noise is of the session's ADC, whose ``steps`` (LSB) and noise ``octaves`` are given by axis.
 
     LSBs are compared where the session's exceeds the noise; densities are of another ADC where they differ by more than
-    a factor in every octave: a filter or a hand's tremor changes only some. Raises ``RefusedError`` naming the axis,
+    a factor in every octave: a filter or a hand's tremor changes only some. Raises ``InputError`` naming the axis,
     both values and the remedy.
     """
     remedy = "record the static log with the range, rate and output of the session"
     for axis, noise, step, seen in zip(AXES, given, steps, octaves, strict=True):
         fast = noise.sample_sigma
         if step > COARSER * noise.resolution and step > fast > 0.0:
-            raise RefusedError(
+            raise InputError(
                 f"the static log is of another ADC than {source}: accelerometer {axis} has a resolution of {step:.3g} "
                 f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
                 f"{noise.resolution:.3g}, would have shown it; {remedy}"
@@ -128,7 +128,7 @@ def check_same_adc(
         if lowest > MOST_ABOVE**2 or highest < 1.0 / MOST_BELOW**2:
             middle = math.sqrt(sorted(r[2] for r in ratios)[len(ratios) // 2])
             words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
-            raise RefusedError(
+            raise InputError(
                 f"the noise of accelerometer {axis} inside the poses of {source} is {words} of the static log, "
                 f"at every frequency: another ADC, range or unit; {remedy}"
             )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import AXES, XYZ, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
 from trihedron.records.calibration import Observability, SensorCalibration
@@ -25,12 +25,12 @@ def start_from_range(readings: npt.ArrayLike, gravity_m_s2: float) -> tuple[Floa
     """Initial scales (3,), biases (3,) in raw units, by the range of mean readings (n, 3): each axis was near the
     vertical, both ways up. The norm does not determine signs: those of the result are positive, as these.
 
-    Raises ``RefusedError`` when an axis did not move.
+    Raises ``InputError`` when an axis did not move.
     """
     a = np.asarray(readings, dtype=np.float64)
     half = np.ptp(a, axis=0) / 2.0
     if np.any(half <= 0):
-        raise RefusedError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up")
+        raise InputError(f"{XYZ[int(np.argmin(half))]} never changed: turn it both ways up")
     return gravity_m_s2 / half, (a.max(axis=0) + a.min(axis=0)) / 2.0
 
 
@@ -75,7 +75,7 @@ class NormFilter:
     def add(self, reading: FloatArray, start_s: float, pose_s: float, extra_variance: FloatArray) -> None:
         """Update with the mean raw reading (3,) of one pose; ``extra_variance`` (3,), raw², adds to the noise model.
 
-        Raises ``RefusedError`` when the reading is not finite or the pose is earlier than the last one.
+        Raises ``InputError`` when the reading is not finite or the pose is earlier than the last one.
         """
         self._filter.add([float(v) for v in reading - self._bias], start_s, pose_s, [float(v) for v in extra_variance])
 
@@ -132,7 +132,7 @@ def calibrate_without_references(
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
 
-    Arguments are those of ``calibrate_with_references``. Raises ``RefusedError`` when shapes disagree, values are not
+    Arguments are those of ``calibrate_with_references``. Raises ``InputError`` when shapes disagree, values are not
     finite, poses are out of order, or there are fewer than nine.
     """
     a = _mean_readings(readings)
@@ -185,12 +185,12 @@ def calibrate_without_references(
 def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
     a = np.array(readings, dtype=np.float64)
     if a.ndim != 2 or a.shape[1] != 3:
-        raise RefusedError(f"readings must have shape (n, 3), got {a.shape}")
+        raise InputError(f"readings must have shape (n, 3), got {a.shape}")
     n = len(a)
     if n < N_PARAMETERS:
-        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: record at least nine, better eighteen")
+        raise InputError(f"{n} poses give {n} equations for nine unknowns: record at least nine, better eighteen")
     if not np.all(np.isfinite(a)):
-        raise RefusedError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
+        raise InputError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
     return a
 
 

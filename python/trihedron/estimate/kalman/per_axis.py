@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -26,7 +26,7 @@ def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, A
     if isinstance(noise, AxisNoise):
         return noise, noise, noise
     if len(noise) != 3:
-        raise RefusedError(f"noise must describe one axis or three, got {len(noise)}")
+        raise InputError(f"noise must describe one axis or three, got {len(noise)}")
     return noise[0], noise[1], noise[2]
 
 
@@ -46,15 +46,13 @@ def calibrate_with_references(
     axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start and length of the poses [s],
     ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model.
 
-    Raises ``RefusedError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
+    Raises ``InputError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
     constants.
     """
     f = table.specific_force
     z = np.array(readings, dtype=np.float64)
     if z.shape != f.shape:
-        raise RefusedError(
-            f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose"
-        )
+        raise InputError(f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose")
     start, pose, extra = pose_arrays(len(f), start_s, pose_s, extra_variance)
     noises = noise_per_axis(noise)
     session = float(start[-1] + pose[-1] - start[0])
@@ -141,13 +139,13 @@ def direct_form(
 ) -> SensorCalibration:
     """``raw = S_a f + b_a`` per axis → ``f = S raw + b`` with its covariance, to first order (docs/kalman.md, eq. 9).
 
-    Raises ``RefusedError`` when the three axes are not independent: no direct form exists.
+    Raises ``InputError`` when the three axes are not independent: no direct form exists.
     """
     inverse_S = np.array([a.constants[:3] for a in axes])
     inverse_b = np.array([a.constants[3] for a in axes])
     scale = np.linalg.norm(inverse_S, axis=1)
     if np.any(scale == 0) or np.linalg.cond(inverse_S / scale[:, None]) > 1e6:
-        raise RefusedError("the three axes read the same component of gravity: the triad cannot be inverted")
+        raise InputError("the three axes read the same component of gravity: the triad cannot be inverted")
     S, b = other_form(inverse_S, inverse_b)
     covariance = np.zeros((12, 12))
     for i, axis in enumerate(axes):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
 from trihedron.estimate.kalman.per_axis import calibrate_with_references
 from trihedron.records import (
@@ -37,17 +37,17 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
     """Means of the poses, matched with a pose table.
 
     With start and stop times the readings are averaged over these; with pose numbers the table selects poses of the
-    log; with neither it must have as many rows as the log has poses. Raises ``RefusedError`` when there is no
+    log; with neither it must have as many rows as the log has poses. Raises ``InputError`` when there is no
     accelerometer, the log has no pose, or table and log do not match.
     """
     a = recording.accelerometer
     if a is None:
-        raise RefusedError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+        raise InputError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     if table is not None and table.start_s is not None and table.stop_s is not None:
         return _timed_means(recording, segments, a, table.start_s, table.stop_s)
     mean, sigma = segments.accelerometer_mean, segments.norm_sigma
     if mean is None or sigma is None or segments.n_poses == 0:
-        raise RefusedError(f"{recording.source}: no pose was found, so there is nothing to calibrate from")
+        raise InputError(f"{recording.source}: no pose was found, so there is nothing to calibrate from")
     step = 1.0 / recording.rate_hz
     start = np.array([recording.time_s[pose.start] for pose in segments.poses])
     length = np.array([recording.time_s[pose.stop - 1] + step for pose in segments.poses]) - start
@@ -56,13 +56,13 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         chosen = np.asarray(table.pose, dtype=np.intp)
         if np.any(chosen >= segments.n_poses):
             worst = int(np.max(chosen)) + 1
-            raise RefusedError(
+            raise InputError(
                 f"{table.source}: pose {worst} is requested, but {recording.source} has {segments.n_poses} poses"
             )
         if np.any(np.diff(chosen) <= 0):
-            raise RefusedError(f"{table.source}: give the poses in the order in which they were recorded, each once")
+            raise InputError(f"{table.source}: give the poses in the order in which they were recorded, each once")
     elif table is not None and len(table) != segments.n_poses:
-        raise RefusedError(
+        raise InputError(
             f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_poses} poses: add "
             "a column 'pose' with the number of the pose (`trihedron segment` lists them), or 'start' and 'stop'"
         )
@@ -80,7 +80,7 @@ def _timed_means(
         rows = a[first:last]
         rows = rows[np.isfinite(rows).all(axis=1)]
         if len(rows) < 2:
-            raise RefusedError(f"pose {i + 1}: the log has {len(rows)} readings from {start:g} s to {stop:g} s")
+            raise InputError(f"pose {i + 1}: the log has {len(rows)} readings from {start:g} s to {stop:g} s")
         mean[i] = rows.mean(axis=0)
         scatter = rows.std(axis=0, ddof=1) if noise is None else noise
         sigma[i] = scatter / np.sqrt(len(rows))
@@ -90,11 +90,11 @@ def _timed_means(
 def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """White noise from the scatter inside the poses, and the LSB where it exceeds that; no slow noise.
 
-    Raises ``RefusedError`` when there is no accelerometer.
+    Raises ``InputError`` when there is no accelerometer.
     """
     a = recording.accelerometer
     if a is None:
-        raise RefusedError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+        raise InputError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     sigma = segments.accelerometer_sigma
     sigma = np.zeros(3) if sigma is None else sigma
     noises, steps = [], recording.facts.of("accelerometer").step
@@ -125,7 +125,7 @@ def calibrate_session(
 ) -> KalmanCalibration:
     """Calibrate the accelerometer of a recording in the known attitudes of a pose table, by all methods for comparison.
 
-    With ``noise`` None white noise and resolution are estimated from the poses, with a finding. Raises ``RefusedError``
+    With ``noise`` None white noise and resolution are estimated from the poses, with a finding. Raises ``InputError``
     when table and log do not match, or the poses do not determine the constants.
     """
     poses = pose_readings(recording, segments, table)
@@ -152,7 +152,7 @@ def calibrate_session_without_references(
 ) -> NormKalmanCalibration:
     """Calibrate the accelerometer of a recording from the norm of gravity in its poses.
 
-    Raises ``RefusedError`` when there are fewer than nine poses.
+    Raises ``InputError`` when there are fewer than nine poses.
     """
     poses = pose_readings(recording, segments)
     used, extra, findings = _noise(recording, segments, noise, poses)

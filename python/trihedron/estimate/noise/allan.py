@@ -12,9 +12,9 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise.gaps import true_share
-from trihedron.records.noise import AllanCurve, AllanKind
+from trihedron.records.allan_curve import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 
@@ -80,12 +80,12 @@ def allan_deviation(
     ((2,), [1.0, 0.09])
     """
     if isinstance(names, str) or isinstance(units, str):
-        raise RefusedError("names and units are lists, one text for each channel.")
+        raise InputError("names and units are lists, one text for each channel.")
     readings = as_readings(x)
     n = len(readings)
     check_question(rate_hz, kind, confidence)
     if n < _LONGEST[kind]:
-        raise RefusedError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
+        raise InputError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
     sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
     variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
     for c in range(len(variance)):
@@ -121,33 +121,33 @@ def as_readings(x: npt.ArrayLike) -> FloatArray:
     if array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2 or array.shape[1] == 0:
-        raise RefusedError(f"readings must have shape (n,) or (n, channels), got {np.shape(x)}")
+        raise InputError(f"readings must have shape (n,) or (n, channels), got {np.shape(x)}")
     if array.dtype not in (np.float64, np.float32, np.int16, np.int32):
         if array.dtype.kind not in "iufb":
-            raise RefusedError(f"readings must be real numbers, got the type {array.dtype}")
+            raise InputError(f"readings must be real numbers, got the type {array.dtype}")
         array = array.astype(np.float64)
     # The kernel reads all four types; signatures name float64 for any of them.
     return np.ascontiguousarray(array)
 
 
 def check_question(rate_hz: float, kind: str, confidence: float) -> None:
-    """Check the arguments of an Allan deviation; raises ``RefusedError`` naming the argument."""
+    """Check the arguments of an Allan deviation; raises ``InputError`` naming the argument."""
     if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+        raise InputError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     if kind not in KINDS:
-        raise RefusedError(f"kind must be one of {', '.join(KINDS)}; got {kind!r}")
+        raise InputError(f"kind must be one of {', '.join(KINDS)}; got {kind!r}")
     if not 0.0 < confidence < 1.0:
-        raise RefusedError(f"confidence must lie between 0 and 1, got {confidence}")
+        raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
 
 
 def checked_clusters(clusters: Sequence[int] | IntArray) -> list[int]:
-    """Cluster sizes as integers; raises ``RefusedError`` when one is not a whole number of at least 1."""
+    """Cluster sizes as integers; raises ``InputError`` when one is not a whole number of at least 1."""
     sizes = np.atleast_1d(np.asarray(clusters))
     if sizes.ndim != 1 or sizes.size == 0:
-        raise RefusedError("clusters must be a list of cluster sizes in readings")
+        raise InputError("clusters must be a list of cluster sizes in readings")
     whole = np.asarray(sizes, dtype=np.float64)
     if not np.all(np.isfinite(whole)) or np.any(whole != np.round(whole)) or np.any(whole < 1):
-        raise RefusedError("clusters are counted in readings: whole numbers of at least 1 (averaging time times rate)")
+        raise InputError("clusters are counted in readings: whole numbers of at least 1 (averaging time times rate)")
     return [int(m) for m in whole]
 
 

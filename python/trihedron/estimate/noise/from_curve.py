@@ -12,14 +12,15 @@ import numpy.typing as npt
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
 STEP = 1.9
@@ -69,12 +70,12 @@ def identify_curve(
     tau, sigma = np.asarray(tau_s, dtype=np.float64), np.asarray(deviation, dtype=np.float64)
     sigma = sigma[:, np.newaxis] if sigma.ndim == 1 else sigma
     if tau.ndim != 1 or sigma.ndim != 2 or len(tau) != len(sigma):
-        raise RefusedError(f"tau_s (k,) and deviation (k, channels) must fit, got {tau.shape} and {sigma.shape}")
+        raise InputError(f"tau_s (k,) and deviation (k, channels) must fit, got {tau.shape} and {sigma.shape}")
     order = np.argsort(tau)
     tau, sigma = tau[order], sigma[order]
     clusters = np.round(tau * rate_hz).astype(np.int64)
     if np.any(clusters < 1) or np.any(np.abs(clusters / rate_hz - tau) > 0.02 * tau):
-        raise RefusedError(
+        raise InputError(
             f"averaging times are whole numbers of readings: at {rate_hz:g} Hz these are not; check --rate"
         )
     kept = np.concatenate([[True], np.diff(clusters) > 0]) & (2 * clusters <= n_samples)
@@ -141,7 +142,7 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
         if not chosen or curve.clusters[i] >= STEP * curve.clusters[chosen[-1]]:
             chosen.append(i)
     if len(chosen) < FEWEST_POINTS:
-        raise RefusedError(
+        raise InputError(
             f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to separate noise terms; "
             f"at least {FEWEST_POINTS} are needed"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -13,10 +13,10 @@ from trihedron.units import acceleration_to_si, rate_to_si
 def reject_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
     """Check that the ``size`` of a count is stated only for readings in counts.
 
-    Raises ``RefusedError`` when a ``size`` is stated and the readings have a physical unit.
+    Raises ``InputError`` when a ``size`` is stated and the readings have a physical unit.
     """
     if size is not None and unit != "counts":
-        raise RefusedError(
+        raise InputError(
             f"the readings of the {sensor} are in {unit}, not in counts: leave --{sensor}-lsb out, or say "
             f"--{sensor}-unit counts if they are."
         )
@@ -27,7 +27,7 @@ def readings_of(
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
     """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost.
 
-    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known. Raises ``RefusedError`` when most
+    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known. Raises ``InputError`` when most
     of the time has no reading, or the size of a count is stated for readings in a physical unit.
     """
     columns: list[FloatArray] = []
@@ -68,7 +68,7 @@ def _with_gaps(readings: FloatArray, recording: Recording) -> FloatArray:
     lost = np.round(steps[late]).astype(np.int64) - 1
     total = len(readings) + int(lost.sum())
     if total > 4 * len(readings):
-        raise RefusedError(
+        raise InputError(
             f"{recording.source}: {100 - 100 * len(readings) / total:.0f} % of the time has no reading; "
             "cut the log to the part that was recorded without a break."
         )

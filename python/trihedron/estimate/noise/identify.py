@@ -12,15 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
+from trihedron.records.noise import Noise, NoiseAxis
 
 # Warm-up of the bias: an exponential approach, separated from a random walk by likelihood.
 MEANS = 64
@@ -145,9 +146,9 @@ def identify_noise(
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
     if len(names) != channels or len(units) != channels:
-        raise RefusedError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
+        raise InputError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
     if n < SHORTEST:
-        raise RefusedError(
+        raise InputError(
             f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {SHORTEST} are "
             "needed, an hour or more is useful"
         )
@@ -194,7 +195,7 @@ def _screen(
     for start, stop in excluded:
         column[start:stop] = np.nan
     if not np.any(np.isfinite(column)):
-        raise RefusedError(f"{name} holds no finite reading outside the excluded stretches")
+        raise InputError(f"{name} holds no finite reading outside the excluded stretches")
     steps: list[Event] = []
     cuts: list[tuple[int, int]] = []
     findings: list[Finding] = []
@@ -248,8 +249,8 @@ def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
 def _checked_stretch(stretch: tuple[float, float], n: int, rate_hz: float) -> tuple[int, int]:
     start, stop = stretch
     if not (math.isfinite(start) and start < stop):
-        raise RefusedError(f"an excluded stretch runs from an earlier to a later second, got {start} to {stop}")
+        raise InputError(f"an excluded stretch runs from an earlier to a later second, got {start} to {stop}")
     first, last = max(0, math.floor(start * rate_hz)), min(n, math.ceil(min(stop, n / rate_hz) * rate_hz))
     if first >= n or last <= 0:
-        raise RefusedError(f"the excluded stretch {start} s to {stop} s lies outside the log of {n / rate_hz:.6g} s")
+        raise InputError(f"the excluded stretch {start} s to {stop} s lies outside the log of {n / rate_hz:.6g} s")
     return first, last

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import line_coefficients
 from trihedron.estimate.noise.terms import SYMBOLS
 from trihedron.records.noise import NoiseAxis, TermName
@@ -54,13 +54,13 @@ def relative_sigma(axis: NoiseAxis, duration_s: float) -> dict[TermName, float]:
 def recording_length_s(axis: NoiseAxis, symbol: TermName | str, relative: float) -> float | None:
     """Recording time [s] after which ``symbol`` has the relative uncertainty ``relative``; None beyond a month.
 
-    Raises ``RefusedError`` when the term is not present on the axis, or ``relative`` is not positive.
+    Raises ``InputError`` when the term is not present on the axis, or ``relative`` is not positive.
     """
     term = TermName(symbol)
     if not axis.terms[term].is_present:
-        raise RefusedError(f"{axis.name} shows no {term.value}: there is nothing to know more precisely")
+        raise InputError(f"{axis.name} shows no {term.value}: there is nothing to know more precisely")
     if not relative > 0:
-        raise RefusedError(f"a relative accuracy is a positive share, got {relative}")
+        raise InputError(f"a relative accuracy is a positive share, got {relative}")
     low, high = 10.0 / axis.rate_hz, LONGEST_S
     if relative_sigma(axis, high)[term] > relative:
         return None

@@ -16,10 +16,10 @@ import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.at_rest import AxisAtRest
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of, low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
-from trihedron.errors import RefusedError
+from trihedron.channel_facts.static_axes import StaticAxis
+from trihedron.errors import InputError
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
@@ -58,11 +58,11 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
     polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
-    frequency zero: the uncertainty of the filter's shape is included. Raises ``RefusedError`` when ``low_pass`` has no
+    frequency zero: the uncertainty of the filter's shape is included. Raises ``InputError`` when ``low_pass`` has no
     corner.
     """
     if low_pass.corner_hz is None:
-        raise RefusedError("no corner shows: the density is that of all readings")
+        raise InputError("no corner shows: the density is that of all readings")
     corner = low_pass.corner_hz.value
     axes = []
     for spectrum in spectra:
@@ -143,11 +143,11 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     x = np.asarray(readings, dtype=np.float64)
     x = x[:, np.newaxis] if x.ndim == 1 else x
     if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+        raise InputError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     for start, stop in poses:
         if not 0 <= start < stop <= len(x):
-            raise RefusedError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
-    axes = [AxisAtRest.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(x.T)]
+            raise InputError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
+    axes = [StaticAxis.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(x.T)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(
@@ -168,7 +168,7 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     )
 
 
-def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
+def _white(axes: Sequence[StaticAxis], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
     """White noise densities: below the corner where a filter is detected, else from all frequencies."""
     out = [_of_differences(axis, rate_hz) for axis in axes]
     for one in dict.fromkeys(filters):
@@ -197,7 +197,7 @@ def _band_power(
     return np.array(power), np.array(ordinates)
 
 
-def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
+def _of_differences(axis: StaticAxis, rate_hz: float) -> Measured | None:
     """White density of a flat spectrum: half the mean squared difference of readings less the variance of rounding."""
     if not axis.is_dithered:
         return None
@@ -207,7 +207,7 @@ def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
     return root_of(sensor, 1.0 / rate_hz)
 
 
-def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
+def _of_level(axis: StaticAxis, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
     """White density below a filter's corner, of a typical pose.
 
     ``density`` is that of the mean over poses, which noisy ones dominate. The ratio of a typical pose to it is measured

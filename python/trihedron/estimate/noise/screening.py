@@ -14,8 +14,8 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.at_rest import adc_step
 from trihedron.channel_facts.limits import share_at_limits
+from trihedron.channel_facts.static_axes import adc_step
 
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""

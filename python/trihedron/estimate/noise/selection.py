@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
 
@@ -71,7 +71,7 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
         pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
     frequency = np.concatenate([band.frequency_hz[p] for band, p in zip(bands, pick, strict=True)])
     if len(frequency) == 0:
-        raise RefusedError(f"no spectral ordinate lies below {highest_hz} Hz")
+        raise InputError(f"no spectral ordinate lies below {highest_hz} Hz")
     order = np.argsort(frequency, kind="stable")
 
     def gather(parts: list[FloatArray]) -> FloatArray:
@@ -120,7 +120,7 @@ def select(
 ) -> Selection:
     """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if needed.
 
-    Raises ``RefusedError`` when the channel does not change, or no ordinate of the spectrum remains.
+    Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
     spectrum = binned(bands, highest_hz, masked)
     if tolerance > 0.0:

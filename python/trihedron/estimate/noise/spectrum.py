@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise.gaps import (
     MOST_BRIDGED,
     MOST_SLOW,
@@ -98,7 +98,7 @@ def unit_densities(frequency_hz: FloatArray, order: IntArray, length: int, step_
 def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]]) -> list[Ordinates]:
     """Bands of all stretches ``[start, stop)`` of one channel ``x`` (n,); NaN marks a missing reading.
 
-    Raises ``RefusedError`` when no stretch is long enough for a spectrum.
+    Raises ``InputError`` when no stretch is long enough for a spectrum.
     """
     total = sum(stop - start for start, stop in stretches)
     block = -(-total // LONGEST_TRANSFORM) if total > LONGEST_TRANSFORM else 1
@@ -114,7 +114,7 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     if block > 1 and used == USED_SHARE:
         bands += _segments(x, rate_hz, stretches, block)
     if not bands:
-        raise RefusedError(
+        raise InputError(
             f"no stretch of the log is long enough to separate noise terms: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )

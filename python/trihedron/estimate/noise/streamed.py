@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import (
     STREAM_BUDGET_BYTES,
@@ -23,7 +23,8 @@ from trihedron.estimate.noise.allan import (
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.screening import readout, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
-from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
+from trihedron.records.allan_curve import AllanCurve
+from trihedron.records.noise import Noise, NoiseAxis
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
 _PARTS = ("numbers", "fine", "window", "sums")
@@ -51,7 +52,7 @@ def stream_noise(
     means; impacts are not excluded.
 
     ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
-    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``RefusedError``
+    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``InputError``
     when a chunk has missing readings or another number of channels, or the log is too short.
     """
     check_question(rate_hz, "overlapping", 0.95)
@@ -86,7 +87,7 @@ def stream_noise(
         if keep is not None:
             keep(seen, now)
     if stream is None:
-        raise RefusedError("the log holds no chunk of readings")
+        raise InputError("the log holds no chunk of readings")
     *_, n, means = stream.finish()
     channels = len(means)
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))

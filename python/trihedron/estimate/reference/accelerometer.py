@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
@@ -73,7 +73,7 @@ def fit_accelerometer(
 
     With attitude alone the acceleration of the body is unknown: the second derivative of a bounded path has little
     power at the low frequencies of gravity's rotation, and the spectrum of the residuals shows how much. Raises
-    ``RefusedError`` when there are too few windows, or the reference's frames are mirrored.
+    ``InputError`` when there are too few windows, or the reference's frames are mirrored.
     """
     if grid.accelerometer is None:
         return None
@@ -293,7 +293,7 @@ def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> 
 
 def _reject_mirror(reference: Reference, determinant: float, handedness: float) -> None:
     if determinant * handedness < 0.0:
-        raise RefusedError(
+        raise InputError(
             f"{reference.motion.source}: the reference is mirrored against the log: its turns and its forces are those "
             "of frames of opposite handedness. Turn the sign of one axis of the reference (position and attitude), or "
             "of one sensor's axis in the log."

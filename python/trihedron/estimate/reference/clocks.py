@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference.together import Grid, Reference, running_mean
 
 LEAST_CORRELATION = 0.7
@@ -49,7 +49,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     """Offset and rate of the reference's clock, to about a sample.
 
     ``stamped_offset_s`` is the offset by the absolute timestamps of both logs, where they have any. Raises
-    ``RefusedError`` when the motions differ at every lag, or the reference's clock jumps.
+    ``InputError`` when the motions differ at every lag, or the reference's clock jumps.
     """
     ours = _size_of_rate(grid)
     theirs = _reference_size(reference, grid.step_s)
@@ -58,7 +58,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     # A clock jump reduces the correlation of the whole log: stretches are tested first.
     refined = _refined(ours, grid, reference, offset)
     if correlation < LEAST_CORRELATION:
-        raise RefusedError(
+        raise InputError(
             f"{reference.motion.source}: this reference and the log share no motion (the turning rates agree best "
             f"with a correlation of {correlation:.2f}; shared ones reach 0.93): name the reference of this very log, "
             "or check its rate and angle units."
@@ -143,7 +143,7 @@ def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
 def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) -> tuple[float, float]:
     """Offset [s] and rate from the lags of stretches.
 
-    Raises ``RefusedError`` when neighbouring stretches fit well at lags that no steady clock explains.
+    Raises ``InputError`` when neighbouring stretches fit well at lags that no steady clock explains.
     """
     if len(ours) < 3 * round(BLOCK_S / grid.step_s):
         return offset, 0.0
@@ -184,7 +184,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         is_borne_out = len(beyond) >= FEWEST_BEYOND or beyond[0][0] > SURE
         is_borne_out &= float(np.median([correlation[there] for _, correlation in beyond])) < LOCKED
         if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and is_borne_out:
-            raise RefusedError(
+            raise InputError(
                 f"{reference.motion.source}: the reference's clock jumps by {after - before:+.3g} s between "
                 f"{at[k]:.0f} and {at[k + 1]:.0f} s of the log: cut the reference there and use the parts one by one."
             )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 ORDERS = (0, 2, 12)
 """Orders of the autoregression that are tried: none; one slope or line; wobble with some lines (two poles each)."""
@@ -58,11 +58,11 @@ def solve(
     """Estimate θ of ``target (k, 3) = design (k, 3, p) θ``.
 
     ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model``
-    the noise model where it is fixed. Raises ``RefusedError`` when there are too few rows for the parameters.
+    the noise model where it is fixed. Raises ``InputError`` when there are too few rows for the parameters.
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:
-        raise RefusedError("too little motion is known beside the log: fewer windows than the parameters need.")
+        raise InputError("too little motion is known beside the log: fewer windows than the parameters need.")
     scale = np.sqrt(np.mean(design**2, axis=(0, 1)))
     scale[scale == 0.0] = 1.0
     X = design / scale

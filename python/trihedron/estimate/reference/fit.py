@@ -14,8 +14,7 @@ from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
-from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
-from trihedron.estimate.reference.refusals import (
+from trihedron.estimate.reference.mismatch import (
     reject_parts_elsewhere,
     reject_still,
     reject_strangers,
@@ -23,6 +22,7 @@ from trihedron.estimate.reference.refusals import (
     reject_units,
     share_left,
 )
+from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
 from trihedron.estimate.reference.replay import held_out
 from trihedron.estimate.reference.smoothed import (
     bias_over_time,
@@ -79,7 +79,7 @@ def fit_reference(
     """Fit a log to reference motion.
 
     ``given`` is a gyro's (S, b) whose replay is compared; it has its own frame, and its rotation to the reference's
-    body is taken from the fit. Raises ``RefusedError`` when the two share no motion, the clock jumps or has two
+    body is taken from the fit. Raises ``InputError`` when the two share no motion, the clock jumps or has two
     possible offsets, units differ by a factor, frames are mirrored, or the motion does not determine the 12 parameters.
     """
     return fit_references([(recording, motion)], gravity_m_s2, given=given)[0]
@@ -198,7 +198,7 @@ def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: flo
 def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     """Correlation of the magnitudes of the rates of a log and a reference with one motion.
 
-    Raises ``RefusedError`` when they share no motion, or the clock jumps.
+    Raises ``InputError`` when they share no motion, or the clock jumps.
     """
     grid, reference = grid_of(recording), Reference(motion)
     found = align(grid, reference, _stamped(recording, motion))

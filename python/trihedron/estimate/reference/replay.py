@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron._core import rotation_from_vector
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
@@ -36,7 +36,7 @@ def held_out(
         return ()
     try:
         taught = fit_gyroscope(grid, reference, windows(grid, reference, first), gyro.offset_s, gyro.rate, clock=1)
-    except REFUSALS:
+    except INPUT_ERRORS:
         return ()
     time = grid.time_s * (1.0 + taught.rate) + taught.offset_s
     stages: list[tuple[str, FloatArray]] = [

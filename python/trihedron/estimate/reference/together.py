@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
@@ -31,10 +31,10 @@ class Grid:
 def grid_of(recording: Recording) -> Grid:
     """The log at even times of its own rate, by cubic interpolation; not valid within gaps.
 
-    Raises ``RefusedError`` when there is no gyro.
+    Raises ``InputError`` when there is no gyro.
     """
     if recording.gyroscope is None:
-        raise RefusedError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
+        raise InputError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
     recording = recording.with_distinct_timestamps()
     gyroscope = recording.gyroscope
     assert gyroscope is not None

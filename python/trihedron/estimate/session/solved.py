@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
-from trihedron.errors import REFUSALS
+from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -32,7 +32,7 @@ def calibrate_moves(
     """Calibrate the gyro from the tilt errors after rotations between poses (equations 5.1-5.7).
 
     The frame of the calibrated ``accelerometer`` becomes the gyro's, its covariance enters the gyro's. Raises
-    ``RefusedError`` when a sensor or every move is missing, or no initial scale can be determined.
+    ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
     found = solved(log, options or MoveOptions())
@@ -78,7 +78,7 @@ class _Fit:
 def solved(log: Log, options: MoveOptions) -> SolvedSession:
     """Fit the session model from the initial scale with the least tilt errors (docs/model-session.md).
 
-    Raises ``RefusedError`` when a sensor or every move is missing, or no initial scale can be determined.
+    Raises ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     measured, near = begun(log, options.nominal())
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)
@@ -230,7 +230,7 @@ def scale_by_gravity(
         return None
     try:
         gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2, MoveOptions(n_folds=0))
-    except REFUSALS:
+    except INPUT_ERRORS:
         return None
     quality, seen = gyroscope.quality, gyroscope.observability
     if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:

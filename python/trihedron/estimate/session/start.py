@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import REFUSALS, RefusedError
+from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
@@ -122,7 +122,7 @@ def is_enough(used: BoolArray) -> bool:
 
 def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
     if np.all(measured.is_lost):
-        raise RefusedError("the gyro clipped in every move: turn more slowly or set a wider range")
+        raise InputError("the gyro clipped in every move: turn more slowly or set a wider range")
     first = starts(log.recording, measured, log.accelerometer, nominal)
     found = _nearest(log, measured, first)
     if nominal is not None or rate_to_si(log.recording.gyroscope_unit) is not None:
@@ -144,11 +144,11 @@ def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
         near = S_a, b_a, R @ scale
         try:
             core = approached(with_prior(observed, *near, is_given=True), *near)
-        except REFUSALS:
+        except INPUT_ERRORS:
             continue
         found.append((core.chi2, np.asarray(core.rate_scale)))
     if not found:
-        raise RefusedError("the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)")
+        raise InputError("the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)")
     return S_a, b_a, min(found, key=lambda one: one[0])[1]
 
 
@@ -202,7 +202,7 @@ class MoveOptions:
         if value.ndim == 0:
             return float(value) * np.eye(3)
         if value.shape != (3, 3):
-            raise RefusedError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
+            raise InputError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
         return value
 
 
@@ -250,7 +250,7 @@ def starts(
 ) -> FloatArray:
     """Initial scales (k, 3, 3): the nominal one, else that of the unit, and that of :func:`integral_start`.
 
-    Raises ``RefusedError`` when readings are counts, no nominal scale is given and the moves do not determine a start.
+    Raises ``InputError`` when readings are counts, no nominal scale is given and the moves do not determine a start.
     """
     found = []
     if nominal is not None:
@@ -262,7 +262,7 @@ def starts(
     if unit is not None and nominal is None:
         found.append(unit * np.eye(3))
     if not found:
-        raise RefusedError(
+        raise InputError(
             "the moves do not determine a first guess of the gyro scale and its readings are counts: "
             "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
         )

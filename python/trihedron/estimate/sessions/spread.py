@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.probability import chdtri, ndtri, stdtrit
 from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
 
@@ -27,11 +27,11 @@ from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
 def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
     """Mean and spreads of each parameter over all sessions, which are grouped by their ``group``.
 
-    Where every session is its own group there is one spread, between sessions, in ``within``. Raises ``RefusedError``
+    Where every session is its own group there is one spread, between sessions, in ``within``. Raises ``InputError``
     with fewer than two sessions.
     """
     if len(sessions) < 2:
-        raise RefusedError("one recording does not show how far a parameter repeats; give two or more.")
+        raise InputError("one recording does not show how far a parameter repeats; give two or more.")
     groups = _groups(sessions)
     out = []
     for k, parameter in enumerate(PARAMETERS[: len(sessions[0].numbers)]):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.sessions.spread import spread_within
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
@@ -32,14 +32,14 @@ MIN_SPAN_DEGC = 2.0
 def thermal_model(sessions: Sequence[Session]) -> ThermalModel:
     """The thermal model of sessions that all have a temperature.
 
-    Raises ``RefusedError`` where temperatures are missing, or within ``MIN_SPAN_DEGC``.
+    Raises ``InputError`` where temperatures are missing, or within ``MIN_SPAN_DEGC``.
     """
     T = np.array([session.temperature_degc for session in sessions])
     if not np.all(np.isfinite(T)):
         missing = [session.name for session in sessions if not np.isfinite(session.temperature_degc)]
-        raise RefusedError(f"{missing[0]}: no temperature was logged; log it, or leave this recording out.")
+        raise InputError(f"{missing[0]}: no temperature was logged; log it, or leave this recording out.")
     if np.ptp(T) < MIN_SPAN_DEGC:
-        raise RefusedError(
+        raise InputError(
             f"all recordings were made within {np.ptp(T):.1f} °C: they do not show what temperature does; record at "
             "temperatures 10 °C apart or more."
         )

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.documents import DocumentError, of_path, read_text
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
 from trihedron.files.formats.contract import ExportOptions as ExportOptions
@@ -28,7 +28,7 @@ from trihedron.files.formats.matrices import upper_frame as upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.folders import modules_of
 from trihedron.records import Calibration
-from trihedron.sanitise import printable
+from trihedron.sanitise import escaped
 
 
 @cache
@@ -48,7 +48,7 @@ def needs(one: Format) -> list[str]:
     identity = (np.eye(3), np.zeros(3))
     try:
         one.write(given("trihedron", {"accelerometer": identity, "gyroscope": identity}), ExportOptions())  # type: ignore[misc]
-    except RefusedError as error:
+    except InputError as error:
         return list(dict.fromkeys(re.findall(r"--(?:noise|rate|current-parameters)", str(error))))
     return []
 
@@ -56,16 +56,16 @@ def needs(one: Format) -> list[str]:
 def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:
     """A calibration for ``target``, one of :func:`targets`: text by file name ending; ``""`` where there is one file.
 
-    Raises ``RefusedError`` when the target is unknown, the calibration is not plausible, or it cannot be expressed in
+    Raises ``InputError`` when the target is unknown, the calibration is not plausible, or it cannot be expressed in
     that convention.
     """
     one = formats().get(target)
     if one is None or one.write is None:
-        raise RefusedError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
+        raise InputError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
     made = one.write(require_plausible(calibration), options or ExportOptions())
     texts = {"": made} if isinstance(made, str) else made
     # The texts contain file names, which may contain control characters.
-    return {ending: printable(text) for ending, text in texts.items()}
+    return {ending: escaped(text) for ending, text in texts.items()}
 
 
 def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
@@ -76,7 +76,7 @@ def export_calibration(calibration: Calibration, target: str, options: ExportOpt
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration file of trihedron or of another program; its format is recognised by content.
 
-    Raises ``RefusedError`` when the file is missing or its format is not supported.
+    Raises ``InputError`` when the file is missing or its format is not supported.
     """
     path = Path(path)
     text = _text(path)
@@ -84,7 +84,7 @@ def any_calibration(path: str | os.PathLike[str]) -> Calibration:
         return read_calibration(path)
     try:
         found = _recognised(text, path)
-    except RefusedError as error:
+    except InputError as error:
         raise CalibrationFileError(f"{path}: {error}") from None
     # An unrecognised file is a damaged own file or no calibration: the own reader reports which.
     return found or read_calibration(path)
@@ -99,7 +99,7 @@ def is_calibration(path: str | os.PathLike[str]) -> bool:
         return False
     try:
         return f'"{OWN}"' in text or _recognised(text, path) is not None
-    except RefusedError:
+    except InputError:
         # Another program's file without readings to correct: reading it as a calibration reports that.
         return True
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats.contract import ExportOptions, Thermal, given, of_si_readings, thermal_of
 from trihedron.records import Calibration, Onboard, SensorCalibration
 from trihedron.records.onboard import Autopilot
@@ -46,10 +46,10 @@ Correction = Callable[[Onboard, str], AxisCorrection]
 def orientation(number: float) -> FloatArray:
     """(3, 3) rotation from the sensor's to the board's axes for one of MAVLink's orientations.
 
-    Raises ``RefusedError`` when the number is none of the fixed orientations.
+    Raises ``InputError`` when the number is none of the fixed orientations.
     """
     if number != int(number) or not 0 <= number < len(_DEG_ROLL_PITCH_YAW):
-        raise RefusedError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
+        raise InputError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
     return euler(*_DEG_ROLL_PITCH_YAW[int(number)])
 
 
@@ -79,19 +79,19 @@ def parameters_in(text: str) -> dict[str, float]:
 def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, prefix: str) -> Onboard:
     """The corrections that the board had applied to the calibrated readings.
 
-    Raises ``RefusedError`` when neither the calibration nor a parameter file states them, or the log is of another
+    Raises ``InputError`` when neither the calibration nor a parameter file states them, or the log is of another
     autopilot.
     """
     name = {"ardupilot": "ArduPilot", "px4": "PX4"}[autopilot]
     stated = calibration.extensions.get("onboard")
     known = None if stated is None else from_plain(dict(stated), Onboard)  # type: ignore[call-overload]
     if known is not None and known.autopilot != autopilot:
-        raise RefusedError(
+        raise InputError(
             f"this calibration is of a log of another autopilot ({known.autopilot}), whose axes of the sensor {name} "
             f"does not share: record with {name}, or export to {known.autopilot}."
         )
     if known is not None and known.changed:
-        raise RefusedError(
+        raise InputError(
             f"{', '.join(known.changed)} changed while readings were logged: it is not known which offsets the "
             "readings carry; record again without calibrating on board meanwhile."
         )
@@ -100,8 +100,8 @@ def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, p
         return Onboard(known.autopilot if known else autopilot, 0, 0, "raw")  # type: ignore[arg-type]
     current = {key: value for key, value in parameters_in(text).items() if key.startswith((prefix, *_SHARED))}
     if text and not any(key.startswith(prefix) for key in current):
-        raise RefusedError(
-            f"the file of current parameters holds no {prefix}...: save the parameters of the {name} board."
+        raise InputError(
+            f"the file of current parameters contains no {prefix}...: save the parameters of the {name} board."
         )
     if known is not None:
         return replace(known, parameters={**known.parameters, **current})
@@ -109,7 +109,7 @@ def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, p
         return Onboard(autopilot, 0, 0, "body", current)  # type: ignore[arg-type]
     if calibration.accelerometer.raw_unit == "counts":
         return Onboard(autopilot, 0, 0, "raw")  # type: ignore[arg-type]
-    raise RefusedError(
+    raise InputError(
         f"{name} logs readings that its own offsets and scales have corrected, and this calibration does not say by "
         "which: add --current-parameters FILE, the parameters of the board when the log was made (.param, .parm or "
         ".params), or --current-parameters none where the readings were raw."
@@ -136,7 +136,7 @@ def composed(
     With ``logged = R (s o (r - o))``, ``truth = S logged + b`` is ``S' r + b'`` with ``S' = Rᵀ S R diag(s)`` and
     ``b' = Rᵀ b - S' o``. The offset is the reading at zero input; the scale is along the sensitive axis.
 
-    Raises ``RefusedError`` when an axis is mirrored, which a positive scale cannot represent.
+    Raises ``InputError`` when an axis is mirrored, which a positive scale cannot represent.
     """
     known = of_si_readings(calibration, target, options)
     made, out = {}, {}
@@ -148,8 +148,8 @@ def composed(
         S = own.turn.T @ sensor.S @ own.turn * own.scale
         b = own.turn.T @ sensor.b - S @ own.offset
         if np.any(np.diag(S) <= 0.0):
-            raise RefusedError(
-                f"an axis of the {name} is mirrored against the board and {target} holds positive scales only: "
+            raise InputError(
+                f"an axis of the {name} is mirrored against the board and {target} stores positive scales only: "
                 "set the orientation of the sensor first."
             )
         made[name] = replace(sensor, S=S, b=b, covariance=_turned(sensor.covariance, own))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.thermal_model import parameters_at
@@ -94,7 +94,7 @@ class Format:
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
     """The calibration for readings that the target's driver converts to SI.
 
-    Raises ``RefusedError`` when it is for counts and the LSB is not given.
+    Raises ``InputError`` when it is for counts and the LSB is not given.
     """
     made = {}
     for name, sensor in named_sensors(calibration):
@@ -105,7 +105,7 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
             unit, lsb = rate_to_si(RateUnit(sensor.raw_unit)), options.gyro_lsb
             lsb_to_si, said = rate_lsb_to_si, "--gyro-lsb '0.0305 deg/s'"
         if unit is None and not lsb:
-            raise RefusedError(
+            raise InputError(
                 f"{target} expects {name} readings in SI and this calibration maps counts: say the size of a count "
                 f"that its driver assumes with {said}, or export to c, rust or python."
             )
@@ -220,7 +220,7 @@ def lost_temperature(calibration: Calibration) -> list[str]:
             else f"{degrees_from_radians(bias):.3g} deg/s"
         )
         said.append(
-            f"This file holds the {name} at {thermal.reference_degc:.1f} degC: its change from "
+            f"This file contains the {name} at {thermal.reference_degc:.1f} degC: its change from "
             f"{thermal.range_degc[0]:.1f} to {thermal.range_degc[1]:.1f} degC is lost, up to {size} of bias and "
             f"{100 * thermal.scale:.2g} % of scale."
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, number
 from trihedron.files.formats.noise_keys import COVARIANCES, KEYS, Figures, si_rows
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
@@ -103,16 +103,16 @@ TARGETS: dict[str, _Target] = {
 def filter_noise_text(found: FilterNoise, target: str) -> str:
     """The noise of both sensors in the format of ``target``.
 
-    Raises ``RefusedError`` when the target is unknown, or a sensor was not estimated: the target reads a missing key
+    Raises ``InputError`` when the target is unknown, or a sensor was not estimated: the target reads a missing key
     as 0.
     """
     one = TARGETS.get(target)
     if one is None:
-        raise RefusedError(f"noise is not written for {target!r}; there are {', '.join(TARGETS)}.")
+        raise InputError(f"noise is not written for {target!r}; there are {', '.join(TARGETS)}.")
     figures = {sensor.sensor: sensor for sensor in found.sensors}
     for name in ("accelerometer", "gyroscope"):
         if name not in figures:
-            raise RefusedError(
+            raise InputError(
                 f"{target} needs both sensors, and the {name} was not estimated: give a reference with positions, or "
                 "leave --reference out."
             )

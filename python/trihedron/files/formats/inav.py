@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats.autopilot import AxisCorrection, Composed, composed
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number
 from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal, size_of_bias
@@ -26,11 +26,11 @@ LARGEST_GAIN, LARGEST_OFFSET = 8192, 32767
 def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     """Commands for INAV's command line, from a calibration of uncorrected readings.
 
-    Raises ``RefusedError`` when the readings were not raw, the LSB is not given, or a value exceeds the range of a
+    Raises ``InputError`` when the readings were not raw, the LSB is not given, or a value exceeds the range of a
     setting.
     """
     if calibration.accelerometer.raw_unit != "counts" and options.current_parameters.strip().lower() != "none":
-        raise RefusedError(
+        raise InputError(
             "INAV logs readings that its own biases and gains have corrected and its alignments have turned: calibrate "
             "raw counts (debug_mode = ACC), or say --current-parameters none where the readings were raw."
         )
@@ -55,7 +55,7 @@ def _size_of_a_count(name: str, options: ExportOptions) -> float:
         (options.accel_lsb, "--accel-lsb", "0.488 mg") if is_accel else (options.gyro_lsb, "--gyro-lsb", "0.061 deg/s")
     )
     if not said:
-        raise RefusedError(f"INAV holds whole counts: say the size of one of the {name} with {option} '{example}'.")
+        raise InputError(f"INAV stores whole counts: say the size of one of the {name} with {option} '{example}'.")
     return acceleration_lsb_to_si(said) if is_accel else rate_lsb_to_si(said)
 
 
@@ -68,7 +68,7 @@ def _lines(name: str, one: Composed, count: float) -> list[str]:
 def _settings(word: str, values: FloatArray, low: int, high: int) -> list[str]:
     whole = np.rint(values)
     if np.any((whole < low) | (whole > high)):
-        raise RefusedError(
+        raise InputError(
             f"{word} of INAV is from {low} to {high} and would be {number(float(whole[np.abs(whole).argmax()]))}: is "
             "the size of a count that of INAV's driver?"
         )

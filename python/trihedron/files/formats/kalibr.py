@@ -29,7 +29,7 @@ from trihedron.sensor_model import other_form
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     """``imu.yaml`` with the six keys that its reader requires, and intrinsics named as in Kalibr's results.
 
-    Raises ``RefusedError`` when noise or rate, which the reader requires, are not given.
+    Raises ``InputError`` when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
     figures = required(lower, options, "Kalibr")
@@ -53,7 +53,7 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
 def from_kalibr(text: str) -> Calibration | None:
     """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``).
 
-    Raises ``RefusedError`` when it is the camera chain written beside those results, which contains only the pose of
+    Raises ``InputError`` when it is the camera chain written beside those results, which contains only the pose of
     the IMU.
     """
     document = yaml_of(text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise, number
 from trihedron.records import Calibration
 
@@ -42,11 +42,11 @@ COVARIANCES = ("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov")
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
     """The noise and rate that the target's reader requires.
 
-    Raises ``RefusedError`` when noise or rate are not given.
+    Raises ``InputError`` when noise or rate are not given.
     """
     accel, gyro = options.accelerometer_noise, options.gyroscope_noise
     if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
-        raise RefusedError(
+        raise InputError(
             f"{target} needs the noise and the rate of the samples: add --noise ALLAN.json (of `trihedron allan LOG "
             "--json ALLAN.json`) and --rate HZ."
         )

@@ -29,7 +29,7 @@ def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
 
     Comments are on separate lines: OpenCV's reader takes a value followed by a comment for a sequence.
 
-    Raises ``RefusedError`` when noise or rate, which the reader requires, are not given.
+    Raises ``InputError`` when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "OpenVINS", options)
     figures = required(lower, options, "OpenVINS")

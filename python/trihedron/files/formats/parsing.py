@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _PAIR = re.compile(r"^( *)(?:- )?([\w.]+)\s*:\s*(.*)$")
@@ -24,9 +24,9 @@ def json_of(text: str) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def without_readings(what: str) -> RefusedError:
+def without_readings(what: str) -> InputError:
     """The error for a file that states the pose of an IMU but nothing about its readings."""
-    return RefusedError(
+    return InputError(
         f"{what} states the pose of the IMU, and no scale, misalignment or bias of its readings: there is nothing here "
         "to judge or to apply."
     )

@@ -13,7 +13,7 @@ from trihedron.records import Calibration
 def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     """The three covariances of a message.
 
-    Raises ``RefusedError`` when noise or rate, from which the covariance is computed, are not given.
+    Raises ``InputError`` when noise or rate, from which the covariance is computed, are not given.
     """
     known = of_si_readings(calibration, "ROS", options)
     figures = required(known, options, "ROS")

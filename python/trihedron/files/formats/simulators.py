@@ -22,7 +22,7 @@ def distortion(
 ) -> tuple[Calibration, dict[str, tuple[FloatArray, FloatArray]], Figures]:
     """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and the noise; an ideal gyro where there is none.
 
-    Raises ``RefusedError`` when noise or rate are not given.
+    Raises ``InputError`` when noise or rate are not given.
     """
     known = of_si_readings(calibration, target, options)
     pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
@@ -151,7 +151,7 @@ def to_gnss_ins_sim(calibration: Calibration, options: ExportOptions) -> str:
     https://github.com/Aceinna/gnss-ins-sim.
     """
     known, pairs, figures = distortion(calibration, options, "gnss-ins-sim")
-    lost = (f"The walk of the bias holds at {figures.rate_hz:g} Hz: the program scales it by the step.",)
+    lost = (f"The walk of the bias is valid at {figures.rate_hz:g} Hz: the program scales it by the step.",)
     lines = [f"# {line}" for line in said_of(known, options, "reading = truth + b + slow bias + noise.", lost=lost)]
     lines += ["import numpy as np", "", f"FS = {number(figures.rate_hz)}", "imu_err = {"]
     root, hour = math.sqrt(figures.rate_hz), 3600.0
@@ -211,7 +211,7 @@ def to_isaac(calibration: Calibration, options: ExportOptions) -> str:
     lost = (*lost_to_a_diagonal(known), *_lost_walks(figures))
     lines = [f"# {line}" for line in said_of(known, options, equation, holds_matrix=True, lost=lost)]
     lines += ["import torch", "from isaaclab.utils.noise import GaussianNoiseCfg", ""]
-    lines.append(f"STEP_S = {number(1.0 / figures.rate_hz)}  # of the environment: std holds at this step")
+    lines.append(f"STEP_S = {number(1.0 / figures.rate_hz)}  # of the environment: std is valid at this step")
     for term, name, N in (
         ("IMU_ANG_VEL", "gyroscope", figures.gyro_N),
         ("IMU_LIN_ACC", "accelerometer", figures.accel_N),

@@ -65,7 +65,9 @@ def build_clock(
         finite = np.isfinite(raw)
         bad = int(np.flatnonzero(~finite)[0])
         if finite.sum() < 2:
-            raise ReadError(f"{table.path}: the time column {table.label(column)} holds no numbers; name another one.")
+            raise ReadError(
+                f"{table.path}: the time column {table.label(column)} contains no numbers; name another one."
+            )
         count = np.count_nonzero(~finite)
         findings.append(
             Finding.of(
@@ -82,7 +84,7 @@ def build_clock(
         steps = steps_of(raw)
     if len(raw) > 1 and steps.same == len(raw) - 1:
         raise ReadError(
-            f"{table.path}: the time column {table.label(column)} holds {raw[0]:.12g} in every row; "
+            f"{table.path}: the time column {table.label(column)} contains {raw[0]:.12g} in every row; "
             "choose another with --columns time=..., or --columns time=none with --rate."
         )
     raw, wraps = unwrap(raw, table, rows, findings) if steps.back else (raw, False)

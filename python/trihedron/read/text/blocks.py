@@ -188,7 +188,7 @@ def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
     if zero >= 0:
         line = first_line + data.count(b"\n", 0, zero)
         raise ReadError(
-            f"{path}: line {line} holds binary data (a zero byte), so this is not a text log; "
+            f"{path}: line {line} contains binary data (a zero byte), so this is not a text log; "
             "convert it to CSV, or delete the damaged lines."
         )
     return data

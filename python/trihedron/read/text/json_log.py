@@ -45,7 +45,7 @@ def of_json(path: Path, text: str) -> Rewritten:
     names = list(dict.fromkeys(name for row in rows for name in row))
     if len(rows) < 2 or len(names) < 3:
         raise ReadError(
-            f"{path}: this JSON holds no rows of readings known here; write them as one object per line, or "
+            f"{path}: this JSON contains no rows of readings known here; write them as one object per line, or "
             "pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
         )
     body = [",".join(_cell(row.get(name)) for name in names) for row in rows]

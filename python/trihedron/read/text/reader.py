@@ -89,7 +89,7 @@ class TextReader:
                 done = min(self.n_bytes / self.size, 1.0) if self.compression is None else 0.5
                 self.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
         if layout is None:
-            raise ReadError(f"{self.path}: the file holds no text after unpacking; record or copy it again.")
+            raise ReadError(f"{self.path}: the file contains no text after unpacking; record or copy it again.")
         return layout
 
     def _odd_part(self, raw: bytes, layout: Layout | None) -> Layout:

@@ -20,7 +20,7 @@ _TURNED_TABLE = (
 )
 FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
     {
-        "room": FamilyWords(_TURNED_TABLE, ("a magnetic field",)),
+        "world": FamilyWords(_TURNED_TABLE, ("a magnetic field",)),
         "force": FamilyWords(
             "record poses on edges and corners as well as on faces, each twice", ("unequal stiffness",)
         ),

@@ -5,43 +5,42 @@ from __future__ import annotations
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated."
-_LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
+_LOOK = "Look at the error of each pose in the whole report; `trihedron diagnose` names the effect."
 _ADD_POSES = "Add poses with {advice:numbered}."
 _FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
 _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
-        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
-        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard "
-        "uncertainties of the accelerometer are multiplied by {widening:.3g}.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms, noise alone {floor_m_s2:.3g mm/s²} (χ²/dof "
+        "{chi2_per_dof:.3g}, {dof:.0f} degrees of freedom); all standard uncertainties of the accelerometer are "
+        "multiplied by {widening:.3g}.",
         _UNQUIET,
         _LOOK,
     ),
     (Code.RESIDUAL_ABOVE_NOISE, "poses-joint", WARNING): Words(
-        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
-        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit "
-        "includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, level axes "
-        "(which the moves show, and this residual does not) included, and so do the standard uncertainties.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms, noise alone {floor_m_s2:.3g mm/s²} (χ²/dof "
+        "{chi2_per_dof:.3g}, {dof:.0f} degrees of freedom). The fit includes a bias repeatability of "
+        "{bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, and so do the standard uncertainties.",
         _UNQUIET,
         _LOOK,
     ),
     (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
-        "{unseen:&, }, constrained to {anchor:.0f %} of an ideal triad.",
+        "{unseen:&, }, constrained by a prior of {anchor:.0f %} about an ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _FACES_OR_POSES,
     ),
     (Code.NOT_OBSERVABLE, "poses-weak", SERIOUS): Words(
         "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
-        "gravity; least certain is the {weakest}. All parameters were constrained to {anchor:.0f %} of an ideal triad.",
+        "gravity; least certain: {weakest}. A prior of {anchor:.0f %} about an ideal triad constrains all parameters.",
         "The orientations are too much alike.",
         _FACES_OR_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
     (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
-        "In some orientations gravity is predicted {times_worse:.2g} times as uncertainly as one pose measures it; "
-        "least certain: {weakest}.",
+        "In some orientations the predicted gravity is {times_worse:.2g} times as uncertain as a measurement in one "
+        "pose; least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),

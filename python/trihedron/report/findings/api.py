@@ -28,7 +28,7 @@ _CALIBRATE = {
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
     ),
     (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
-        "No calibration can be made from this log: {why}",
+        "No calibration can be made from this log: {why}.",
         "The log does not contain what a calibration needs.",
         "Keep the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
     ),
@@ -45,7 +45,8 @@ _VERIFIED = {
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
         "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:first 8}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
-        "See the table of parameters; calibrate several sessions together to learn how far each repeats.",
+        "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
+        "each.",
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "

@@ -25,8 +25,8 @@ from trihedron.report.findings.wording import filled
 
 ENTRIES: tuple[Entry, ...] = tuple(
     Entry(code=code, case=case, severity=severity, **vars(words))
-    for room in (read, clock, readings, accelerometer, gyroscope, kalman, noise, api, filter_noise, reference, segment)
-    for (code, case, severity), words in room.ENTRIES.items()
+    for stage in (read, clock, readings, accelerometer, gyroscope, kalman, noise, api, filter_noise, reference, segment)
+    for (code, case, severity), words in stage.ENTRIES.items()
 )
 CATALOGUE: Mapping[tuple[Code, str], Entry] = MappingProxyType({(entry.code, entry.case): entry for entry in ENTRIES})
 

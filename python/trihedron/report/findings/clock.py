@@ -29,8 +29,8 @@ _TIMESTAMPS = {
         numbers=("sample",),
     ),
     (Code.TIME_GAP, "", WARNING): Words(
-        "{count} gaps, about {lost_samples} samples lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
-        "Where: {worst:each; }{has_more:? ...|}.",
+        "{count:# gap}, about {lost_samples:# sample} lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
+        "Where: {worst:each; }{has_more:?; and others|}.",
         "Lost packets or a full buffer.",
         _INTEGRATED,
         numbers=("sample",),
@@ -55,11 +55,13 @@ _TIMESTAMPS = {
         numbers=("row",),
     ),
     (Code.TIME_UNIT_DETECTED, "", NOTE): Words(
-        "The time is in {unit}, by its intervals of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
+        "The time column is in {unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
+        "possible too|}.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "unsure", WARNING): Words(
-        "The time is in {unit}, by its intervals of {step:.6g}{has_others:?; {others:&, } would be possible too|}.",
+        "The time column is in {unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
+        "possible too|}.",
         "The interval alone does not determine the unit; every rate and every noise density depends on it.",
         "Give --time-unit s, ms, us or ns if this is wrong, or --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
@@ -109,11 +111,11 @@ _RATES = {
 _EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
     "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
-    "samples are timestamped on arrival|off by {timestamp_error_s:.2g ms} rms}}"
+    "samples are timestamped on arrival|scattered by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_shows:?readings in motion follow {followed:.2g %} ± {sigma_followed:.2g %} of that error "
-    "(0 %: sampled evenly, 100 %: sampled as timestamped)|no motion shows when samples were taken}"
+    "{motion_shows:?the readings in motion contain {followed:.2g %} ± {sigma_followed:.2g %} of that error "
+    "(0 %: sampled evenly, 100 %: sampled at the timestamps)|no motion shows when samples were taken}"
 )
 _WITH_THEM = (
     "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",

@@ -67,10 +67,10 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # empirical relations of what stays unexplained
         "relation-follows": "The {sensor}'s {is_static:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
         "{share:.0f %} of the cross-validated misfit.",
-        "relation-follows-room": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
+        "relation-follows-world": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",
-        "relation-form-room": "bias = K Rᵀ m, m a unit vector fixed in the world frame",
+        "relation-form-world": "bias = K Rᵀ m, m a unit vector fixed in the world frame",
         "angle-to-vertical": "angle to the vertical",
         # places in a file, amounts
         "line": "line {line}",
@@ -82,7 +82,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "names": "the line of names",
         "counted": "{words:each}",
         "both": "{one} and {other}",
-        "streams": "{streams:each}{has_more:? ...|}",
+        "streams": "{streams:each}{has_more:? and others|}",
         "this-container": "This {kind}",
         "unit-with-rate": "{unit} ({rate_hz:.4g} Hz)",
         "amount-of-scatter": "{value:.3g} {unit} in {name}",

@@ -9,8 +9,8 @@ _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wron
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
-    "gravity rotates by {factor:.3g} (± {percent:.1g} %) times the gyro's angle in {unit} (1 where the unit is right; "
-    "correlation {correlation:.2f})"
+    "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit} (1 "
+    "where the unit is right; correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
@@ -18,41 +18,41 @@ _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings 
 
 _UNITS = {
     (Code.UNIT_ASSUMED, "counts-or-mg", WARNING): Words(
-        "The accelerometer reads whole numbers of length {rest_norm:.4g} while static: counts of about 1/1000 g, or "
+        "The accelerometer reads whole numbers of length {static_norm:.4g} while static: counts of about 1/1000 g, or "
         "mg; taken as counts.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
-        "The accelerometer reads {rest_norm:.4g} while static: mg (1000) or cm/s^2 (981); taken as {unit}.",
+        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s^2 (981); taken as {unit}.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_DETECTED, "accelerometer-counts", NOTE): Words(
-        "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("rest_norm",)
+        "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("static_norm",)
     ),
     (Code.UNIT_DETECTED, "accelerometer-static", NOTE): Words(
-        "The accelerometer reads {rest_norm:.4g} while static, so its unit is {unit}."
+        "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit}."
     ),
     (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
         "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
-        numbers=("rest_norm",),
+        numbers=("static_norm",),
     ),
     (Code.UNIT_ASSUMED, "no-gravity", WARNING): Words(
-        "The accelerometer reads {rest_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
+        "The accelerometer reads {static_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
         "as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
     (Code.GRAVITY_MISSING, "", SERIOUS): Words(
-        "The accelerometer reads only {rest_norm:.3g} while static: gravity is missing from it.",
+        "The accelerometer reads only {static_norm:.3g} while static: gravity is missing from it.",
         "'Linear' or 'user' acceleration of a phone, from which gravity was subtracted, or wrong columns.",
         "Log the accelerometer itself; nothing here can be calibrated without gravity.",
     ),
     (Code.UNIT_CONTRADICTED, "accelerometer", SERIOUS): Words(
-        f"The accelerometer is in {{unit}} {_SOURCE}, but while static it reads {{rest_norm:.4g}} {{unit}}, "
+        f"The accelerometer is in {{unit}} {_SOURCE}, but while static it reads {{static_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
         "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
@@ -71,7 +71,7 @@ _UNITS = {
     (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
     (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit}}: {_TURNING}."),
     (Code.UNIT_ASSUMED, "gyro", WARNING): Words(
-        "Nothing states the gyro's unit; it reads {rest:.3g} while static and {largest:.4g} at most, so it was taken "
+        "Nothing states the gyro's unit; it reads {static:.3g} while static and {largest:.4g} at most, so it was taken "
         "as {unit}.",
         "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
@@ -96,7 +96,7 @@ _COLUMNS = {
         or_severity=WARNING,
     ),
     (Code.COLUMNS_RECOGNISED, "", NOTE): Words(
-        "Columns{has_file:? of {file}|}: {roles:each}{has_rest:?; not used: {rest:& }|}.",
+        "Columns{has_file:? of {file}|}: {roles:each}{has_others:?; not used: {others:& }|}.",
         lines={"roles": "{v0} from {v1}"},
     ),
     (Code.COLUMNS_ASSUMED, "accelerometer", WARNING): Words(
@@ -201,7 +201,7 @@ _ROWS = {
         "The log is damaged inside; what could not be read of it was skipped, readings among it.", _CUT_OFF, _COPY_AGAIN
     ),
     (Code.SAMPLES_LOST, "dropouts", WARNING): Words(
-        "The logger itself reports {count} dropouts, {lost_s:.3g} s altogether.",
+        "The logger itself reports {count:# dropout}, {lost_s:.3g} s in all.",
         "A memory card that was too slow.",
         _INTEGRATED,
     ),

@@ -51,6 +51,8 @@ ENTRIES = {
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
         "The log has few poses, or they were held for less than a second.",
-        "Log the six faces and twelve edges of a cube (18 poses), a few seconds each.",
+        "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each; `trihedron segment LOG` shows what "
+        "was found.",
+        or_severity=SERIOUS,
     ),
 }

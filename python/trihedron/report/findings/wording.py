@@ -9,12 +9,12 @@ A placeholder is a name and, after the colon, the format of its value:
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; placeholders are allowed
 ``<below|above``         the first words where the value is negative, else the second; placeholders are allowed
 ``&, the ``              several words, joined by the text after the ``&``; ``and``: ``X, Y and Z``
-``together``             ``x, y + z``
+``together``             ``x, y in combination``
 ``sentences``            ``X. Y.``
 ``clause``               a sentence without its full stop
 ``opening``              its first clause alone
 ``unit``                 ``m/s²`` for ``m/s^2``
-``first 8``              ``3, 5, 6``, with ``...`` after the eighth
+``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
 ``axis``                 ``X`` for 1 or ``x``
 ``axes`` · ``axes and ``  several axes, joined by comma or by the word: ``X, Y``, ``X and Z``
@@ -109,7 +109,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how == "and":
         return listed([str(word) for word in value])
     if how == "together":
-        return " + ".join([", ".join(value[:-1]), value[-1]] if len(value) > 1 else value)
+        return ", ".join(value) + (" in combination" if len(value) > 1 else "")
     if how == "sentences":
         return " ".join(f"{word[:1].upper()}{word[1:]}." for word in value)
     if how == "unit":
@@ -124,7 +124,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
         return how[1:].join(map(str, value))
     if how.startswith("first "):
         most = int(how[6:])
-        return ", ".join(map(str, value[:most])) + (" ..." if len(value) > most else "")
+        return ", ".join(map(str, value[:most])) + (f" and {len(value) - most} more" if len(value) > most else "")
     if how.startswith("# "):
         noun = how[2:]
         return f"{value:.0f} {noun if value == 1 else _plural(noun)}"

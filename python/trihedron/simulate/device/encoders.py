@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.frame_declaration import SIZES, FrameDeclaration
 
 Reading = Sequence[float]
@@ -164,11 +164,11 @@ LINE_HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space":
 
 
 def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) -> Encoder:
-    """The encoder of frames in that protocol; raises ``RefusedError`` when no simulated board has that protocol."""
+    """The encoder of frames in that protocol; raises ``InputError`` when no simulated board has that protocol."""
     if isinstance(protocol, FrameDeclaration):
         return declared(protocol)
     if protocol not in ENCODERS:
-        raise RefusedError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
+        raise InputError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
     return ENCODERS[protocol](scales or Scales())
 
 

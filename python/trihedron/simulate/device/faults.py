@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 KINDS = ("missing", "cut", "flipped", "garbage", "byte_lost", "byte_doubled", "twice")
 
@@ -51,7 +51,7 @@ class Faults:
 def parse_faults(text: str) -> Faults:
     """``"1%"`` (every kind), or ``"cut=1%,garbage=0.5%,drift=50ppm,disconnect=20,away=2,text"``.
 
-    Raises ``RefusedError`` when a fault is unknown or its size is not a number.
+    Raises ``InputError`` when a fault is unknown or its size is not a number.
     """
     chosen: dict[str, float | bool | tuple[float, ...]] = {}
     for part in (piece.strip() for piece in text.split(",") if piece.strip()):
@@ -71,11 +71,11 @@ def parse_faults(text: str) -> Faults:
             chosen[key] = _size(value, part)
         else:
             known = ", ".join((*KINDS, "drift", "disconnect", "away", "text"))
-            raise RefusedError(f"--faults: there is no fault '{key}'; there are {known}.")
+            raise InputError(f"--faults: there is no fault '{key}'; there are {known}.")
     made = Faults(**chosen)  # type: ignore[arg-type]
     for kind in KINDS:
         if not 0.0 <= getattr(made, kind) < 1.0:
-            raise RefusedError(f"--faults: {kind} is a chance per frame, between 0 and 100 %.")
+            raise InputError(f"--faults: {kind} is a chance per frame, between 0 and 100 %.")
     return made
 
 
@@ -91,7 +91,7 @@ def _size(text: str, whole: str) -> float:
     try:
         return float(number) * scale
     except ValueError:
-        raise RefusedError(f"--faults: '{whole}' has no size; write for example cut=1%.") from None
+        raise InputError(f"--faults: '{whole}' has no size; write for example cut=1%.") from None
 
 
 @dataclass

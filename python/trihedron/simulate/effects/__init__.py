@@ -9,7 +9,7 @@ import inspect
 from functools import partial
 from typing import Any, Literal
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.effects import experiment, found, sensor
 from trihedron.simulate.effects.found import Found
@@ -65,20 +65,20 @@ EFFECT_IDS: tuple[str, ...] = tuple(EFFECTS)
 def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
     """The scenario with one effect of the catalogue added at a stated size.
 
-    Raises ``RefusedError`` when the id is unknown, or a parameter is unknown, missing or invalid.
+    Raises ``InputError`` when the id is unknown, or a parameter is unknown, missing or invalid.
     """
     if effect_id not in EFFECTS:
-        raise RefusedError(
+        raise InputError(
             f"no effect is called {effect_id!r}{meant(effect_id, EFFECTS)}; there are {', '.join(EFFECTS)}"
         )
     change, _ = EFFECTS[effect_id]
     takes = dict(list(inspect.signature(change).parameters.items())[1:])
     words = ", ".join(name if p.default is p.empty else f"{name} (may be left out)" for name, p in takes.items())
     if unknown := [name for name in size if name not in takes]:
-        raise RefusedError(f"effect {effect_id} has no {unknown[0]!r}{meant(unknown[0], takes)}; it takes {words}")
+        raise InputError(f"effect {effect_id} has no {unknown[0]!r}{meant(unknown[0], takes)}; it takes {words}")
     if missing := [name for name, p in takes.items() if p.default is p.empty and name not in size]:
-        raise RefusedError(f"effect {effect_id} needs {', '.join(missing)}; it takes {words}")
+        raise InputError(f"effect {effect_id} needs {', '.join(missing)}; it takes {words}")
     try:
         return change(scenario, **size)
     except TypeError as error:
-        raise RefusedError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None
+        raise InputError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None

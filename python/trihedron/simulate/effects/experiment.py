@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.effects.sizes import Sensor, checked
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.readout import Values, triple
@@ -77,7 +77,7 @@ def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, s
         else:
             steps.append(step)
     if any(not 0 <= p < count for p in poses):
-        raise RefusedError(f"the motion has poses 0 to {count - 1}, got {list(poses)}")
+        raise InputError(f"the motion has poses 0 to {count - 1}, got {list(poses)}")
     return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
 
 
@@ -90,7 +90,7 @@ def turn_errors(scenario: Scenario, errors_deg: Sequence[float]) -> Scenario:
             count += 1
         steps.append(step)
     if count == 0:
-        raise RefusedError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
+        raise InputError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
     return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
 
 

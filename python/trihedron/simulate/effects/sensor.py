@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.effects.sizes import (
     Sensor,
     checked,
@@ -92,10 +92,10 @@ def drift(
     length_s: float = 300.0,
 ) -> Scenario:
     if not (tau_s > 0.0 and length_s > 0.0):
-        raise RefusedError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
+        raise InputError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
     drift = Drift(triple(amplitude), tau_s, triple(change), length_s)
     if not (any(drift.amplitude) or any(drift.change)):
-        raise RefusedError("a drift needs an amplitude that dies away, or a change over length_s")
+        raise InputError("a drift needs an amplitude that dies away, or a change over length_s")
     return electronics(scenario, sensor, drift=drift)
 
 
@@ -166,7 +166,7 @@ def supply(
 def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
     """``axis`` 1, 2 or 3 (X, Y, Z) points opposite to its documentation."""
     if axis not in (1, 2, 3):
-        raise RefusedError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
+        raise InputError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
     part = getattr(scenario, checked(sensor))
     S = np.array(part.S)
     S[:, axis - 1] *= -1.0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.accelerometer import ProofMass
 from trihedron.simulate.readout import NONE, Triple, triple
 from trihedron.simulate.scenario import Scenario
@@ -23,7 +23,7 @@ def electronics(scenario: Scenario, sensor: Sensor, **changes: Any) -> Scenario:
 
 def checked(sensor: str) -> str:
     if sensor not in ("accelerometer", "gyroscope"):
-        raise RefusedError(f"sensor is 'accelerometer' or 'gyroscope', got {sensor!r}")
+        raise InputError(f"sensor is 'accelerometer' or 'gyroscope', got {sensor!r}")
     return sensor
 
 

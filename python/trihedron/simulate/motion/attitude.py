@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.simulate.motion.steps import LEVEL, Quaternion
 
 
@@ -61,7 +61,7 @@ def unit(v: npt.ArrayLike) -> FloatArray:
     out: FloatArray = np.asarray(v, dtype=np.float64)
     norm = float(np.linalg.norm(out))
     if out.shape != (3,) or not math.isfinite(norm) or norm == 0.0:
-        raise RefusedError(f"a direction needs three numbers that are not all zero, got {np.asarray(v).tolist()}")
+        raise InputError(f"a direction needs three numbers that are not all zero, got {np.asarray(v).tolist()}")
     return out / norm
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.records.truth import SegmentKind
 from trihedron.simulate.motion.attitude import (
     quaternion_from_vector,
@@ -108,7 +108,7 @@ class _Planner:
         stated_rad: float | None = None,
     ) -> int:
         if not (math.isfinite(duration_s) and duration_s > 0.0):
-            raise RefusedError(f"step {len(self.rows)} ({kind} {name}) must last a positive time, got {duration_s} s")
+            raise InputError(f"step {len(self.rows)} ({kind} {name}) must last a positive time, got {duration_s} s")
         vector = np.zeros(3) if rotation is None else rotation
         angle = float(np.linalg.norm(vector))
         axis = vector / angle if angle > 0.0 else np.array([1.0, 0.0, 0.0])
@@ -135,8 +135,8 @@ class _Planner:
 
     def step(self, step: Step) -> None:
         if isinstance(step, Pose):
-            creep = radians_from_degrees(step.creep_deg) * unit(step.creep_axis)
-            self.add("pose", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
+            creep = radians_from_degrees(step.settling_deg) * unit(step.settling_axis)
+            self.add("pose", step.name, step.duration_s, creep if step.settling_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
             # R' = R exp(v) has `up` vertical if exp(v) rotates `up` to the old vertical in the body frame.
             turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))
@@ -200,10 +200,10 @@ class _Planner:
 def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
     """Convert a motion to tables in time.
 
-    Raises ``RefusedError`` when there are no steps, a duration is not positive, or a direction has zero length.
+    Raises ``InputError`` when there are no steps, a duration is not positive, or a direction has zero length.
     """
     if not motion.steps:
-        raise RefusedError("a motion needs at least one step, for instance a Pose")
+        raise InputError("a motion needs at least one step, for instance a Pose")
     planner = _Planner(motion, rng)
     for step in motion.steps:
         planner.step(step)

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -24,12 +24,12 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Pose:
-    """Static pose. With ``creep_deg`` it settles by that angle about ``creep_axis`` (body) over the whole pose."""
+    """Static pose; it settles by ``settling_deg`` about ``settling_axis`` (body) over the whole pose."""
 
     duration_s: float
     name: str = ""
-    creep_deg: float = 0.0
-    creep_axis: Vector = (1.0, 0.0, 0.0)
+    settling_deg: float = 0.0
+    settling_axis: Vector = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ class Replay:
         rate, acceleration = np.asarray(self.rate_rad_s, dtype=float), np.asarray(self.acceleration_m_s2, dtype=float)
         if rate.ndim != 2 or rate.shape[1:] != (3,) or len(rate) < 2 or rate.shape != acceleration.shape:
             shapes = f"{rate.shape} and {acceleration.shape}"
-            raise RefusedError(f"a replay needs rate and acceleration of one shape (m, 3), m >= 2, got {shapes}")
+            raise InputError(f"a replay needs rate and acceleration of one shape (m, 3), m >= 2, got {shapes}")
         if not (np.isfinite(rate).all() and np.isfinite(acceleration).all()):
-            raise RefusedError("a replay must not hold values that are not finite")
+            raise InputError("a replay must not hold values that are not finite")
         object.__setattr__(self, "rate_rad_s", rate)
         object.__setattr__(self, "acceleration_m_s2", acceleration)
 

@@ -11,9 +11,9 @@ from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.thermal import BRANCH_K_S
-from trihedron.diagnose.rest.pieces import RestPieces
-from trihedron.diagnose.rest.process import DRIFT, SCATTER, STRENGTHS, WALK, BiasProcess, BiasReadings, maximum
 from trihedron.diagnose.sample_evidence import VISIBLE
+from trihedron.diagnose.static_log.pieces import StaticPieces
+from trihedron.diagnose.static_log.process import DRIFT, SCATTER, STRENGTHS, WALK, BiasProcess, BiasReadings, maximum
 
 SLOW = 0.01
 """p-value below which biases change slowly: false in 1 % of logs whose biases only scatter."""
@@ -118,7 +118,7 @@ class Curve:
     p_value: float
 
 
-def thermal_curve(pieces: RestPieces, sensor: int) -> Curve | None:
+def thermal_curve(pieces: StaticPieces, sensor: int) -> Curve | None:
     """The most likely curve of the biases, scatter, walk and drift being free beside it; ``None`` if none is.
 
     Temperature enters to the first, second or third power, with or without its rate of change and another branch while
@@ -181,7 +181,7 @@ def _held_out(values: FloatArray, X: FloatArray) -> tuple[float, float]:
     return float(np.sqrt(np.mean(values**2))), float(np.sqrt(np.mean(missed**2)))
 
 
-def branch_gap(pieces: RestPieces, rest: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def branch_gap(pieces: StaticPieces, rest: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """(3,) mean difference of the residuals between heating and cooling at one temperature, and its standard error.
 
     ``rest`` (n, 3); the error is that of a mean over temperature bins. ``None`` where too few bins were passed both

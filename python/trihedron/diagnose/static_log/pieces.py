@@ -9,8 +9,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.context import TEMPERATURE_WINDOW_S
-from trihedron.diagnose.rest.process import BiasReadings
 from trihedron.diagnose.session.state import smoothed_slope
+from trihedron.diagnose.static_log.process import BiasReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
 
@@ -33,7 +33,7 @@ LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
 
 
 @dataclass(frozen=True, eq=False)
-class RestPieces:
+class StaticPieces:
     """Means over the halves of static pieces of a log, raw units: n = 2 per piece, in the order of time.
 
     ``pose`` (n,) number of the orientation, ``piece`` (n,) of the piece, ``spans`` their sample ranges; ``means``
@@ -72,7 +72,7 @@ class RestPieces:
         )  # fmt: skip
 
 
-def rest_pieces(recording: Recording) -> RestPieces | None:
+def static_pieces(recording: Recording) -> StaticPieces | None:
     """The static pieces of a log without rare orientations; ``None`` where too little of the log is static."""
     assert recording.accelerometer is not None
     n = recording.n_samples
@@ -107,7 +107,7 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
     middles = np.array([[t[a + k * half] + t[min(a + (k + 1) * half, n) - 1] for k in (0, 1)] for a in still]) / 2.0
     heat = _logged(recording, still, half)
     count = np.full(2 * len(still), half, dtype=np.int64)
-    return RestPieces(
+    return StaticPieces(
         middles.ravel(), count / recording.rate_hz, count, np.repeat(pose, 2),
         np.repeat(np.arange(len(still)), 2), tuple((int(a), int(a) + 2 * half) for a in still), tuple(means),
         tuple(_at_least(own, known) for own, known in zip(noise, facts, strict=True)), *heat,

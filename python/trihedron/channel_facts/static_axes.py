@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
 from trihedron.channel_facts.quiet import Windows, look
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.probability import chdtri
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
@@ -87,7 +87,7 @@ FEWER = 4.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class AxisAtRest:
+class StaticAxis:
     """Poses of one axis without disturbed ones and lines, and their pooled noise."""
 
     parts: list[FloatArray]
@@ -97,10 +97,10 @@ class AxisAtRest:
     spectrum: Spectrum
 
     @classmethod
-    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> AxisAtRest:
+    def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> StaticAxis:
         parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
         if not parts:
-            raise RefusedError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
+            raise InputError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
         step = adc_step(np.concatenate(parts))
         keep = robust_poses(*_power_of(parts))
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
@@ -280,8 +280,8 @@ def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str,
     found = {}
     for name, readings in sensors.items():
         try:
-            axes = [AxisAtRest.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
-        except RefusedError:
+            axes = [StaticAxis.of(readings[:, c], rate_hz, stretches, name) for c in range(3)]
+        except InputError:
             continue  # fewer than 32 readings in a row
         found[name] = tuple(low_passes([axis.spectrum for axis in axes], rate_hz))
     return found

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import XYZ, BoolArray, FloatArray
-from trihedron.errors import RefusedError
+from trihedron.errors import InputError
 from trihedron.estimate.reference.clocks import JUMP_S
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.likelihood import Problem, most_likely, together
@@ -31,17 +31,17 @@ def share_left(gyro: GyroFit) -> float:
 
 
 def reject_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
-    """Raise ``RefusedError`` where the rates agree in magnitude, but no mounting rotation makes them equal."""
+    """Raise ``InputError`` where the rates agree in magnitude, but no mounting rotation makes them equal."""
     left = share_left(gyro)
     if left > STRANGERS and not motion.is_stepwise:
-        raise RefusedError(
+        raise InputError(
             f"{motion.source}: this reference and the log share no motion: their turning rates look alike in size, but "
             f"no mounting makes them one ({100 * left:.0f} % of the rate is left); name the reference of this very log."
         )
 
 
 def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
-    """Raise ``RefusedError`` where the rates differ by a factor of units: 57.3, 1000, 60 or 9.55 (rpm)."""
+    """Raise ``InputError`` where the rates differ by a factor of units: 57.3, 1000, 60 or 9.55 (rpm)."""
     nominal = rate_to_si(recording.gyroscope_unit)
     if nominal is None:
         return
@@ -56,7 +56,7 @@ def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -
         (60.0, "it is in rpm or per minute"),
     ):
         if abs(scale / factor - 1.0) < 0.2:
-            raise RefusedError(
+            raise InputError(
                 f"{motion.source}: the reference turns {scale:.3g} times as fast as the gyro says: {words}, or the "
                 "log's unit is misread; name the unit in its columns ('wx [deg/s]', --reference-columns) or with "
                 "--gyro-unit."
@@ -64,12 +64,12 @@ def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -
 
 
 def reject_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
-    """Raise ``RefusedError`` for axes of S (9,) whose relative σ by its covariance (9, 9) is 0.5 or more."""
+    """Raise ``InputError`` for axes of S (9,) whose relative σ by its covariance (9, 9) is 0.5 or more."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
     size = np.linalg.norm(S.reshape(3, 3), axis=0)
     weak = [XYZ[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
     if weak:
-        raise RefusedError(
+        raise InputError(
             f"{motion.source}: the log's gyro axis {' and '.join(weak)} hardly turns while the reference is there, and "
             "its scale stays open: turn the unit about every axis (a rate table: one mounting for each)."
         )
@@ -83,7 +83,7 @@ REACH_S, SHIFT_S = 0.3, 0.02
 
 
 def reject_two_clocks(found: MotionFit, k: int) -> None:
-    """Raise ``RefusedError`` with both offsets where the evidence of another is within ``NAMED_FROM`` of the best."""
+    """Raise ``InputError`` with both offsets where the evidence of another is within ``NAMED_FROM`` of the best."""
     if "clock" not in found.places[k]:
         return
     side, point = found.sides[k], found.points[k]
@@ -107,7 +107,7 @@ def reject_two_clocks(found: MotionFit, k: int) -> None:
     here = most_likely([problem(0.0)], strengths, spread)[1]
     if 2.0 * (here - there) < NAMED_FROM:
         at = float(found.value(k, "clock")[0])
-        raise RefusedError(
+        raise InputError(
             f"{side.reference.motion.source}: the motion fits two offsets of the reference's clock, {at:+.4g} s and "
             f"{at + shifts[best]:+.4g} s (evidence {2.0 * (here - there):.1f} apart, {NAMED_FROM:g} needed): shake the "
             "unit once, irregularly, or give the reference timestamps of the log's own clock."
@@ -137,7 +137,7 @@ def reject_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
     """Check that no part of the reference fits at another lag than the whole.
 
     The alignment's stretches are 8 s long and use only magnitudes of rates: it excludes a jump in the last seconds as
-    another motion, and the fit excludes it as outliers. Raises ``RefusedError`` with the interval and the lag, when
+    another motion, and the fit excludes it as outliers. Raises ``InputError`` with the interval and the lag, when
     consecutive stretches have the same other lag.
     """
     if reference.motion.is_stepwise:
@@ -170,7 +170,7 @@ def reject_parts_elsewhere(grid: Grid, reference: Reference, gyro: GyroFit) -> N
     if len(run) >= FEWEST:
         first, last = at[run[0][0]], at[run[-1][0]] + STRETCH_S
         off = step * float(np.median([lag for _, lag in run]))
-        raise RefusedError(
+        raise InputError(
             f"{reference.motion.source}: the reference's clock jumps: from {first:.0f} to {last:.0f} s of the log it "
             f"is {off:+.2g} s off the remaining parts; cut the reference there and use the parts one by one."
         )

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trihedron.diagnose.rest.answer import diagnose_rest
 from trihedron.diagnose.session.starting_point import is_open, nominal
-from trihedron.errors import REFUSALS
+from trihedron.diagnose.static_log.answer import diagnose_static_log
+from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
@@ -27,7 +27,7 @@ TURNED_RAD, MOST_TURNS = 0.7, 2
 """Rotation [rad] (40°) from which a move counts as a turn, and the most turns of a log of one or two orientations."""
 
 
-def at_rest(
+def model_of_static_log(
     recording: Recording,
     segments: Segments,
     known: Calibration | None,
@@ -62,7 +62,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         return False
     try:
         own = calibrated()
-    except REFUSALS:
+    except INPUT_ERRORS:
         return True
     return is_open(own)
 
@@ -81,7 +81,7 @@ def _turns(recording: Recording, segments: Segments) -> int:
     return sum(angle > TURNED_RAD for angle in turned)
 
 
-def diagnosed_at_rest(
+def diagnosed_static_log(
     recording: Recording,
     segments: Segments,
     model: Calibration,
@@ -93,7 +93,7 @@ def diagnosed_at_rest(
 ) -> DiagnosisResult:
     """The diagnosis of a log of one or two orientations."""
     linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
-    found = diagnose_rest(recording, linear, gravity[0], alpha)
+    found = diagnose_static_log(recording, linear, gravity[0], alpha)
     return DiagnosisResult(
         **vars(found),
         findings=(*findings, _too_few(recording, segments)),

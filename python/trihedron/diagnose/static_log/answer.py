@@ -16,10 +16,10 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.rest.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
-from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.static_log.heat import POWERS, Curve, DriftCurve, branch_gap, slow_change, thermal_curve
+from trihedron.diagnose.static_log.pieces import StaticPieces, static_pieces
 from trihedron.probability import LEAST_P
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
@@ -48,7 +48,7 @@ class _Samples:
         return tuple(f"pose {i + 1}" for i in which)
 
 
-def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
+def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
     """Biases against temperature and time, and spectral lines, of a log with too few orientations for a calibration.
 
     Parameters
@@ -58,7 +58,7 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
     model : LinearModel
             Nominal or given S, b of both sensors, used only for sizes in physical units.
     """
-    pieces = rest_pieces(recording)
+    pieces = static_pieces(recording)
     domains: list[DomainTest] = []
     remaining: list[DomainTest] = []
     effects: list[AcceptedEffect] = []
@@ -101,7 +101,7 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
 class _Side:
     """One sensor of a static log: its number, and the ``size`` (3,) of a raw unit along every axis in ``unit``."""
 
-    pieces: RestPieces
+    pieces: StaticPieces
     sensor: int
     size: FloatArray
     unit: str
@@ -137,7 +137,7 @@ def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:
     return "raw" if is_counts and _matrix(model, GYRO)[0, 0] == 1.0 else SENSORS[sensor].unit
 
 
-def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) -> dict[str, Any]:
+def _noise(recording: Recording, pieces: StaticPieces | None, model: LinearModel) -> dict[str, Any]:
     step = np.sqrt(1.0 / recording.rate_hz)
     out: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
                            "accelerometer_corner_s": None, "gyroscope_density": None,
@@ -231,7 +231,7 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         p_adjusted=float(min(1.0, max(curve.p_value, LEAST_P) * n_effects)), delta_bic=curve.score,
         held_out=(held,), confounded_with=("accel-thermal-scale",) if is_accelerometer else (),
         separating_experiment=experiment_for(effect_id, is_static=True) if is_accelerometer else "",
-        model=_model("rest-curve", series),
+        model=_model("static-curve", series),
         share=float(np.clip(1.0 - (rest**2).sum() / (raw**2).sum(), 0.0, 1.0)),
     )  # fmt: skip
 
@@ -268,13 +268,13 @@ def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> Accep
         id=side.id("bias-drift"), statement=effect_words(side.id("bias-drift"), side.case, range=spans),
         parameters=tuple(parameters), p_adjusted=float(min(1.0, p * n_effects)),
         delta_bic=float(max(-2.0 * np.log(p), 0.0)), held_out=(), separating_experiment="",
-        model=_model("rest-drift", series),
+        model=_model("static-drift", series),
         share=float(np.clip(((curve.rms * size) ** 2).sum() / whole, 0.0, 1.0)),
     )  # fmt: skip
 
 
 def _lines(
-    recording: Recording, pieces: RestPieces, model: LinearModel, alpha: float
+    recording: Recording, pieces: StaticPieces, model: LinearModel, alpha: float
 ) -> tuple[DomainTest, AcceptedEffect | None]:
     """Spectral lines of the pieces, their slow part subtracted, and the test of noise that differs between pieces."""
     assert recording.accelerometer is not None
