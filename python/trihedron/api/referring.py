@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from trihedron.records.diagnosis import (
     Verdict,
 )
 from trihedron.records.domains import DomainTest
-from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, ReferenceMotion
+from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceMotion
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
@@ -252,22 +251,11 @@ def _rate(found: AgainstReference) -> DomainTest:
 
 
 def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
-    def sensor(fit: Any, raw: str, si: str) -> MappingProxyType[str, Any]:
-        sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-        return MappingProxyType(
-            {
-                "S": fit.S.tolist(),
-                "b": fit.b.tolist(),
-                "sigma_S": sigma[:9].reshape(3, 3).tolist(),
-                "sigma_b": sigma[9:].tolist(),
-                "raw_unit": raw,
-                "si_unit": si,
-            }
-        )
+    def sensor(fit: FitToReference, raw: str, si: str) -> SensorCalibration:
+        return SensorCalibration(fit.S, fit.b, fit.covariance, raw, si, "reference")
 
     gyro = sensor(found.gyroscope, recording.gyroscope_unit.value, "rad/s")
     if found.accelerometer is None:
-        nothing: dict[str, Any] = {name: np.zeros((3, 3)).tolist() for name in ("S", "sigma_S")}
-        nothing |= {"b": [0.0] * 3, "sigma_b": [0.0] * 3}
-        return LinearModel(MappingProxyType({**nothing, "raw_unit": "none", "si_unit": "m/s^2"}), gyro)
-    return LinearModel(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)
+        nothing = SensorCalibration(np.zeros((3, 3)), np.zeros(3), np.zeros((12, 12)), "none", "m/s^2", "none")
+        return LinearModel.of_sensors(nothing, gyro)
+    return LinearModel.of_sensors(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)

@@ -23,6 +23,7 @@ from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
+from trihedron.session.noise import between_sessions
 
 BYS: tuple[By, ...] = get_args(By)
 MEDIAN_CHI2 = 0.4549
@@ -209,25 +210,16 @@ def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
         up = up / np.linalg.norm(up, axis=1, keepdims=True)
         if len(up) == len(quality.residual):
             noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
-            out[:3] = _shared(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
+            out[:3] = between_sessions(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
     if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
         biases = segments.gyroscope_mean @ gyro.S.T
         noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
         is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
         if is_seen.sum() > 3:
             biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
-            each = [_shared(biases[:, k], noise[:, k], np.ones(len(biases) - 1)) for k in range(3)]
+            each = [between_sessions(biases[:, k], noise[:, k]) for k in range(3)]
             out[9:12] = np.mean(each)
     return out
-
-
-def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
-    """``2 C₁ + (V - C₁)/n``: V of n poses beyond their noise, C₁ of neighbours; ``alike`` cosine of their verticals."""
-    n = len(away)
-    total = max(float(np.sum(away**2)) / (n - 1) - float(np.mean(noise)), 0.0)
-    shared = float(np.sum(away[1:] * away[:-1] * alike) / max(np.sum(alike**2), 1e-12)) + float(np.mean(away**2)) / n
-    shared = min(max(shared, 0.0), total)
-    return 2.0 * shared + (total - shared) / n
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

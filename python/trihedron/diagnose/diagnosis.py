@@ -19,7 +19,7 @@ from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
-from trihedron.diagnose.residuals.effect_curves import residuals_before_after, with_covariance
+from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
@@ -111,8 +111,8 @@ def _diagnosed(
     residuals = residuals_before_after(answer.predicted, answer.judged, {one.effect.sensor for one in answer.biases})
     result = Diagnosis(
         verdict=verdict, domains=answer.domains, effects=accepted_effects(answer, residuals),
-        remaining=answer.remaining, candidates=candidates(answer), baseline=with_covariance(linear_model(base), base),
-        extended=with_covariance(linear_model(final), final), noise=_noise(model),
+        remaining=answer.remaining, candidates=candidates(answer), baseline=linear_model(base),
+        extended=linear_model(final), noise=_noise(model),
         gravity_m_s2=calibration.gravity_m_s2, alpha=alpha, recording_source=recording.source,
         recording_sha256=recording.sha256, references=MappingProxyType(model.context.references),
         residuals=residuals, relations=relations, stages=held_out_stages(answer),

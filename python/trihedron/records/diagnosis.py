@@ -203,7 +203,9 @@ class LinearModel(Frozen, Plain):
     covariance: FloatArray | None = None
 
     @classmethod
-    def of_sensors(cls, accelerometer: SensorCalibration, gyroscope: SensorCalibration | None) -> LinearModel:
+    def of_sensors(
+        cls, accelerometer: SensorCalibration, gyroscope: SensorCalibration | None, covariance: FloatArray | None = None
+    ) -> LinearModel:
         """The model of calibrated sensors."""
         accel, gyro = (
             None if s is None else {"S": s.S.tolist(), "b": s.b.tolist(), "sigma_S": s.sigma_S.tolist(),
@@ -211,7 +213,7 @@ class LinearModel(Frozen, Plain):
             for s in (accelerometer, gyroscope)
         )  # fmt: skip
         assert accel is not None
-        return cls(MappingProxyType(accel), None if gyro is None else MappingProxyType(gyro))
+        return cls(MappingProxyType(accel), None if gyro is None else MappingProxyType(gyro), covariance)
 
 
 @dataclass(frozen=True)

@@ -55,8 +55,6 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             bound = ", at its upper bound" if changes["is_at_edge"] else ""
             words = f"changes {size_in_words(changes['rms'], si)} RMS between poses (random walk{bound})"
             words += f"; uncertainty of a pose's mean {size_in_words(changes['noise'], si)}"
-            if "flicker" in changes:
-                words += f", {size_in_words(changes['flicker'], si)} of it flicker noise seen inside poses"
             facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)

@@ -248,3 +248,19 @@ def _mean_square(x: FloatArray) -> float:
     squares = x**2
     near = squares <= FAR * np.median(squares) / MEDIAN_CHI2[1]
     return float(np.mean(squares[near]))
+
+
+def between_sessions(away: FloatArray, noise: FloatArray, alike: FloatArray | float = 1.0) -> float:
+    """Variance of the bias change between two sessions from the biases of n poses about their mean (eq. 9.3).
+
+    ``2 C₁ + (V - C₁)/n``, V the variance of ``away`` (n,) or (n, axes) beyond the variance ``noise``, C₁ the covariance
+    of neighbours, the cosine of whose verticals is ``alike``: between two sessions 1/f noise differs by twice its
+    variance within one.
+    """
+    n = len(away)
+    total = max(float((away**2).sum()) / (away.size - away.size / n) - float(np.mean(noise)), 0.0)
+    weight = np.broadcast_to(alike, away[1:].shape)
+    # Subtracting the mean makes neighbours anticorrelated by variance/n, which is added back.
+    shared = float((away[1:] * away[:-1] * weight).sum() / max((weight**2).sum(), TINY)) + float(np.mean(away**2)) / n
+    shared = min(max(shared, 0.0), total)
+    return 2.0 * shared + (total - shared) / n

@@ -14,6 +14,7 @@ from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain, DomainTest
+from trihedron.session.noise import between_sessions
 from trihedron.units import si_of
 
 
@@ -131,18 +132,8 @@ def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:
 
 
 def _scatter_of_mean(diagnosis: Diagnosis) -> FloatArray:
-    """(3,) variance of the bias change between sessions from the biases of the poses, SI².
-
-    ``2 C₁ + (V - C₁)/n``, V the variance of the biases of n poses beyond their noise, C₁ the covariance of neighbours,
-    both pooled over the axes: between two sessions 1/f noise differs by twice its variance within one (eq. 9.3).
-    """
+    """(3,) variance of the gyro's bias change between sessions from the biases of the poses, SI²; pooled over axes."""
     for shown in diagnosis.residuals:
         if shown.domain == "static-gyro" and len(shown.after) > 2:
-            n = len(shown.after)
-            away = shown.after - shown.after.mean(axis=0)
-            total = max(float((away**2).sum()) / (3 * (n - 1)) - float(np.mean(shown.sigma_after**2)), 0.0)
-            # Subtracting the mean makes neighbours anticorrelated by variance/n, which is added back.
-            shared = float(np.mean(away[1:] * away[:-1])) + float(np.mean(away**2)) / n
-            shared = min(max(shared, 0.0), total)
-            return np.full(3, 2.0 * shared + (total - shared) / n)
+            return np.full(3, between_sessions(shown.after - shown.after.mean(axis=0), shown.sigma_after**2))
     return np.zeros(3)

@@ -41,9 +41,8 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape parameters it was computed with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; the score corrects for their number.
-    ``scale`` converts a linear parameter to the reported unit. ``given`` holds known values of the session (gravity)
-    that limit the possible parameters. ``is_family`` marks a shape that represents a family (a filter of any
-    order and damping): a plain mechanism that explains as much is preferred.
+    ``scale`` converts a linear parameter to the reported unit. ``is_family`` marks a shape that represents a family (a
+    filter of any order and damping): a plain mechanism that explains as much is preferred.
     """
 
     distortion: Distortion
@@ -53,7 +52,6 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
-    given: dict[str, float] = field(default_factory=dict)
     is_family: bool = False
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
-from trihedron.gravity import EARTH_RATE_RAD_S, normal_gravity
+from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.units import degrees_from_radians, radians_from_degrees
+from trihedron.units import degrees_from_radians
 
 N_GRID = 121
 """Latitudes and azimuths at which the likelihood is computed: 1.5° and 3°, then closer about the best."""
@@ -20,12 +20,6 @@ CLOSER = 6.0
 """Steps of the grid to either side of the best that the next grid covers, where an angle is surer than a step."""
 MISSES = 6.63
 """χ² of the vector's length, one degree of freedom, p = 0.01: above it the vector is not Earth rate."""
-NOMINAL = (9.8, 9.80665, 9.807, 9.81)
-"""Nominal values of gravity, which give no information on the latitude."""
-HEIGHTS_M, GRAVITY_SLACK = (-430.0, 5000.0), 0.005
-"""Heights where sensors are calibrated, m, and deviation of gravity from normal gravity, rounding included, m/s²."""
-OUTSIDE = 3.0
-"""Standard uncertainties by which a latitude may lie outside the range that gravity allows."""
 
 
 @dataclass(frozen=True)
@@ -73,19 +67,6 @@ def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
     return np.asarray(unit * EARTH_RATE_RAD_S)
 
 
-def latitudes_of(gravity: float) -> tuple[float, float]:
-    """Least and greatest absolute latitude, rad, at which gravity has this value at any height of ``HEIGHTS_M``."""
-    low, high = HEIGHTS_M
-    if not np.isclose(gravity, NOMINAL, rtol=0.0, atol=1e-9).any():
-        possible = [
-            degree for degree in range(91)
-            if normal_gravity(degree, high) - GRAVITY_SLACK <= gravity <= normal_gravity(degree, low) + GRAVITY_SLACK
-        ]  # fmt: skip
-        if possible:
-            return radians_from_degrees(possible[0]), radians_from_degrees(possible[-1])
-    return 0.0, 0.5 * np.pi
-
-
 class EarthRate(Effect):
     """Earth rate in the level frame of the first pose: two horizontal components and the vertical one."""
 
@@ -97,19 +78,12 @@ class EarthRate(Effect):
     def variants(self, context: Context) -> list[Variant]:
         attitude = context.pose_attitude
         attitude = np.where(np.isfinite(attitude), attitude, 0.0)
-        return [
-            Variant(
-                rate_only(context.between_poses(attitude)), ("horizontal_x", "horizontal_y", "vertical"),
-                ("rad/s",) * 3, given={"gravity": context.fitted.state.gravity},
-            )
-        ]  # fmt: skip
+        names = ("horizontal_x", "horizontal_y", "vertical")
+        return [Variant(rate_only(context.between_poses(attitude)), names, ("rad/s",) * 3)]
 
-    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
-        # The length of Earth rate is known and gravity limits the latitude: any other vector is another effect.
-        near = nearest_turning(value, covariance)
-        least, most = latitudes_of(variant.given["gravity"])
-        outside = max(least - abs(near.latitude), abs(near.latitude) - most)
-        return near.chi2 < MISSES and outside < OUTSIDE * near.latitude_std
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        # The length of Earth rate is known: any other vector is another effect.
+        return nearest_turning(value, covariance).chi2 < MISSES
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         near = nearest_turning(value, covariance)

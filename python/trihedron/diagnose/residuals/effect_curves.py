@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.solve import Fit
-from trihedron.records.diagnosis import EffectCurve, LinearModel
+from trihedron.records.diagnosis import EffectCurve
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.words import words
 
@@ -71,15 +71,6 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
         out["moves"] = middle, angle[:, None], expected, moves
         out["dynamics"] = middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)), moves
     return out
-
-
-def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
-    """The linear model with the full covariance of its parameters, in the order of a calibration file.
-
-    On raw readings: S row by row, then b, of the gyro with one bias for the session (eq. 11.16).
-    """
-    covariance = fitted.linear[0]
-    return replace(model, covariance=covariance[:12, :12] if model.gyroscope is None else covariance)
 
 
 N_BINS = 80

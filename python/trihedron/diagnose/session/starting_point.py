@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -109,19 +108,16 @@ def _rate_of_count(recording: Recording, segments: Segments) -> float:
 
 
 def linear_model(fitted: Fit) -> LinearModel:
-    """S, b of both sensors from a fitted session, with standard errors, on raw readings; one bias for the session."""
-    state, obs = fitted.state, fitted.obs
+    """S, b of both sensors from a fitted session, on raw readings, with one bias for the session.
+
+    With the full covariance of its parameters, in the order of a calibration file: S row by row, then b (eq. 11.16).
+    """
+    state, obs, recording = fitted.state, fitted.obs, fitted.obs.recording
     covariance, gyro_b = fitted.linear
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     accel_b = fitted.core.session_force_bias - state.accel_S @ obs.force_origin
-    accel, gyro = (
-        MappingProxyType(
-            {"S": S.tolist(), "b": b.tolist(), "sigma_S": own[:9].reshape(3, 3).tolist(), "sigma_b": own[9:].tolist(),
-             "raw_unit": unit.value}
-        )
-        for S, b, own, unit in (
-            (state.accel_S, accel_b, sigma[:12], obs.recording.accelerometer_unit),
-            (state.gyro_S, gyro_b, sigma[12:], obs.recording.gyroscope_unit),
-        )
-    )  # fmt: skip
-    return LinearModel(accel, None if obs.raw_rate is None else gyro)
+    accel_unit, gyro_unit = recording.accelerometer_unit.value, recording.gyroscope_unit.value
+    accel = SensorCalibration(state.accel_S, accel_b, covariance[:12, :12], accel_unit, "m/s^2", "diagnosis")
+    if obs.raw_rate is None:
+        return LinearModel.of_sensors(accel, None, covariance[:12, :12])
+    gyro = SensorCalibration(state.gyro_S, gyro_b, covariance[12:, 12:], gyro_unit, "rad/s", "diagnosis")
+    return LinearModel.of_sensors(accel, gyro, covariance)
