@@ -21,7 +21,7 @@ from trihedron.simulate import hand_session, scenario_by_name
 
 @pytest.fixture(scope="module")
 def recording():
-    motion = hand_session(n_poses=14, pose_s=2.0, first_pose_s=4.0)
+    motion = hand_session(n_poses=24, pose_s=2.0, first_pose_s=4.0)
     return trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
 
 
@@ -129,10 +129,8 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
         result.plot("residuals", ax=[above, below, above])
 
 
-def test_verbs_say_what_they_return_and_their_examples_run():
+def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
     """Examples name a recording and its calibration as a reader has them."""
-    recording = trihedron.simulate("hand-session", 3)[0]
-    result = trihedron.calibrate(recording, latitude_deg=60.0)
     run = doctest.DocTestRunner()
     for name in trihedron.__all__:
         verb = getattr(trihedron, name)

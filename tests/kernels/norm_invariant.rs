@@ -113,22 +113,6 @@ fn many(copies: usize) -> Vec<Vector3<f64>> {
 }
 
 #[test]
-fn summed_normal_equations_and_kept_rows_agree() {
-    let values = many(1200);
-    let noise = [Matrix3::identity()];
-    let settings = settings(Frame::Lower, Objective::Norm);
-    let fitted = |values: &[Vector3<f64>]| fit(of(values, &noise), &settings, None).expect("fits");
-    let summed = fitted(&values);
-    // The same problem with each sample's noise multiplied keeps weights equal, in halves that fit into rows.
-    let (half, rest) = (fitted(&values[..10_800]), fitted(&values[10_800..]));
-    let mean = (half.model.s + rest.model.s) / 2.0;
-    // Halves have equal information, so the whole is their mean up to the square of their difference.
-    let curvature = (half.model.s - rest.model.s).norm_squared() / summed.model.s.norm();
-    assert!((summed.model.s - mean).norm() < 1e-9 * mean.norm() + 10.0 * curvature);
-    assert!((summed.covariance[(0, 0)] / half.covariance[(0, 0)] - 0.5).abs() < 1e-3);
-}
-
-#[test]
 fn poses_held_out_are_predicted_within_their_own_error() {
     let mut values = readings(&triad([0.1; 9]), &cube_poses());
     values[4].x += 500.0;

@@ -54,26 +54,6 @@ fn normal_deviates_have_the_normal_distribution() {
 }
 
 #[test]
-fn a_stream_is_the_same_for_the_same_key_and_another_for_another() {
-    let draw = |key| {
-        let mut s = Stream::new(key);
-        [s.normal(), s.normal(), s.uniform()]
-    };
-    assert!(
-        draw(1)
-            .iter()
-            .zip(draw(1))
-            .all(|(a, b)| a.to_bits() == b.to_bits())
-    );
-    assert!(
-        draw(1)
-            .iter()
-            .zip(draw(2))
-            .all(|(a, b)| a.to_bits() != b.to_bits())
-    );
-}
-
-#[test]
 fn a_resonator_settles_on_a_step_as_its_closed_form_says() {
     let (dt, f0, q) = (1e-3, 12.0, 2.5);
     let w = TAU * f0;
