@@ -12,8 +12,6 @@ mod poisson;
 mod rotation;
 #[path = "kernels/session_model.rs"]
 mod session_model;
-#[path = "kernels/spectral_likelihood.rs"]
-mod spectral_likelihood;
 #[path = "kernels/stillness.rs"]
 mod stillness;
 

@@ -78,37 +78,6 @@ fn a_resonator_settles_on_a_step_as_its_closed_form_says() {
 }
 
 #[test]
-fn low_passes_pass_a_sine_as_their_transfer_functions_say() {
-    let (dt, f) = (1e-4, 7.0);
-    let n = 60_000;
-    let signal = one_channel((0..n).map(|i| (TAU * f * f64::from(i) * dt).sin()));
-    // A straight line between samples of a sine scales it by sinc²: 1 - (ωdt)²/12 = 1 - 1.6e-6.
-    for (name, mut x, gain_phase) in [
-        {
-            let (f0, q) = (20.0, 0.9);
-            let mut x = signal.clone();
-            second_order(&mut x, dt, &[f0; 3], &[q; 3]).expect("legal question");
-            let r: f64 = f / f0;
-            let (re, im) = (1.0 - r * r, r / q);
-            ("second order", x, (1.0 / re.hypot(im), -im.atan2(re)))
-        },
-        {
-            let mut x = signal.clone();
-            first_order(&mut x, dt, &[0.03; 3]).expect("legal question");
-            let wt = TAU * f * 0.03;
-            ("first order", x, (1.0 / 1.0_f64.hypot(wt), -wt.atan()))
-        },
-    ] {
-        for i in 50_000..60_000 {
-            let exact = gain_phase.0 * (TAU * f * f64::from(i) * dt + gain_phase.1).sin();
-            let got = x[usize::try_from(i).expect("legal question")][0];
-            assert!((got - exact).abs() < 5e-6, "{name} at {i}: {got} {exact}");
-        }
-        x.clear();
-    }
-}
-
-#[test]
 fn stages_rest_at_rest_and_far_too_stiff_ones_follow_at_once() {
     let mut x = one_channel((0..50).map(|_| 3.0));
     second_order(&mut x, 0.01, &[5.0; 3], &[0.7; 3]).expect("legal question");
