@@ -4,6 +4,8 @@
 mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]
 mod gauss_newton;
+#[path = "kernels/made_session.rs"]
+mod made_session;
 #[path = "kernels/norm_invariant.rs"]
 mod norm_invariant;
 #[path = "kernels/poisson.rs"]

@@ -1,137 +1,20 @@
-//! The joint model of a session: derivatives against differences, score at the truth.
+//! The joint model of a session: derivatives against differences, one end whatever the start.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use trihedron::rotation::exp;
+use nalgebra::{DMatrix, DVector, Vector3};
 use trihedron::session_model::chain::Layout;
 use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
-use trihedron::session_model::moves::{Move, MoveNoise};
+use trihedron::session_model::moves::Move;
 use trihedron::session_model::strength_search::Within;
 use trihedron::session_model::strengths::tune;
-use trihedron::session_model::{Distortion, Session, State, StaticMeans, Strengths};
+use trihedron::session_model::{Distortion, Session, State, Strengths};
 
-/// A small generator of uniform numbers in (-1, 1): the test must not depend on the simulator.
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next())
-    }
-
-    /// Sum of twelve: close enough to normal.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| 0.5 * self.next()).sum()
-    }
-}
+use super::made_session::{Uniform, made as made_of};
 
 const N_POSES: usize = 7;
-const G: f64 = 9.81;
 
-/// A session read without noise by a known instrument, smooth turns between poses, with uneven timestamps and one repeated.
 fn made(scatter: bool) -> (Session, State) {
-    let mut random = Uniform(7);
-    let force_scale = Matrix3::new(0.9, 0.0, 0.0, 0.01, 1.1, 0.0, -0.02, 0.03, 1.05);
-    let rate_scale = Matrix3::new(0.01, 1e-4, -2e-4, 0.0, 0.011, 1e-4, 2e-4, 0.0, 0.009);
-    let force_bias = Vector3::new(0.1, -0.2, 0.05);
-    let zeros: Vec<Vector3<f64>> = (0..N_POSES).map(|_| random.vector() * 3.0).collect();
-    let slow: Vec<Vector3<f64>> = (0..N_POSES)
-        .map(|i| {
-            if i == 0 {
-                Vector3::zeros()
-            } else {
-                random.vector() * 0.01
-            }
-        })
-        .collect();
-    let mut up = vec![Vector3::new(0.3, -0.5, 0.8).normalize()];
-    let mut moves = Vec::new();
-    let mut first_point = 0;
-    let pose_time: Vec<f64> = (0..N_POSES).map(|i| 5.0 * i as f64).collect();
-    let (inverse_force, inverse_rate) = (
-        force_scale.try_inverse().unwrap_or_default(),
-        rate_scale.try_inverse().unwrap_or_default(),
-    );
-    for m in 0..N_POSES - 1 {
-        let axis = random.vector().normalize();
-        let n = 61;
-        let mut time: Vec<f64> = (0..n)
-            .map(|k| 5.0 * m as f64 + 2.0 + 0.02 * k as f64 + 0.002 * random.next())
-            .collect();
-        time[30] = time[29];
-        let span = time[n - 1] - time[0];
-        let mut rate = Vec::new();
-        let mut force = Vec::new();
-        for t in &time {
-            let x = (t - time[0]) / span;
-            let angle =
-                1.8 * (x - (2.0 * std::f64::consts::PI * x).sin() / (2.0 * std::f64::consts::PI));
-            let speed = 1.8 / span * (1.0 - (2.0 * std::f64::consts::PI * x).cos());
-            let fraction = (t - pose_time[m]) / (pose_time[m + 1] - pose_time[m]);
-            let zero = zeros[m] * (1.0 - fraction) + zeros[m + 1] * fraction;
-            let offset = slow[m] * (1.0 - fraction) + slow[m + 1] * fraction;
-            rate.push(inverse_rate * (axis * speed) + zero);
-            let here = exp(&(-axis * angle)) * up[m] * G;
-            force.push(inverse_force * (here - force_bias) + offset);
-        }
-        up.push(exp(&(-axis * 1.8)) * up[m]);
-        moves.push(Move::new(
-            m,
-            &time,
-            rate,
-            force,
-            [pose_time[m], pose_time[m + 1]],
-            [Vector3::zeros(); 2],
-            first_point,
-        ));
-        first_point += n;
-    }
-    let noise_force = Vector3::new(1e-3, 1.2e-3, 0.9e-3);
-    let noise_rate = Vector3::new(0.02, 0.03, 0.025);
-    let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| {
-        let sigma = vec![density / 2.0; mean.len()];
-        StaticMeans::of(mean, sigma, density, None).expect("means without verticals")
-    };
-    let force_mean = (0..N_POSES)
-        .map(|i| inverse_force * (up[i] * G - force_bias) + slow[i])
-        .collect();
-    let session = Session {
-        gravity: G,
-        time_s: pose_time,
-        force: at_rest(force_mean, noise_force),
-        rate: Some(at_rest(zeros.clone(), noise_rate)),
-        moves: std::sync::Arc::new(moves),
-        noise: MoveNoise {
-            force_density: noise_force,
-            rate_density: noise_rate,
-            jitter_s: 0.0,
-            nominal_step_s: 0.02,
-        },
-        prior: None,
-        scatter: scatter.then_some([noise_force / 2.0, noise_rate / 2.0]),
-        expected_scatter: 0.0,
-    };
-    let state = State {
-        force_scale,
-        force_bias,
-        rate_scale,
-        up,
-        pose_rate_bias: zeros,
-        pose_force_bias: slow,
-        own: [
-            vec![Vector3::zeros(); N_POSES],
-            vec![Vector3::zeros(); N_POSES],
-        ],
-        effect: DVector::zeros(0),
-    };
-    (session, state)
+    made_of(N_POSES, 61, scatter)
 }
 
 const STRENGTHS: Strengths = Strengths {
