@@ -68,36 +68,3 @@ fn of_columns(rows: &[f64], width: usize, statistic: impl Fn(&mut [f64]) -> f64)
         })
         .collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{column_medians, median, quantile};
-
-    #[test]
-    fn a_median_of_an_even_number_is_the_middle_of_two() {
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]).to_bits(), 2.0_f64.to_bits());
-        assert_eq!(median(&mut [4.0, 1.0]).to_bits(), 2.5_f64.to_bits());
-        assert!(median(&mut []).is_nan() && quantile(&mut [], 0.5).is_nan());
-    }
-
-    #[test]
-    fn a_quantile_lies_between_its_neighbours() {
-        let values = [5.0, 1.0, 3.0];
-        for (at, wanted) in [
-            (0.0, 1.0),
-            (0.25, 2.0),
-            (0.5, 3.0),
-            (0.875, 4.5),
-            (1.0, 5.0),
-        ] {
-            let found: f64 = quantile(&mut values.clone(), at);
-            assert_eq!(found.to_bits(), f64::to_bits(wanted), "at {at}");
-        }
-    }
-
-    #[test]
-    fn a_column_with_a_missing_value_has_no_median() {
-        let found = column_medians(&[1.0, f64::NAN, 3.0, 2.0], 2);
-        assert!((found[0] - 2.0).abs() < 1e-15 && found[1].is_nan());
-    }
-}

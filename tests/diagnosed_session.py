@@ -1,9 +1,6 @@
 """A simulated session of a named part, as short as a diagnosis allows."""
 
-from trihedron.diagnose import diagnose_recording
-from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
-from trihedron.segment import resegment, segment_recording
+import trihedron
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.named import _of
@@ -18,12 +15,4 @@ def simulated(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
 
 def diagnosed(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
     recording, truth = simulated(effect_id, seed, n_poses, grade, **size)
-    segments = segment_recording(recording)
-    accelerometer, _ = calibrate_norm(
-        segments.accelerometer_mean,
-        segments.accelerometer_sigma_mean,
-        truth.gravity_m_s2,
-        raw_unit=recording.accelerometer_unit,
-    )
-    calibration = calibrate_joint(recording, segments, accelerometer, truth.gravity_m_s2, "simulated")
-    return diagnose_recording(recording, resegment(recording, segments), calibration)
+    return trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)

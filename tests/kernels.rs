@@ -4,6 +4,8 @@
 mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]
 mod gauss_newton;
+#[path = "kernels/made_session.rs"]
+mod made_session;
 #[path = "kernels/norm_invariant.rs"]
 mod norm_invariant;
 #[path = "kernels/poisson.rs"]
@@ -12,8 +14,6 @@ mod poisson;
 mod rotation;
 #[path = "kernels/session_model.rs"]
 mod session_model;
-#[path = "kernels/spectral_likelihood.rs"]
-mod spectral_likelihood;
 #[path = "kernels/stillness.rs"]
 mod stillness;
 

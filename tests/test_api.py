@@ -21,7 +21,7 @@ from trihedron.simulate import hand_session, scenario_by_name
 
 @pytest.fixture(scope="module")
 def recording():
-    motion = hand_session(n_poses=14, pose_s=2.0, first_pose_s=4.0)
+    motion = hand_session(n_poses=24, pose_s=2.0, first_pose_s=4.0)
     return trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
 
 

@@ -55,7 +55,7 @@ def test_a_wrong_gravity_goes_into_the_scale_and_nowhere_else(recording, result)
     np.testing.assert_allclose(other.gyroscope.S, result.gyroscope.S, rtol=1e-6, atol=1e-11)
 
 
-def test_both_methods_agree_within_their_error_bars(recording, result):
+def test_both_methods_agree_within_their_error_bars_and_moves_sharpen_the_accelerometer(recording, result):
     apart = trihedron.calibrate(
         recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2, method="separate"
     )
@@ -64,6 +64,11 @@ def test_both_methods_agree_within_their_error_bars(recording, result):
         sigma = np.where(other.sigma_S > 0, other.sigma_S, 1.0)
         # Same data: they differ by less than either's uncertainty.
         assert np.all(np.abs(one.S - other.S) < 2.0 * sigma)
+    free = apart.accelerometer.sigma_S > 0.0
+    ratio = (result.accelerometer.sigma_S[free] / apart.accelerometer.sigma_S[free]) ** 2
+    # Estimated scatter of the two noise figures: a few per cent.
+    assert ratio.max() < 1.1
+    assert ratio.min() < 0.8
 
 
 def test_a_frame_is_a_choice_of_axes_and_changes_no_norm(recording, result):

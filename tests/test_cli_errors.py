@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
+from trihedron.cli.options import signs
 from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose
 from written_session import G, log_text, recording, rejected, rejected_only, session, simulated
@@ -34,6 +35,10 @@ __all__ = ["recording", "session"]
 )
 def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, said):
     assert said in rejected(capsys, *arguments)
+
+
+def test_signs_of_axes_are_taken_in_their_order():
+    assert signs("--axis-signs", "-+-") == [-1, 1, -1]
 
 
 @pytest.mark.parametrize("content", [b"", b"dear diary\n" * 50, b"\x89PNG\r\n\x1a\n" + b"\x00" * 100])
@@ -91,7 +96,7 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
 def test_what_comes_next_is_the_remedy_of_what_is_wrong_and_keeps_the_rate_that_was_said(tmp_path, capsys):
     rng = np.random.default_rng(2)
     poses = np.vstack([np.eye(3), -np.eye(3)]) * 16384.0
-    rows = np.repeat(np.hstack([poses, np.zeros((6, 3))]), 400, axis=0) + rng.normal(scale=20.0, size=(2400, 6))
+    rows = np.repeat(np.hstack([poses, np.zeros((6, 3))]), 200, axis=0) + rng.normal(scale=20.0, size=(1200, 6))
     np.savetxt(tmp_path / "board.csv", rows, fmt="%d", delimiter=",")
     main(["check", str(tmp_path / "board.csv")])
     assert "Calibrate:" not in capsys.readouterr().out

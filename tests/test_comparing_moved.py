@@ -10,7 +10,7 @@ ALPHA = 0.01
 
 
 class Drawn:
-    """Mean squares of n poses and n moves, χ² over their degrees of freedom, simulations ``ratio`` times as far."""
+    """Mean squares of n poses and n moves of some mm/s² and mrad, simulations ``ratio`` times as far."""
 
     def __init__(self, rng, n, ratio=1.0, rejected=()):
         self.rng, self.n, self.ratio, self.rejected = rng, n, ratio, rejected
@@ -18,7 +18,7 @@ class Drawn:
         self.drawn = 0
 
     def of_one(self):
-        return self.rng.chisquare(self.n) / self.n
+        return 1e-6 * self.rng.chisquare(self.n) / self.n
 
     def missed_by(self, _scenario, _seed):
         self.drawn += 1

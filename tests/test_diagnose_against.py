@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from small_session import SCENARIO
-from trihedron.api.disagreeing import disagree
 from trihedron.cli import main
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
@@ -118,16 +117,6 @@ def test_an_effect_that_only_the_simulation_has_is_surplus(unit):
     assert "which the recording lacks" in str(found)
 
 
-@pytest.mark.slow
-def test_an_effect_that_both_have_is_compared_as_numbers(unit):
-    profile, accel, gyro = unit
-    simulated = log(profile, accel, gyro, 5, 5, "accel-quadratic", k2=(3e-4, -2e-4, 2e-4))
-    recording = log(profile, accel, gyro, 6, 6, "accel-quadratic", k2=(6e-4, -2e-4, 2e-4))
-    found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=9.80665)
-    assert found.verdict == "parameters-differ"
-    assert {p.id for p in found.parameters if p.significant} == {"accel-quadratic"}
-
-
 def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve(tmp_path, capsys):
     given = tmp_path / "student.toml"
     given.write_text(SCENARIO)
@@ -135,17 +124,6 @@ def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve
     assert "overwrite" in capsys.readouterr().err
     assert main(["diagnose", "log.csv", "--against", "sim.csv", "--improved", str(given)]) == 1
     assert ".toml" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [3, 4])
-def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp_path):
-    done = disagree(tmp_path, seed)
-    assert done.found.verdict == "missing-physics"
-    first = done.found.effects[0]
-    assert done.sealed["effect"] in (first.id, *first.confounded_with)
-    assert done.improved.verdict == "consistent"
-    assert (tmp_path / "improved.toml").read_text().startswith("# simulation.toml, with the values of a recording")
 
 
 @pytest.mark.slow

@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from trihedron import calibrate, diagnose
-from trihedron.diagnose import diagnose_recording
-from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
-from trihedron.segment import resegment, segment_recording
 from trihedron.session.aliasing import unresolved_variance
 
 SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
@@ -25,13 +21,7 @@ def diagnosed(gravity: float, first: float = 0.0, last: float = 1.0, **arguments
     readings = {name: getattr(recording, name) for name in ("accelerometer", "gyroscope", "temperature_degc")}
     readings = {name: column[rows] for name, column in readings.items() if column is not None}
     recording = replace(recording, time_s=recording.time_s[rows] - recording.time_s[rows.start], **readings)
-    segments = segment_recording(recording)
-    accelerometer, _ = calibrate_norm(
-        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, raw_unit=recording.accelerometer_unit
-    )
-    return diagnose_recording(
-        recording, resegment(recording, segments), calibrate_joint(recording, segments, accelerometer, gravity, "test")
-    )
+    return diagnose(recording, gravity_m_s2=gravity)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 import trihedron
+from diagnosed_session import simulated
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
@@ -14,9 +15,6 @@ from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.records import Recording
 from trihedron.segment import resegment, segment_recording
-from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
 
 NAMED = threshold(0.01)
 
@@ -24,7 +22,7 @@ NAMED = threshold(0.01)
 @cache
 def session(lean_rad, scatter_rad_s, seed=1):
     """Poses that lean by ``lean_rad`` within seconds of being set down, gyro biases drawn anew in each."""
-    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
+    recording, truth = simulated(seed=seed, grade="tactical")
     rng = np.random.default_rng(seed)
     force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
     to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))

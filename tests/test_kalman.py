@@ -113,6 +113,16 @@ def test_the_smoother_is_the_conditional_expectation_given_all_readings():
     np.testing.assert_allclose(drift_sigma, np.sqrt(np.diag(spread)), rtol=1e-6)
 
 
+def test_constants_that_walk_forget():
+    start, pose, f, _ = session(6, 50)
+    poses = _core.KalmanPoses(f @ [0.1, -0.02, 0.01] + 2.0, f, start, pose, np.zeros(50))
+    still, walking = (
+        _core.kalman_track(compiled(white=0.01), _core.KalmanStart(np.zeros(4), np.full(4, 1e6), walk), poses)[1]
+        for walk in (np.zeros(4), np.array([0.0, 0.0, 0.0, 0.1]))
+    )
+    assert walking[-1, 3] > 2.0 * still[-1, 3]
+
+
 def test_factors_keep_their_digits_where_the_printed_covariance_form_loses_them_all():
     rng = np.random.default_rng(6)
     rows = np.column_stack([1.0 + 1e-4 * rng.standard_normal((12, 3)), np.ones(12)])

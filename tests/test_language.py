@@ -26,8 +26,7 @@ from trihedron.report.effects.catalogue import REASONS
 from trihedron.report.effects.relations import FAMILIES
 from trihedron.report.findings.catalogue import ENTRIES as FINDINGS
 from trihedron.report.findings.phrases import LINES, PHRASES
-from trihedron.simulate import hand_session
-from written_session import G, simulated
+from written_session import G, usual
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python/trihedron"
@@ -243,12 +242,11 @@ def keys_of(node: object) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def results():
-    recording = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
-    made = trihedron.calibrate(recording, gravity_m_s2=float(G))
+    recording, made, diagnosis = usual()
     return {
         "calibration": made,
         "verification": trihedron.verify(made, recording, gravity_m_s2=float(G)),
-        "diagnosis": trihedron.diagnose(recording, gravity_m_s2=float(G)),
+        "diagnosis": diagnosis,
         "check": trihedron.check(recording),
         "segments": trihedron.segment(recording),
         "ranking": trihedron.rank([made, made], recording, gravity_m_s2=float(G)),

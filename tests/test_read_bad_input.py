@@ -1,12 +1,14 @@
 """What cannot be read is rejected in one sentence that names the file, the line and the remedy; never a traceback."""
 
 import gzip
+import os
 
 import numpy as np
 import pytest
 
 from test_read import HEADER, readings, text_module, write
 from trihedron.read import ReadError, read_recording
+from trihedron.read.errors import panics_unprinted
 from trihedron.read.memory import check_memory
 
 ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
@@ -120,3 +122,10 @@ def test_two_files_that_do_not_belong_together_are_refused(tmp_path):
     named = write(tmp_path / "named.csv", table[:, :4], "t,ax,ay,az\n")
     with pytest.raises(ReadError, match="swap the two files"):
         read_recording(accelerometer_path=acc, gyroscope_path=named)
+
+
+@pytest.mark.parametrize(("said", "left"), [("a word of caution\n", "a word of caution\n"), ("panicked at x\n", "")])
+def test_words_of_a_library_are_printed_but_for_those_of_a_panic(capfd, said, left):
+    with panics_unprinted():
+        os.write(2, said.encode())
+    assert capfd.readouterr().err == left

@@ -5,6 +5,7 @@ import pytest
 
 import trihedron
 from test_read import HEADER, assert_same, codes, readings, text_module, write
+from test_read_in_silence import motion
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode
 
@@ -137,27 +138,9 @@ def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp
     np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
 
 
-def turning_body(seed: int, rate_hz: float = 50.0, seconds: float = 60.0):
-    """Time (n,), accelerometer (n, 3) [m/s^2] and rates (n, 3) [rad/s] of a body turned to and fro by a hand."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(int(rate_hz * seconds)) / rate_hz
-    rates = np.zeros((len(t), 3))
-    for start in np.arange(3.0, seconds - 3.0, 5.0):
-        inside = (t >= start) & (t < start + 2.0)
-        rates[inside] += rng.uniform(-1, 1, 3) * (1.0 - np.cos(np.pi * (t[inside, None] - start)))
-    down = np.empty((len(t), 3))
-    down[0] = [0.1, 0.3, 1.0] / np.linalg.norm([0.1, 0.3, 1.0])
-    for i in range(1, len(t)):
-        half = down[i - 1] - np.cross(rates[i], down[i - 1]) / rate_hz
-        down[i] = half / np.linalg.norm(half)
-    # A hand accelerates what it turns by some tenths of m/s^2.
-    shake = np.abs(rates) * rng.normal(0.0, 0.3, rates.shape)
-    return t, 9.81 * down + shake + rng.normal(0, 0.01, rates.shape), rates + rng.normal(0, 0.002, rates.shape)
-
-
 @pytest.mark.parametrize(("names", "scale"), [("rx,ry,rz", 1.0), ("вращ_x,вращ_y,вращ_z", 180.0 / np.pi)])
 def test_columns_that_turn_as_gravity_does_are_named_and_others_are_not(tmp_path, names, scale):
-    t, acc, rates = turning_body(0)
+    t, acc, rates = motion(50.0, n_poses=14)
     rng = np.random.default_rng(100)
     others = {
         "gyro": scale * rates,

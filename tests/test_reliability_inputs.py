@@ -50,13 +50,14 @@ def test_what_is_no_plain_file_of_sane_size_is_refused_at_once(tmp_path, reader,
             read_text(name, "calibration file")
 
 
-@pytest.mark.parametrize("text", ["[" * 100_000, "9" * 400, "1e999", "NaN", "[" * 70 + "]" * 70, "{", '"'])
+@pytest.mark.parametrize("text", ["[" * 100_000, "9" * 400, "1e999", "NaN", "[" * 70 + "]" * 70, "{", '"', "a,b\n1,2"])
 @pytest.mark.parametrize(("reader", "error"), READERS)
 def test_depth_and_numbers_beyond_any_document_are_refused(tmp_path, reader, error, text):
     path = tmp_path / "x.json"
     path.write_text(text)
-    with pytest.raises(error):
+    with pytest.raises(error, match=r"x\.json") as caught:
         reader(path)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_header_that_lies_about_an_array_is_refused(tmp_path):

@@ -17,28 +17,21 @@ from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.verification import verification_report
 from trihedron.segment import resegment
 from trihedron.simulate import hand_session
-from written_session import G, simulated
+from written_session import G, simulated, usual
 
 GRAVITY = float(G)
 
 
-@pytest.fixture(scope="module")
-def made():
-    recording = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
-    result = trihedron.calibrate(recording, gravity_m_s2=GRAVITY)
-    return recording, result, trihedron.diagnose(recording, gravity_m_s2=GRAVITY)
-
-
-def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure(made):
-    recording, result, _ = made
+def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
+    recording, result, _ = usual()
     checked = trihedron.verify(result, recording, gravity_m_s2=GRAVITY)
     document = verification_report(checked.verification, checked.segments)
     moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
     assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
 
 
-def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
-    recording, result, _ = made
+def test_a_pose_cut_where_it_was_bumped_keeps_its_number():
+    recording, result, _ = usual()
     segments = result.segments
     pose = segments.poses[4]
     middle = (pose.start + pose.stop) // 2
@@ -50,16 +43,16 @@ def test_a_pose_cut_where_it_was_bumped_keeps_its_number(made):
     assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
 
 
-def test_a_domain_agrees_exactly_up_to_the_limit_of_its_figure_and_is_never_named_by_its_id(made):
-    _, _, found = made
+def test_a_domain_agrees_exactly_up_to_the_limit_of_its_figure_and_is_never_named_by_its_id():
+    _, _, found = usual()
     judged = [one for one in found.domains if one.limit is not None]
     assert {one.domain for one in judged} >= {"static-accel", "moves", "dynamics"}
     assert not re.search("|".join(name for name in DOMAINS if "-" in name), to_text(diagnosis_report(found)))
     assert all(one.disagrees == (one.chi2_per_dof > one.limit) for one in judged)
 
 
-def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
-    recording, result, _ = made
+def test_a_bias_has_one_sign_and_one_value_in_every_report():
+    recording, result, _ = usual()
     text = trihedron.report(result)
     expected = -np.linalg.solve(result.accelerometer.S, result.accelerometer.b)
     expected /= np.linalg.norm(np.linalg.inv(result.accelerometer.S), axis=1)
@@ -84,8 +77,8 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report(made):
         assert "the reading at zero input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
 
 
-def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated(made):
-    _, result, _ = made
+def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
+    _, result, _ = usual()
     document = calibration_report(result.calibration)
     axes = next(s for s in document.sections if s.heading == "Axes").blocks
     for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):

@@ -5,32 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosed_session import simulated
 from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
 from trihedron.segment import segment_recording
 from trihedron.session.model import DYNAMICS, MOVES, core_state
-from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
 
 
 def session_of(seed, n_poses=18):
-    scenario = _of(profile_by_name("adis"), hand_session(n_poses, layout=seed), "session", seed)
-    return simulate(scenario, seed)
+    return simulated(seed=seed, n_poses=n_poses, grade="adis")
 
 
 def fitted_to(recording, gravity):
     segments = segment_recording(recording)
-    accelerometer, _ = calibrate_norm(
-        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, raw_unit=recording.accelerometer_unit
-    )
-    calibration = calibrate_joint(recording, segments, accelerometer, gravity, "test")
+    calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     obs = observe(recording, segments)
     return tune_noise(obs, start_state(obs, calibration), None), calibration
 

@@ -223,12 +223,15 @@ def test_creep_decays_after_a_turn_with_its_time_constant():
     assert np.abs(error[pose.start : pose.stop] + 1e-3 * truth.gravity_m_s2 * np.exp(-t / 8.0)).max() < 1e-5
 
 
-def test_vibration_rectifies_into_an_offset_and_rest_does_not():
+@pytest.mark.parametrize(("sensor", "axis", "kind"), [("gyroscope", 0, Gyroscope), ("accelerometer", 2, Accelerometer)])
+def test_vibration_rectifies_into_an_offset_and_rest_does_not(sensor, axis, kind):
     motion = Motion((Pose(3.0), Vibrate((0, 0, 1), 2.0, 30.0, 10.0), Pose(3.0)))
-    recording, _ = simulate(Scenario(motion, gyroscope=Gyroscope(rectification=(1e-3, 0.0, 0.0))))
-    assert np.abs(recording.gyroscope[50:250, 0]).max() < 1e-9
+    recording, _ = simulate(Scenario(motion, **{sensor: kind(rectification=tuple(1e-3 * np.eye(3)[axis]))}))
+    readings = getattr(recording, sensor)[:, axis]
+    still = readings[50:250].mean()
+    assert np.abs(readings[50:250] - still).max() < 1e-9
     # k times the mean square, high-passed at 5 Hz: power gain r²/(1+r²) at r = 6.
-    assert abs(recording.gyroscope[400:1200, 0].mean() / (1e-3 * 4.0 * 36.0 / 37.0) - 1.0) < 0.01
+    assert abs((readings[400:1200].mean() - still) / (1e-3 * 4.0 * 36.0 / 37.0) - 1.0) < 0.01
     _, truth = both("vibration-rectification", sensor="gyroscope", coefficient=1e-3)
     assert any(s.kind == "vibration" for s in truth.segments)
 

@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from confidence.motion import matrix
 from trihedron import _core
 from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, hand_session
 from trihedron.simulate.motion.attitude import attitude_with_up, up_in_body
@@ -15,6 +15,11 @@ G = 9.81
 EARTH = (0.0, 4.2e-5, 5.9e-5)
 # Fifth and sixth powers of the step in the quadratures below, on motions of at most a few rad/s.
 STEP_S = 1e-3
+
+
+def matrix(q):
+    """(n, 3, 3) of quaternions (n, 4), scalar first."""
+    return Rotation.from_quat(np.roll(q, -1, axis=1)).as_matrix()
 
 
 def busy_motion():

@@ -1,10 +1,12 @@
 """A session as people write it to a file, its calibration, and the one sentence with which a command rejects."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
+import trihedron
 from trihedron.cli import main
 from trihedron.records import Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -19,6 +21,14 @@ def log_text(recording: Recording, *, columns="time_s,ax,ay,az,gx,gy,gz", scale=
 
 def simulated(motion, seed=3):
     return simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0]
+
+
+@cache
+def usual():
+    """A short session, its calibration and its diagnosis, for what is said of them."""
+    log = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
+    gravity = {"gravity_m_s2": float(G)}
+    return log, trihedron.calibrate(log, **gravity), trihedron.diagnose(log, **gravity)
 
 
 @pytest.fixture(scope="module")

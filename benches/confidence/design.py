@@ -7,10 +7,12 @@ The bias that a session can know is the mean over its poses.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from confidence.motion import G, attitude, exponential, matrix, multiply, running_product, vector_of
+from confidence.motion import G, attitude
 from confidence.sensor import DEG, Truth, one_over_f
 from confidence.sessions import directions
+from motion import running_product
 
 FACTORS = {
     "rate_hz": (25.0, 100.0, 400.0),
@@ -74,7 +76,7 @@ def _turns(phi_from, target, path):
     """Rotation vectors in the body that lead from an attitude to another one: at once, or axis after axis."""
     between = phi_from.T @ target
     if path == "free":
-        return [vector_of(between)]
+        return [Rotation.from_matrix(between).as_rotvec()]
     y = -np.arcsin(np.clip(between[2, 0], -1.0, 1.0))
     z, x = np.arctan2(between[1, 0], between[0, 0]), np.arctan2(between[2, 1], between[2, 2])
     return [axis * angle for axis, angle in zip(np.eye(3)[::-1], (z, y, x), strict=True) if abs(angle) > 0.05]
@@ -84,19 +86,19 @@ def _motion(of, rng):
     """Rates (n, 3) and specific force (n, 3) in the body on the fine grid, where it rests (n,), its steps a sample."""
     per = PER_SAMPLE.get(of["rate_hz"]) or max(int(600.0 / of["rate_hz"]), 2)
     dt = 1.0 / (of["rate_hz"] * per)
-    q = exponential(vector_of(attitude(rng.normal(size=3), rng.uniform(0.0, 6.28))))
+    q = Rotation.from_matrix(attitude(rng.normal(size=3), rng.uniform(0.0, 6.28)))
     targets = [attitude(d, rng.uniform(0.0, 2.0 * np.pi)) for d in directions(of["poses"], rng)]
     bumped = rng.integers(1, len(targets)) if of["outlier"] != "none" else -1
-    rates, pushes, rest, turned = [], [], [], [q[None]]
+    rates, pushes, rest, turned = [], [], [], [q]
 
     def add(w, a, is_still):
         nonlocal q
-        path = multiply(np.broadcast_to(q, (len(w), 4)), running_product(w * dt))
-        q = path[-1] / np.linalg.norm(path[-1])
+        path = q * running_product(w * dt)
+        q = path[-1]
         rates.append(w), pushes.append(a), rest.append(np.full(len(w), is_still)), turned.append(path)
 
     for k, target in enumerate(targets):
-        turns = _turns(matrix(q), target, of["path"]) if k else []
+        turns = _turns(q.as_matrix(), target, of["path"]) if k else []
         for phi in turns:
             n = max(round(of["move_s"] / len(turns) * rng.uniform(0.8, 1.25) / dt), 8)
             u, t = ((np.arange(n) + 0.5) / n)[:, None], np.arange(n)[:, None] * dt
@@ -120,8 +122,8 @@ def _motion(of, rng):
         add(w, a, True)
     w, a = np.vstack(rates), np.vstack(pushes) + np.array([0.0, 0.0, G])
     # At the middle of each step, as the rates are: half a step apart is a delay between the sensors.
-    R = matrix(multiply(np.vstack(turned)[:-1], exponential(0.5 * dt * w)))
-    return w, np.einsum("nji,nj->ni", R, a), np.concatenate(rest), per
+    middle = Rotation.concatenate(turned)[:-1] * Rotation.from_rotvec(0.5 * dt * w)
+    return w, middle.inv().apply(a), np.concatenate(rest), per
 
 
 def _sampled(values, per, sampling):

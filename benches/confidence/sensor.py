@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from confidence.motion import G, matrix
+from confidence.motion import G
 from trihedron.records import Recording
 
 DEG = np.pi / 180.0
@@ -52,7 +52,7 @@ def read_out(
     """
     rate_hz = 1.0 / (motion.step * per)
     at = np.arange(0, len(motion.w) - 1, per)
-    R = matrix(motion.q[at])
+    R = motion.q[at].as_matrix()
     # Rate at a node: mean of the steps on both sides.
     before = np.maximum(at - 1, 0)
     w = 0.5 * (motion.w[before] + motion.w[at])

@@ -1,137 +1,20 @@
-//! The joint model of a session: derivatives against differences, score at the truth.
+//! The joint model of a session: derivatives against differences, one end whatever the start.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use trihedron::rotation::exp;
+use nalgebra::{DMatrix, DVector, Vector3};
 use trihedron::session_model::chain::Layout;
 use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
-use trihedron::session_model::moves::{Move, MoveNoise};
+use trihedron::session_model::moves::Move;
 use trihedron::session_model::strength_search::Within;
 use trihedron::session_model::strengths::tune;
-use trihedron::session_model::{Distortion, Session, State, StaticMeans, Strengths};
+use trihedron::session_model::{Distortion, Session, State, Strengths};
 
-/// A small generator of uniform numbers in (-1, 1): the test must not depend on the simulator.
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next())
-    }
-
-    /// Sum of twelve: close enough to normal.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| 0.5 * self.next()).sum()
-    }
-}
+use super::made_session::{Uniform, made as made_of};
 
 const N_POSES: usize = 7;
-const G: f64 = 9.81;
 
-/// A session read without noise by a known instrument, smooth turns between poses, with uneven timestamps and one repeated.
 fn made(scatter: bool) -> (Session, State) {
-    let mut random = Uniform(7);
-    let force_scale = Matrix3::new(0.9, 0.0, 0.0, 0.01, 1.1, 0.0, -0.02, 0.03, 1.05);
-    let rate_scale = Matrix3::new(0.01, 1e-4, -2e-4, 0.0, 0.011, 1e-4, 2e-4, 0.0, 0.009);
-    let force_bias = Vector3::new(0.1, -0.2, 0.05);
-    let zeros: Vec<Vector3<f64>> = (0..N_POSES).map(|_| random.vector() * 3.0).collect();
-    let slow: Vec<Vector3<f64>> = (0..N_POSES)
-        .map(|i| {
-            if i == 0 {
-                Vector3::zeros()
-            } else {
-                random.vector() * 0.01
-            }
-        })
-        .collect();
-    let mut up = vec![Vector3::new(0.3, -0.5, 0.8).normalize()];
-    let mut moves = Vec::new();
-    let mut first_point = 0;
-    let pose_time: Vec<f64> = (0..N_POSES).map(|i| 5.0 * i as f64).collect();
-    let (inverse_force, inverse_rate) = (
-        force_scale.try_inverse().unwrap_or_default(),
-        rate_scale.try_inverse().unwrap_or_default(),
-    );
-    for m in 0..N_POSES - 1 {
-        let axis = random.vector().normalize();
-        let n = 61;
-        let mut time: Vec<f64> = (0..n)
-            .map(|k| 5.0 * m as f64 + 2.0 + 0.02 * k as f64 + 0.002 * random.next())
-            .collect();
-        time[30] = time[29];
-        let span = time[n - 1] - time[0];
-        let mut rate = Vec::new();
-        let mut force = Vec::new();
-        for t in &time {
-            let x = (t - time[0]) / span;
-            let angle =
-                1.8 * (x - (2.0 * std::f64::consts::PI * x).sin() / (2.0 * std::f64::consts::PI));
-            let speed = 1.8 / span * (1.0 - (2.0 * std::f64::consts::PI * x).cos());
-            let fraction = (t - pose_time[m]) / (pose_time[m + 1] - pose_time[m]);
-            let zero = zeros[m] * (1.0 - fraction) + zeros[m + 1] * fraction;
-            let offset = slow[m] * (1.0 - fraction) + slow[m + 1] * fraction;
-            rate.push(inverse_rate * (axis * speed) + zero);
-            let here = exp(&(-axis * angle)) * up[m] * G;
-            force.push(inverse_force * (here - force_bias) + offset);
-        }
-        up.push(exp(&(-axis * 1.8)) * up[m]);
-        moves.push(Move::new(
-            m,
-            &time,
-            rate,
-            force,
-            [pose_time[m], pose_time[m + 1]],
-            [Vector3::zeros(); 2],
-            first_point,
-        ));
-        first_point += n;
-    }
-    let noise_force = Vector3::new(1e-3, 1.2e-3, 0.9e-3);
-    let noise_rate = Vector3::new(0.02, 0.03, 0.025);
-    let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| {
-        let sigma = vec![density / 2.0; mean.len()];
-        StaticMeans::of(mean, sigma, density, None).expect("means without verticals")
-    };
-    let force_mean = (0..N_POSES)
-        .map(|i| inverse_force * (up[i] * G - force_bias) + slow[i])
-        .collect();
-    let session = Session {
-        gravity: G,
-        time_s: pose_time,
-        force: at_rest(force_mean, noise_force),
-        rate: Some(at_rest(zeros.clone(), noise_rate)),
-        moves: std::sync::Arc::new(moves),
-        noise: MoveNoise {
-            force_density: noise_force,
-            rate_density: noise_rate,
-            jitter_s: 0.0,
-            nominal_step_s: 0.02,
-        },
-        prior: None,
-        scatter: scatter.then_some([noise_force / 2.0, noise_rate / 2.0]),
-        expected_scatter: 0.0,
-    };
-    let state = State {
-        force_scale,
-        force_bias,
-        rate_scale,
-        up,
-        pose_rate_bias: zeros,
-        pose_force_bias: slow,
-        own: [
-            vec![Vector3::zeros(); N_POSES],
-            vec![Vector3::zeros(); N_POSES],
-        ],
-        effect: DVector::zeros(0),
-    };
-    (session, state)
+    made_of(N_POSES, 61, scatter)
 }
 
 const STRENGTHS: Strengths = Strengths {
@@ -298,69 +181,6 @@ fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
     assert!(found.corner_s.iter().all(|corner| *corner >= 50.0 - 1e-9));
     assert!(found.scatter[0] <= 2.0 + 1e-9 && found.scatter[1..].iter().all(|s| *s <= 0.5 + 1e-9));
     assert!(found.excess.iter().all(|excess| *excess <= 1.0 + 1e-9));
-}
-
-#[test]
-fn the_score_vanishes_at_the_truth_on_average_though_zeros_scatter() {
-    // Where the score of the gyro's S vanishes, over sessions of noisy readings whose zeros scatter by a hundred standard
-    // errors: on average at the truth. A whitening that follows S without its derivative pulls S to zero there.
-    let (clean, truth) = made(false);
-    let none = Distortion::default();
-    let mut random = Uniform(21);
-    let n_sessions = 60;
-    // A strong walk: scatter must be carried by the zeros, not by S.
-    let strong = Strengths {
-        corner_s: [40.0, 1e-2],
-        ..STRENGTHS
-    };
-    // What the integration of uneven samples leaves is the same in every session: it is not the estimator's.
-    let reference = fit(&clean, truth.clone(), strong, &none)
-        .expect("fit")
-        .state
-        .rate_scale;
-    let mut sums = [0.0; 9];
-    let mut squares = [0.0; 9];
-    for _ in 0..n_sessions {
-        let mut session = clean.clone();
-        let mut state = truth.clone();
-        let zeros: Vec<Vector3<f64>> = (0..N_POSES)
-            .map(|_| Vector3::from_fn(|_, _| random.normal()))
-            .collect();
-        let rest = session.rate.as_mut().expect("gyro");
-        for i in 0..N_POSES {
-            for c in 0..3 {
-                rest.mean[i][c] += zeros[i][c] + rest.sigma[i][c] * random.normal();
-                session.force.mean[i][c] += session.force.sigma[i][c] * random.normal();
-            }
-            state.pose_rate_bias[i] = rest.mean[i];
-        }
-        for one in std::sync::Arc::make_mut(&mut session.moves) {
-            for k in 0..one.rate.len() {
-                let x = one.fraction[k];
-                one.rate[k] += zeros[one.before] * (1.0 - x) + zeros[one.before + 1] * x;
-                for c in 0..3 {
-                    one.rate[k][c] +=
-                        session.noise.rate_density[c] / 0.02_f64.sqrt() * random.normal();
-                    one.force[k][c] +=
-                        session.noise.force_density[c] / 0.02_f64.sqrt() * random.normal();
-                }
-            }
-        }
-        let found = fit(&session, state, strong, &none).expect("fit");
-        for i in 0..3 {
-            for j in 0..3 {
-                let error = found.state.rate_scale[(i, j)] - reference[(i, j)];
-                sums[3 * i + j] += error;
-                squares[3 * i + j] += error * error;
-            }
-        }
-    }
-    for c in 0..9 {
-        let mean = sums[c] / f64::from(n_sessions);
-        let sigma = (squares[c] / f64::from(n_sessions)).sqrt() / f64::from(n_sessions).sqrt();
-        // Nine means of 60: 4 sigma is passed by chance once in 1700 runs, and the seed is fixed.
-        assert!(mean.abs() < 4.0 * sigma, "{c}: {mean} +- {sigma}");
-    }
 }
 
 /// One move with constant readings, so that an inserted sample is the motion that was lost there.

@@ -4,17 +4,6 @@ use trihedron::simd::Instructions;
 use trihedron::stillness::{block_statistics, block_statistics_with};
 
 #[test]
-fn blocks_give_mean_and_unbiased_variance() {
-    let readings: Vec<f64> = (0..6)
-        .flat_map(|k| [f64::from(k), 1.0, -2.0 * f64::from(k)])
-        .collect();
-    let blocks = block_statistics(&readings, 3).expect("legal question");
-    assert_eq!(blocks.mean, vec![[1.0, 1.0, -2.0], [4.0, 1.0, -8.0]]);
-    assert_eq!(blocks.variance, vec![[1.0, 0.0, 4.0], [1.0, 0.0, 4.0]]);
-    assert_eq!(blocks.count, vec![3, 3]);
-}
-
-#[test]
 fn rows_that_are_missing_are_skipped() {
     let nan = f64::NAN;
     let readings = [
