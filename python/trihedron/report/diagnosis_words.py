@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from shlex import quote
 
+from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
 from trihedron.report.numbers import (
+    capital,
     engineering_exponent,
     listed,
     plain_number,
@@ -105,7 +107,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
         store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
-        return _dependent(diagnosis) or store
+        serious = own_serious(diagnosis)
+        return _dependent(diagnosis) or (store if serious is None else capital(serious.action))
     if diagnosis.verdict == "not-testable":
         return ""
     if diagnosis.verdict == "unexplained":
@@ -150,6 +153,14 @@ def _dependent(diagnosis: Diagnosis) -> str:
     """The action for a reference that is not independent; empty where it is or there is none."""
     found = getattr(diagnosis, "findings", ())
     return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
+
+
+def own_serious(diagnosis: Diagnosis) -> Finding | None:
+    """The first serious finding of the calibration that the log itself gives."""
+    name = "updated" if getattr(diagnosis, "model_is_given", False) else "calibration"
+    own = getattr(diagnosis, name, None)
+    findings = () if own is None else own.findings
+    return next((one for one in findings if one.severity is Severity.SERIOUS), None)
 
 
 def _not_compared(diagnosis: Diagnosis) -> str:
