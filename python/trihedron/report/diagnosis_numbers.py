@@ -40,7 +40,7 @@ GROUPS = {
     "gyro-bias": "gyro biases",
     "gyro-scale": "gyro scales",
     "gyro-misalignment": "gyro angles",
-    "triad-alignment": "alignment of the gyro to the accelerometer",
+    "triad-alignment": "gyro alignment",
     "gravity": "gravity",
 }
 MOST_NUMBERS, MOST_NOISE = 3, 2

@@ -43,6 +43,8 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
+_PLAIN = {"1": "", "raw": "", "sigma": "σ"}
+"""Units without another one in print."""
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
@@ -145,8 +147,10 @@ def _taken_by(model: str) -> str:
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
-    """The colour of the verdict; not good for agreement with a reference that was computed from these readings."""
-    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
+    """The colour of the verdict; consistency alone is not good where the reference was computed from these readings, or
+    the log's own calibration is not to be trusted."""
+    is_doubted = _dependent(diagnosis) or own_serious(diagnosis) is not None
+    return "usable" if diagnosis.verdict == "consistent" and is_doubted else LEVELS[diagnosis.verdict]
 
 
 def _dependent(diagnosis: Diagnosis) -> str:
@@ -188,7 +192,7 @@ def rms_in_words(test: DomainTest) -> str:
 
 def size_in_words(value: float, unit: str) -> str:
     """A residual in the customary unit of its kind."""
-    factor, printed = (1.0, "") if unit in ("1", "raw") else shown(unit)
+    factor, printed = (1.0, _PLAIN[unit]) if unit in _PLAIN else shown(unit)
     return with_unit(plain_number(factor * value), printed)
 
 
