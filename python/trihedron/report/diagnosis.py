@@ -14,7 +14,13 @@ from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
-from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
+from trihedron.report.diagnosis_numbers import (
+    differing_blocks,
+    differing_noise,
+    noise_blocks,
+    numbers_blocks,
+    stages_blocks,
+)
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     MEANING,
@@ -59,7 +65,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     ``improved`` the scenario written with the parameters of the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
-        differs = any(one.significant for one in (*diagnosis.parameters, *diagnosis.noise_compared))
+        differs = [one for one in diagnosis.parameters if one.significant] or differing_noise(diagnosis)
         about = (forest_picture(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
         sections.append(Section("Parameters that differ" if differs else "Parameters of the model", about))
     sections += [
