@@ -141,7 +141,7 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, caps
             assert option in known, (line, option)
 
 
-def test_every_part_of_a_divided_table_tells_its_rows_apart():
+def test_every_part_of_a_divided_table_repeats_what_distinguishes_its_rows():
     rows = tuple((f"sensor {k // 2}", f"axis {k % 2}", *["9.87654321"] * 8) for k in range(4))
     table = Table(("sensor", "axis", *(f"quantity {k}" for k in range(8))), rows)
     said = to_text(Document("T", "", "V", True, (Section("S", (table,)),)), width=60)

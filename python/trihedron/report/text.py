@@ -49,7 +49,7 @@ class Style:
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
     """Title, verdict and sections; ``sections`` limits their number (the first fits one screen), ``width`` the columns.
 
-    A wider table is divided between columns; every part repeats the columns that tell its rows apart.
+    A wider table is divided between columns; every part repeats the columns that distinguish its rows.
     """
     style = Style(width) if style is None else style
     style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
@@ -152,7 +152,7 @@ def _table(table: Table, style: Style) -> list[str]:
 
 
 def _keys(rows: Sequence[Sequence[str]]) -> int:
-    """Number of first columns that tell every row from the others: each part of a divided table repeats them."""
+    """Number of first columns that distinguish every row: each part of a divided table repeats them."""
     most = len(rows[0]) - 1 if rows else 1
     return next((k for k in range(1, most) if len({tuple(row[:k]) for row in rows}) == len(rows)), 1)
 
