@@ -95,6 +95,16 @@ def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
     assert np.max(np.abs(difference[free] / scale[free])) < 0.01
 
 
+@pytest.mark.parametrize("run", [1, 2])
+def test_the_filter_trusts_a_session_where_calibrate_does(real_data, run):
+    recording = trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt")
+    by_fit = trihedron.calibrate(recording, gravity_m_s2=9.79871).calibration
+    by_filter = trihedron.kalman(recording, gravity_m_s2=9.79871).calibration
+    assert by_filter.is_trustworthy == by_fit.is_trustworthy == (run == 2)
+    advised = [sensor.accelerometer.observability.advice for sensor in (by_fit, by_filter)]
+    assert advised[0] == advised[1]
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

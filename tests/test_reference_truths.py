@@ -62,6 +62,8 @@ def test_a_stretch_in_which_the_truth_is_wrong_is_said_and_the_rest_is_used():
     attitude[wrong] = turn(0, np.radians([6.0]))[0] @ attitude[wrong]
     found = fit_reference(trial.log, replace(trial.motion, attitude=attitude), G)
     assert any(start < 21.5 and end > 18.5 for start, end in found.error.apart_s)
+    # The attitude begins anew after it: its error there is that of the reference, not the step of 6 degrees.
+    assert np.degrees(np.nanmax(np.abs(found.apart.angle))) < 1.0
     assert np.abs(z_of_bias(found, trial)).max() < 4.5
 
 

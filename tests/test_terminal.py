@@ -139,3 +139,17 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, caps
         known = capsys.readouterr().out
         for option in re.findall(r" (--?[a-z][a-z-]*)", line):
             assert option in known, (line, option)
+
+
+def test_every_part_of_a_divided_table_repeats_what_distinguishes_its_rows():
+    rows = tuple((f"sensor {k // 2}", f"axis {k % 2}", *["9.87654321"] * 8) for k in range(4))
+    table = Table(("sensor", "axis", *(f"quantity {k}" for k in range(8))), rows)
+    said = to_text(Document("T", "", "V", True, (Section("S", (table,)),)), width=60)
+    assert said.count("(continued: ") > 0
+    assert said.count("sensor 1   axis 0") == said.count("(continued: ") + 1
+
+
+def test_a_column_without_a_value_is_left_out():
+    table = Table(("name", "empty", "value"), (("a", "–", "1"), ("b", "", "2")))
+    assert table.head == ("name", "value")
+    assert table.rows == (("a", "1"), ("b", "2"))

@@ -53,7 +53,7 @@ def beside(
     try:
         resting = poses_at_rest(segments, found.gyroscope, has_own_bias=found.kind == ANOTHER_UNIT)
         if resting < FEWEST_POSES:
-            raise InputError(f"{resting} poses are too few for a model of their own")
+            raise InputError(f"{resting} poses are too few for a fit of their own")
         result = ordinary()
     except INPUT_ERRORS as error:
         if found.kind == ANOTHER_UNIT:

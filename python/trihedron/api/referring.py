@@ -227,7 +227,7 @@ def diagnosis_by(
         effects=effects,
         remaining=(left,),
         candidates=tuple(
-            Candidate(name, float(np.exp(-0.5 * max(one.score or 0.0, 0.0))), True)
+            Candidate(name, float(np.exp(-0.5 * max(one.score or 0.0, 0.0))), True, score=one.score)
             for name, one in found.effects.items()
         ),
         baseline=linear,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from textwrap import wrap
 
@@ -19,6 +20,7 @@ from trihedron.report.numbers import how_many
 GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"
 
 POSE, HERE, TARGET = "o", "@", "X"
+_ASIDE = re.compile(r" \([^)]*\)")
 
 
 def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
@@ -97,11 +99,17 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
 
 
 def _in_lines(warnings: Sequence[str], width: int, most: int) -> list[str]:
-    """The first warnings in at most ``most`` lines; a cut is marked by dots."""
-    lines = [line for text in warnings for line in wrap(f"! {text}", width, subsequent_indent="  ")]
+    """The first warnings in at most ``most`` lines: without asides where they do not fit; a cut is marked by dots."""
+    lines = _wrapped(warnings, width)
+    if len(lines) > most:
+        lines = _wrapped([_ASIDE.sub("", text) for text in warnings], width)
     if len(lines) > most:
         lines[most - 1 :] = [f"{lines[most - 1][: width - 4].rstrip()} ..."]
     return lines
+
+
+def _wrapped(warnings: Sequence[str], width: int) -> list[str]:
+    return [line for text in warnings for line in wrap(f"! {text}", width, subsequent_indent="  ")]
 
 
 def _to_go(known: Examination) -> str:

@@ -182,8 +182,9 @@ class BiasOverTime(Plain):
 class ErrorOverTime(Plain):
     """Attitude of the reference relative to the calibrated gyro's over the log's time (m,): vectors (m, 3) [rad].
 
-    Along the axes of the reference's world, about their mean; NaN where the reference has no rows. It is the
-    reference's error plus the gyro's angle random walk since the beginning, ``walk`` [rad/√s].
+    Along the axes of the reference's world, about their mean in each stretch (between gaps of the log and deviating
+    intervals); NaN where the reference has no rows. It is the reference's error plus the gyro's angle random walk since
+    the beginning of the stretch, ``walk`` [rad/√s].
     """
 
     time_s: FloatArray

@@ -18,6 +18,8 @@ LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
 BIAS = "the reading at zero input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
+TRIAD = "triad-alignment is the rotation of the gyro's axes against the accelerometer's"
+"""Definition of the parameter ``triad-alignment`` in every report."""
 
 
 def axis_in_print(name: str) -> str:

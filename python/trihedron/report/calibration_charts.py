@@ -138,6 +138,8 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
                 is_covered = any(name and math.hypot(x - a, y - b) < MARK for a, b, name, *_ in points)
                 label = "" if is_covered or len(up) > MOST_NUMBERED else str(k + 1)
                 points.append((x, y, label, f"pose {k + 1}: up is {words}", "taken"))
+        # Numbered marks last: the others would cover their numbers.
+        points.sort(key=lambda point: point[2] != "")
         for n, (words, d) in enumerate(wanted):
             if sign * d[2] >= -1e-2:
                 points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))

@@ -119,7 +119,8 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
             )
             blocks.append(Picture("orientation", caption, partial(orientation_chart, calibration.accelerometer, means)))
         caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
-        caption += "not recorded; triangles are the most useful next poses, in that order."
+        caption += "not recorded; a number is a pose (the first of coinciding ones); triangles are the most useful "
+        caption += "next poses, in that order."
         blocks.append(Picture("poses", caption, partial(sphere_chart, calibration.accelerometer, means)))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
@@ -191,5 +192,6 @@ def correlation_picture(calibration: Calibration) -> Picture | None:
     if len(names) < FEWEST_NAMES:
         return None
     short = tuple(name.replace("accel ", "a ").replace("gyro ", "w ") for name in names)
-    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope), orange positive, blue negative."
+    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope): orange positive, blue negative, "
+    caption += "full colour at ± 1."
     return Picture("correlations", caption, lambda: Chart((Matrix("correlations", short, r),), legend=False))

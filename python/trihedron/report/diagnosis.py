@@ -7,14 +7,20 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
-from trihedron.records import Finding, Severity
+from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.axes import LETTERS
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
-from trihedron.report.diagnosis_numbers import differing_blocks, noise_blocks, numbers_blocks, stages_blocks
+from trihedron.report.diagnosis_numbers import (
+    differing_blocks,
+    differing_noise,
+    noise_blocks,
+    numbers_blocks,
+    stages_blocks,
+)
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     MEANING,
@@ -22,6 +28,7 @@ from trihedron.report.diagnosis_words import (
     headlines_of,
     level_of,
     next_step_in_words,
+    own_serious,
     p_in_words,
     parameter_unit,
     quantity,
@@ -32,7 +39,7 @@ from trihedron.report.diagnosis_words import (
     where_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.effect_charts import effect_chart, rest_panels
+from trihedron.report.effect_charts import alike, effect_chart, rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import capital, how_many, listed, plain_number
@@ -58,14 +65,15 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     ``improved`` the scenario written with the parameters of the log."""
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
+        differs = [one for one in diagnosis.parameters if one.significant] or differing_noise(diagnosis)
         about = (forest_picture(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
-        sections.append(Section("Parameters that differ", about))
+        sections.append(Section("Parameters that differ" if differs else "Parameters of the model", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", candidates_blocks(diagnosis)),
-        Section("Calibration and noise", models_blocks(diagnosis)),
+        Section("Calibration and noise", _models(diagnosis)),
     ]
     if diagnosis.parameters:
         stages = (*stages_pictures(diagnosis), *stages_blocks(diagnosis, MEANING))
@@ -81,12 +89,14 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     found = getattr(diagnosis, "reference", None)
     strengths = strengths_picture(diagnosis)
+    # By a reference alone a model without a gyro, or a simulation, is not compared.
+    is_compared = model != "" and (diagnosis.parameters != () or not by_reference_alone(diagnosis))
     if found is not None and strengths is not None:
         # The chart of the reference's own error is the lead then.
         sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
-        subtitle=f"{diagnosis.recording_source} against {model}" if model else diagnosis.recording_source,
+        subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
         verdict=verdict_in_words(diagnosis) + _distrust(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
@@ -98,11 +108,22 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     return beside_reference(document, found)
 
 
+def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """S, b and noise; by a reference alone S and b are in its own section."""
+    blocks = models_blocks(diagnosis)
+    return tuple(b for b in blocks if not isinstance(b, Table)) if by_reference_alone(diagnosis) else blocks
+
+
+def by_reference_alone(diagnosis: Diagnosis) -> bool:
+    """Whether the log had too few poses for a diagnosis of its own."""
+    return all(one.domain == "rate" for one in diagnosis.domains) and getattr(diagnosis, "reference", None) is not None
+
+
 def _distrust(diagnosis: Diagnosis) -> str:
     """The first serious finding of the log's own calibration, which the diagnosis began with."""
-    own = None if getattr(diagnosis, "model_is_given", False) else getattr(diagnosis, "calibration", None)
-    serious = [one.seen for one in own.findings if one.severity is Severity.SERIOUS] if own is not None else []
-    return f" The calibration without effects is not to be trusted: {opening(serious[0])}." if serious else ""
+    serious = own_serious(diagnosis)
+    whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
+    return "" if serious is None else f" The {whose} is not to be trusted: {opening(serious.seen)}."
 
 
 def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -248,7 +269,8 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not rows:
         return (Paragraph("No effect was added, so there is no before and after."),)
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
-    caption = "Poses and moves, cross-validated: predicted by fits that did not see them; noise alone gives χ²/dof 1"
+    caption = "Poses and moves, cross-validated: predicted by fits that did not see them; χ²/dof by the noise that the "
+    caption += "model with the effect needs, 1 by that alone"
     return (Table(head, rows, caption),)
 
 
@@ -270,11 +292,12 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     if any(one is None for one in made):
         return []
     out = []
-    for effect in diagnosis.effects:
-        chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
+    for effects in alike(diagnosis.effects, diagnosis.residuals):
+        chart = effect_chart(effects[0], diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{effect.id}: {_drawn_in_words(effect)}. {_without_strongest(effect.statement)}"
-            out.append(Picture(f"effect-{effect.id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
+            said = " ".join(_without_strongest(effect.statement) for effect in effects)
+            caption = f"{listed([effect.id for effect in effects])}: {_drawn_in_words(effects[0])}. {said}"
+            out.append(Picture(f"effect-{effects[0].id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
 
 
@@ -282,7 +305,7 @@ def _drawn_in_words(effect: AcceptedEffect) -> str:
     if rest_panels(effect):
         return "the bias of the log (dots: means of neighbouring stretches) and the curve that it follows"
     if not effect.curves:
-        return "the residual that it explains"
+        return "the residual without effects, and the part of it that all effects together explain"
     beside = any(len(one.data) for one in effect.curves)
     shown = "with what poses show (dots)" if beside else "and the residual of the moves in which it acts"
     return f"what it adds, over the variable that drives it, {shown}"

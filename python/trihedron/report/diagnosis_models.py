@@ -48,7 +48,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             words += f" {unit_in_print(str(diagnosis.noise.get(f'{name}_unit', '')))}"
             corner = diagnosis.noise[f"{name}_corner_s"]
             if corner is not None:
-                words += f"; bias random walk beyond {plain_number(float(corner))} s"
+                words += f"; the bias random walk dominates beyond {plain_number(float(corner))} s"
             facts.append((f"{name} noise", words))
         changes = diagnosis.noise.get(f"{name}_bias")
         if changes:
@@ -87,7 +87,8 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 def candidates_table(diagnosis: Diagnosis) -> Table:
     """Every effect that was tried: its score, the limit on its size, and the outcome."""
-    accepted = {effect.id for effect in diagnosis.effects}
+    outcomes = {effect.id: "accepted, as in the model" for effect in getattr(diagnosis, "own_effects", ())}
+    outcomes |= {effect.id: "accepted" for effect in diagnosis.effects}
     tried = [c for c in diagnosis.candidates if c.applicable]
     redundant = {c.id: f"redundant with {c.superseded_by}" for c in tried if c.superseded_by is not None}
     tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
@@ -95,8 +96,8 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
         (
             c.id,
             "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
-            "–" if c.limit95 is None or c.id in accepted else parameter_in_words(c.limit95, c.size[0].unit),
-            "accepted" if c.id in accepted else redundant.get(c.id) or c.reason or "not needed",
+            "–" if c.limit95 is None or c.id in outcomes else parameter_in_words(c.limit95, c.size[0].unit),
+            outcomes.get(c.id) or redundant.get(c.id) or c.reason or "not needed",
         )
         for c in tried
     ]

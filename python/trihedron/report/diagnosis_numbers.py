@@ -30,7 +30,7 @@ _WORDS = {
     "gyro-bias": "gyro {} bias",
     "gyro-scale": "gyro {} scale",
     "gyro-misalignment": "gyro angle {}",
-    "triad-alignment": "gyro triad turned about {}",
+    "triad-alignment": "gyro turned against the accelerometer about {}",
     "gravity": "gravity (or all three accelerometer scales)",
 }
 GROUPS = {
@@ -40,7 +40,7 @@ GROUPS = {
     "gyro-bias": "gyro biases",
     "gyro-scale": "gyro scales",
     "gyro-misalignment": "gyro angles",
-    "triad-alignment": "the gyro triad's alignment",
+    "triad-alignment": "gyro alignment",
     "gravity": "gravity",
 }
 MOST_NUMBERS, MOST_NOISE = 3, 2
@@ -111,7 +111,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     named = (whole if numbers else noise)[:MOST_NOISE]
     left, quieter = len(numbers) - MOST_NUMBERS, len(noise) - len(named)
     more = [f"{left} more"] if left > 0 else []
-    more += [f"noise and sampling in {how_many(quieter, 'figure')}"] if quieter else []
+    more += [f"{how_many(quieter, 'figure')} of noise and sampling"] if quieter else []
     return [*numbers[:MOST_NUMBERS], *named, *more]
 
 

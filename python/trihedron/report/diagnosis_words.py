@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from shlex import quote
 
+from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
 from trihedron.report.numbers import (
+    capital,
     engineering_exponent,
     listed,
     plain_number,
@@ -41,6 +43,8 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
+_PLAIN = {"1": "", "raw": "", "sigma": "σ"}
+"""Units without another one in print."""
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
@@ -105,7 +109,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
         store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
-        return _dependent(diagnosis) or store
+        serious = own_serious(diagnosis)
+        return _dependent(diagnosis) or (store if serious is None else capital(serious.action))
     if diagnosis.verdict == "not-testable":
         return ""
     if diagnosis.verdict == "unexplained":
@@ -142,14 +147,24 @@ def _taken_by(model: str) -> str:
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
-    """The colour of the verdict; not good for agreement with a reference that was computed from these readings."""
-    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
+    """The colour of the verdict; consistency alone is not good where the reference was computed from these readings, or
+    the log's own calibration is not to be trusted."""
+    is_doubted = _dependent(diagnosis) or own_serious(diagnosis) is not None
+    return "usable" if diagnosis.verdict == "consistent" and is_doubted else LEVELS[diagnosis.verdict]
 
 
 def _dependent(diagnosis: Diagnosis) -> str:
     """The action for a reference that is not independent; empty where it is or there is none."""
     found = getattr(diagnosis, "findings", ())
     return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
+
+
+def own_serious(diagnosis: Diagnosis) -> Finding | None:
+    """The first serious finding of the calibration that the log itself gives."""
+    name = "updated" if getattr(diagnosis, "model_is_given", False) else "calibration"
+    own = getattr(diagnosis, name, None)
+    findings = () if own is None else own.findings
+    return next((one for one in findings if one.severity is Severity.SERIOUS), None)
 
 
 def _not_compared(diagnosis: Diagnosis) -> str:
@@ -177,7 +192,7 @@ def rms_in_words(test: DomainTest) -> str:
 
 def size_in_words(value: float, unit: str) -> str:
     """A residual in the customary unit of its kind."""
-    factor, printed = (1.0, "") if unit in ("1", "raw") else shown(unit)
+    factor, printed = (1.0, _PLAIN[unit]) if unit in _PLAIN else shown(unit)
     return with_unit(plain_number(factor * value), printed)
 
 

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 Level = Literal["good", "usable", "bad"]
 """The colour of a verdict: no problems, usable with warnings, not to be trusted."""
+EMPTY = ("", "–")
+"""Cells without a value."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,20 @@ class Facts:
 
 @dataclass(frozen=True)
 class Table:
-    """Cells already in words; the first column is text, the others are figures (aligned right)."""
+    """Cells already in words; the first column is text, the others are figures (aligned right).
+
+    A column whose cells are all empty or dashes is left out.
+    """
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
+
+    def __post_init__(self) -> None:
+        said = [k for k in range(len(self.head)) if k == 0 or any(row[k] not in EMPTY for row in self.rows)]
+        if self.rows and len(said) < len(self.head):
+            object.__setattr__(self, "head", tuple(self.head[k] for k in said))
+            object.__setattr__(self, "rows", tuple(tuple(row[k] for k in said) for row in self.rows))
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ from trihedron.report.numbers import plain_number, with_sigma
 COARSE = 10
 """Resolution of long curves, in units of a panel; finer steps are not visible."""
 FEW_LETTERS = 20
-"""Most characters of the tick labels below a panel on a phone; beyond, every other label is hidden there."""
+"""Most characters of the tick labels below a panel on a phone; beyond, every other number is hidden there, and
+names take two lines."""
 LONG = 500
 BETWEEN = "|"
 """Separator between the tooltips of the dots, or the bars, of one path."""
@@ -112,7 +113,8 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
     y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
     label_width = max(around[0], _letters(y_ticks))
-    dense = " dense" if sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS else ""
+    is_dense = sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS
+    dense = "" if not is_dense else " named" if panel.x.names else " dense"
     words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
     notes = "".join(_note(note, at) for note in words)
     back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)

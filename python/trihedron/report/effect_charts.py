@@ -111,23 +111,44 @@ def _explained(
     calibration: Calibration,
 ) -> list[Panel]:
     """The residual that an effect explains, over force, rate or time."""
-    domains = {r.domain: r for r in residuals}
-    named = [h.domain for h in effect.held_out if h.domain in domains]
-    if not named or not len(domains[named[0]].before):
+    seen = _seen_in(effect, residuals)
+    if seen is None:
         return []
-    seen = domains[named[0]]
-    drivers = _drivers(effect.id, seen, recording, segments, calibration)
+    drivers = _drivers(_driver(effect, seen), seen, recording, segments, calibration)
     return [_against(seen, label, unit, x) for label, unit, x in drivers]
 
 
+def alike(effects: Sequence[AcceptedEffect], residuals: Sequence[DomainResiduals]) -> list[list[AcceptedEffect]]:
+    """Effects in groups of one picture: those without curves of their own share that of a residual over one driver."""
+    groups: dict[tuple[str, str], list[AcceptedEffect]] = {}
+    for effect in effects:
+        seen = None if effect.curves or rest_panels(effect) else _seen_in(effect, residuals)
+        key = (effect.id, "") if seen is None else (seen.domain, _driver(effect, seen))
+        groups.setdefault(key, []).append(effect)
+    return list(groups.values())
+
+
+def _seen_in(effect: AcceptedEffect, residuals: Sequence[DomainResiduals]) -> DomainResiduals | None:
+    """The residual in which cross-validation shows an effect most."""
+    domains = {r.domain: r for r in residuals}
+    named = [h.domain for h in effect.held_out if h.domain in domains]
+    return domains[named[0]] if named and len(domains[named[0]].before) else None
+
+
+def _driver(effect: AcceptedEffect, seen: DomainResiduals) -> str:
+    if effect.id in _RATE and seen.kind == "move":
+        return "rate"
+    return "force" if effect.id in _FORCE and seen.kind == "pose" else "time"
+
+
 def _drivers(
-    effect_id: str, seen: DomainResiduals, recording: Recording, segments: Segments, calibration: Calibration
+    driver: str, seen: DomainResiduals, recording: Recording, segments: Segments, calibration: Calibration
 ) -> list[tuple[str, str, FloatArray]]:
     has_gyroscope = recording.gyroscope is not None and calibration.gyroscope is not None
-    if effect_id in _RATE and seen.kind == "move" and has_gyroscope:
+    if driver == "rate" and has_gyroscope:
         fastest = fastest_rate(seen.time_before_s, recording, segments, calibration)
         return [("fastest rate of the move [°/s]", "°/s", fastest)]
-    if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
+    if driver == "force" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
         return [(f"f_{AXES[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]

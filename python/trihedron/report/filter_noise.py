@@ -181,7 +181,8 @@ def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
     )
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
     # Measures that reduce the three largest shares.
-    advice = Facts(tuple(CAUSE_WORDS[share.cause] for share in _ranked(one)[:3]))
+    named = (CAUSE_WORDS[share.cause] for share in _ranked(one)[:3])
+    advice = Facts(tuple((f"less {cause}", action) for cause, action in named))
     return Table(head, rows, "Shares of the mean square error, 95 % intervals"), advice
 
 
@@ -216,7 +217,10 @@ def _tested(one: SensorFilterNoise) -> Block:
         "NEES, static",
         f"static [{unit}]",
     )
-    return Table(head, rows, f"{capital(what)}; NEES 3 is right; static: static N and K, reference taken as exact")
+    caption = f"{capital(what)}. NEES, its square over the predicted variance, is 3 where N and K are right"
+    has_static = any(c.static_nees is not None for c in one.consistency)
+    caption += "; static: static N and K, reference taken as exact" if has_static else ""
+    return Table(head, rows, caption)
 
 
 def filter_noise_record(found: FilterNoise) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter
-from trihedron.report.axes import axis_in_print
+from trihedron.report.axes import TRIAD, axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
@@ -203,7 +203,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
         for one in summary.repeated
     ]
     said = "Standard deviations beyond each log's uncertainty. Scales are relative to their mean; misalignments are "
-    said += "departures from 90°."
+    said += f"departures from 90°; {TRIAD}."
     if summary.passed_over:
         said += f" Not counted: {summary.passed_over}."
     return [Paragraph(said), Table(tuple(head), tuple(rows), "Standard deviations between devices and of one device")]

@@ -12,7 +12,7 @@ from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis
 from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, sensors_chart
+from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
@@ -266,8 +266,12 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
-    caption += '(dashed); N is read off at 1 s, K at 3 s; "K < 2" is in the sum and does not show by itself; '
-    caption += "the orange mark is the least deviation."
+    caption += "(dashed); N is read off at 1 s"
+    names = part_names(noise.curve, axes)
+    caption += ", K at 3 s" if any(name.startswith("K ") for name in names) else ""
+    caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
+    found = any(axis.optimal_averaging() is not None for axis in axes)
+    caption += "; the orange mark is the least deviation." if found else "."
     return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, unit, axes))
 
 

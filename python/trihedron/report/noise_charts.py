@@ -100,6 +100,11 @@ def _names(axis: NoiseAxis, symbol: str) -> tuple[str, str]:
     return f"{symbol} < {limit}", f"{symbol} is in the sum, and does not show by itself: below {limit} {unit}"
 
 
+def part_names(curve: AllanCurve, axes: Sequence[NoiseAxis]) -> list[str]:
+    """Labels of all parts that are drawn."""
+    return [part.name for axis in axes if axis.sample_sigma > 0 for part in parts_of(axis, _times(curve))]
+
+
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
     """Curves of one sensor, a panel per axis with equal scales."""
     chosen = [curve.names.index(axis.name) for axis in axes]

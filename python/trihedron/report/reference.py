@@ -127,6 +127,7 @@ def beside_reference(document: Document, found: AgainstReference | None, place: 
     section = Section("Against the reference", reference_blocks(found))
     return replace(
         document,
+        subtitle=f"{document.subtitle} beside {escaped(found.source)}",
         sections=(*document.sections[:place], section, *document.sections[place:]),
         headlines=(*reference_headlines(found), *document.headlines),
         lead=error_picture(found) or document.lead,
@@ -187,7 +188,7 @@ def _vector(one: Estimate, scale: float) -> str:
 
 def _left(fit: FitToReference, scale: float, unit: str) -> str:
     text = f"{plain_number(scale * fit.rms)} {unit} rms unexplained, up to {plain_number(fit.band_hz, 2)} Hz"
-    text += f", {plain_number(scale * fit.rms_held_out)} {unit} cross-validated in sixteenths"
+    text += f", {plain_number(scale * fit.rms_held_out)} {unit} cross-validated over 16 parts of the log"
     if fit.n_left_out:
         text += f"; {fit.n_left_out} of {fit.n_rows} windows excluded"
     return text
@@ -208,7 +209,7 @@ def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
         for i in range(3)
     )
     head = ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]")
-    return Table(head, rows, f"{name} in the reference's body   {symbol} = S {raw}′ + b")
+    return Table(head, rows, f"{name} in the reference's body: {symbol} = S {raw}′ + b")
 
 
 def _effect(ident: str, one: Estimate) -> Table:
@@ -224,7 +225,7 @@ def _effect(ident: str, one: Estimate) -> Table:
         rows.append((", ".join(one.names[k : k + per]), *cells, printed))
     title = _EFFECTS.get(ident, ident).capitalize()
     if one.score is not None:
-        title += f"   score {plain_number(one.score, 3)} (named from {NAMED_FROM:g}{_shown_from(ident, one)})"
+        title += f": score {plain_number(one.score, 3)}, accepted from {NAMED_FROM:g}{_shown_from(ident, one)}"
     return Table(("", "", "", "", ""), tuple(rows), title)
 
 
@@ -233,9 +234,9 @@ def _shown_from(ident: str, one: Estimate) -> str:
     if one.shown_from is None:
         return ""
     if not np.isfinite(one.shown_from):
-        return ": this reference drifts too much to show any"
+        return "; this reference drifts too much to show any"
     size, unit = _SHEET[ident]
-    return f": beside this reference about {plain_number(size * one.shown_from, 2)} {unit} in every number"
+    return f" (detectable here: about {plain_number(size * one.shown_from, 2)} {unit})"
 
 
 def calibration_result_report(result: CalibrationResult) -> Document:
@@ -252,7 +253,9 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
     caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
     caption += "reference's world: the reference's error, and the gyro's random walk of "
     caption += f"{walk}°/√s. Band: ± 2 σ of the slow error."
-    caption += " Orange: where it differs from the other windows." if found.error.apart_s else ""
+    caption += (
+        " Orange: where it differs from the other windows; the mean is new after it." if found.error.apart_s else ""
+    )
     caption += " Grey: gaps." if found.error.gaps_s else ""
     return Picture(name, caption, partial(error_chart, found))
 

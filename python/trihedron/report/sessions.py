@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS, axis_in_print
+from trihedron.report.axes import BIAS, TRIAD, axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
@@ -140,7 +140,7 @@ def _repeatability(model: SessionsModel) -> list[Block]:
             tuple(rows),
             "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
             f"{BIAS}; scales are raw counts per unit, relative to the common value; misalignments are departures "
-            "from 90°.",
+            f"from 90°; {TRIAD}.",
         )
     ]
 

@@ -49,7 +49,7 @@ class Style:
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
     """Title, verdict and sections; ``sections`` limits their number (the first fits one screen), ``width`` the columns.
 
-    A wider table is divided between columns; every part repeats the first column and the caption.
+    A wider table is divided between columns; every part repeats the columns that distinguish its rows.
     """
     style = Style(width) if style is None else style
     style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
@@ -136,18 +136,25 @@ def _facts(facts: Facts, style: Style) -> list[str]:
 def _table(table: Table, style: Style) -> list[str]:
     """The first layout in which all columns fit, else the one with the fewest parts."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
+    keys = _keys(rows[1:])
     found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
-    in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1])))
+    in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1], keys)))
     widths = _widths(in_lines)
     out = _wrap(style.plain(table.caption), style.width) if table.caption else []
-    for n, part in enumerate(_parts(widths, style.width, gap)):
+    for n, part in enumerate(_parts(widths, style.width, gap, keys)):
         if n:
-            names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[1:])
+            names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[keys:])
             out += ["", *_wrap(f"(continued: {names})", style.width)]
         head, *body = (_line(row, part, widths, (style.width, gap)) for row in in_lines)
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
         out += [line for row in body for line in row]
     return out
+
+
+def _keys(rows: Sequence[Sequence[str]]) -> int:
+    """Number of first columns that distinguish every row: each part of a divided table repeats them."""
+    most = len(rows[0]) - 1 if rows else 1
+    return next((k for k in range(1, most) if len({tuple(row[:k]) for row in rows}) == len(rows)), 1)
 
 
 def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
@@ -210,14 +217,16 @@ def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], sp
     return [" ".join(row[chosen[0]]).rstrip(), *_wrap(" ".join(row[chosen[-1]]), columns, "    ", "    ")]
 
 
-def _parts(widths: list[int], columns: int, gap: int) -> list[list[int]]:
-    """Indices of the columns in every part of a table: the first column, and as many others as fit (at least one)."""
+def _parts(widths: list[int], columns: int, gap: int, keys: int = 1) -> list[list[int]]:
+    """Indices of the columns in every part of a table: the first ``keys``, and as many others as fit (at least one)."""
+    first = list(range(min(keys, len(widths))))
+    wide = sum(widths[k] + gap for k in first) - gap
     parts: list[list[int]] = []
-    part, used = [0], widths[0] if widths else 0
-    for k in range(1, len(widths)):
-        if used + gap + widths[k] > columns and len(part) > 1:
+    part, used = list(first), wide
+    for k in range(len(first), len(widths)):
+        if used + gap + widths[k] > columns and len(part) > len(first):
             parts.append(part)
-            part, used = [0], widths[0]
+            part, used = list(first), wide
         part.append(k)
         used += gap + widths[k]
     return [*parts, part]

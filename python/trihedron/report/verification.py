@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records import FindingCode, Recording, Segments, Verification
-from trihedron.report.axes import axis_in_print
+from trihedron.report.axes import TRIAD, axis_in_print
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -130,7 +130,9 @@ def parameters_table(v: Verification) -> Table:
         judged = times if one.is_judged else "not judged by this log"
         rows.append((f"{one.id} {axis_in_print(one.name)}", unit, differs, sigma, stated, judged))
     head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
-    return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
+    return Table(
+        head, tuple(rows), f"Parameters that do not depend on the frame, against this log's own calibration; {TRIAD}"
+    )
 
 
 def _tables(v: Verification, segments: Segments | None) -> list[Block]:

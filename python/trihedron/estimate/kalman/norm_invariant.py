@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import AXES, XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
 from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
-from trihedron.records.calibration import Observability, SensorCalibration
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
 
@@ -161,11 +161,7 @@ def calibrate_without_references(
     if not converged:
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
-    observability, weak = _observability(one)
-    findings += weak
-    accelerometer = SensorCalibration(
-        S, b, covariance, raw_unit, "m/s^2", "kalman, norm of gravity", observability=observability
-    )
+    accelerometer = SensorCalibration(S, b, covariance, raw_unit, "m/s^2", "kalman, norm of gravity")
     residual = np.linalg.norm(a @ S.T + b, axis=1) - gravity_m_s2
     return NormKalmanCalibration(
         accelerometer=accelerometer,
@@ -211,20 +207,3 @@ def _track(
             one.relinearise(10)
         parameters[i], sigmas[i] = _flat(*one.calibration())
     return parameters, sigmas
-
-
-def _observability(one: NormFilter) -> tuple[Observability, list[Finding]]:
-    """Observability of the nine parameters, from their covariance relative to the scale of each axis and to |g|."""
-    covariance = one._filter.covariance
-    S, _ = one._centred()
-    scale = np.array([1.0 / np.abs(np.diag(S))[j] for _, j in ENTRIES] + [1.0 / one._gravity] * 3)
-    values = np.linalg.eigvalsh(scale[:, None] * covariance * scale)
-    singular = 1.0 / np.sqrt(np.maximum(values, 1e-300))
-    condition = float(singular[0] / singular[-1])
-    direction = np.linalg.eigh(scale[:, None] * covariance * scale)[1][:, -1]
-    names = (*(f"S_{AXES[i]}{AXES[j]}" for i, j in ENTRIES), "b_x", "b_y", "b_z")
-    weakest = names[int(np.argmax(np.abs(direction)))]
-    findings: list[Finding] = []
-    if condition > 100.0:
-        findings.append(Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest=weakest, condition=condition))
-    return Observability(int(np.sum(singular > 1e-9 * singular[0])), 9, condition, singular, weakest=weakest), findings

@@ -9,7 +9,11 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
+from trihedron.estimate.accelerometer.face_poses import are_six_faces
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.accelerometer.poses import PoseDesign
+from trihedron.estimate.accelerometer.verdict import observability_findings
+from trihedron.estimate.kalman.norm_invariant import START_RELATIVE, NormFrame, calibrate_without_references
 from trihedron.estimate.kalman.per_axis import calibrate_with_references
 from trihedron.records import (
     AxisNoise,
@@ -17,10 +21,12 @@ from trihedron.records import (
     FindingCode,
     KalmanCalibration,
     NormKalmanCalibration,
+    Observability,
     PoseTable,
     Recording,
     Segments,
 )
+from trihedron.units import AccelerationUnit
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,4 +172,27 @@ def calibrate_session_without_references(
         extra_variance=extra,
         raw_unit=recording.accelerometer_unit.value,
     )
-    return replace(result, findings=(*findings, *result.findings))
+    observability, weak = _observed(poses, gravity_m_s2, frame, recording.accelerometer_unit)
+    accelerometer = replace(result.accelerometer, observability=observability)
+    return replace(result, accelerometer=accelerometer, findings=(*findings, *result.findings, *weak))
+
+
+def _observed(
+    poses: PoseReadings, gravity_m_s2: float, frame: NormFrame, unit: AccelerationUnit
+) -> tuple[Observability, tuple[Finding, ...]]:
+    """What the poses determine, judged as by ``calibrate``: one verdict for one session."""
+    sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit, frame=frame)
+    assert sensor.quality is not None
+    force = poses.mean @ sensor.S.T + sensor.b
+    sigma = sensor.quality.sigma / gravity_m_s2
+    design = PoseDesign.of(force / np.linalg.norm(force, axis=1)[:, None], sigma)
+    observability = design.observability(float(np.median(sigma)))
+    weak = observability_findings(
+        design,
+        float(np.median(sigma)),
+        observability.advice,
+        is_anchored=any(finding.code is FindingCode.NOT_OBSERVABLE for finding in seen),
+        anchor=START_RELATIVE,
+        are_faces=are_six_faces(poses.mean),
+    )
+    return observability, tuple(weak)

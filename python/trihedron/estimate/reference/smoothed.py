@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import matmul_toeplitz
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.accelerometer import ForceFit, turns, turns_of_frame
 from trihedron.estimate.reference.likelihood import (
     FARTHEST,
@@ -86,7 +86,20 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
     angle = (problem.observed - problem.columns @ mean).reshape(m, 3) - by_walk
     angle[problem.blocks.rows()[:, 0] == 0] = np.nan
     walk = float(strengths[STRENGTHS.index("angle_walk")])
-    return ErrorOverTime(problem.blocks.time_s(), angle - np.nanmean(angle, axis=0), walk)
+    time = problem.blocks.time_s()
+    # The attitude of every stretch begins anew, with a constant of its own.
+    for one in _stretches(found, k, time):
+        if np.isfinite(angle[one]).any():
+            angle[one] -= np.nanmean(angle[one], axis=0)
+    return ErrorOverTime(time, angle, walk)
+
+
+def _stretches(found: MotionFit, k: int, time: FloatArray) -> list[IntArray]:
+    """Blocks about ``time`` (m,) between gaps of the log and deviating blocks."""
+    side = found.sides[k]
+    missing = np.concatenate([[0], np.cumsum(~side.seen)])[np.searchsorted(side.grid.time_s, time)]
+    begins = (np.diff(missing) > 0) | found.points[k].deviates(time)[1:]
+    return np.split(np.arange(len(time)), 1 + np.flatnonzero(begins))
 
 
 def without_slow_error(found: MotionFit, k: int) -> Reference:

@@ -42,11 +42,6 @@ ENTRIES = {
         "The start is too far away, or the poses do not determine the constants.",
         "Give a start near the data sheet, and poses in more directions.",
     ),
-    (Code.WEAKLY_OBSERVABLE, "kalman-norm", WARNING): Words(
-        "The poses determine {weakest} {condition:.0f} times worse than the best determined combination.",
-        "Some directions of gravity in the body were not visited.",
-        "Add poses: the six faces, and edges of the cube between them.",
-    ),
     (Code.WEAKLY_OBSERVABLE, "kalman-sensitivity", WARNING): Words(
         "The attitudes determine the sensitivity to {axis:axis} {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",

@@ -52,7 +52,7 @@ ENTRIES = {
         "An attitude that the unit computed from its own gyro agrees with that gyro by construction.",
         "Believe it only if another instrument measured it.",
     ),
-    (Code.REFERENCE_ONLY, "", NOTE): Words("Only the reference was asked: {why}.", "The log has too few poses."),
+    (Code.REFERENCE_ONLY, "", NOTE): Words("Only the reference was used: {why}.", "The log has too few poses."),
     (Code.ACCELEROMETER_NOMINAL, "", WARNING): Words(
         "The accelerometer was not calibrated: the reference has no force. Its parameters in the file are nominal.",
         "A rate alone says nothing of gravity.",
