@@ -6,7 +6,6 @@ import pytest
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.session.solved import calibrate_moves
-from trihedron.estimate.session.start import MoveOptions
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 
@@ -33,8 +32,7 @@ def solve(recording, truth):
         truth.gravity_m_s2,
         raw_unit=recording.accelerometer_unit,
     )
-    options = MoveOptions(n_folds=0)
-    return segments, alone, calibrate_joint(recording, segments, alone, truth.gravity_m_s2, "given", options)
+    return segments, alone, calibrate_joint(recording, segments, alone, truth.gravity_m_s2, "given")
 
 
 def errors(found, truth):
@@ -70,7 +68,7 @@ def test_the_covariance_of_all_24_parameters_is_honest(sessions):
 def test_the_gyro_alone_agrees_with_the_joint_answer_and_sharpens_the_accelerometer():
     recording, truth = session(3)
     segments, alone, joint = solve(recording, truth)
-    moves, _ = calibrate_moves(recording, segments, alone, truth.gravity_m_s2, MoveOptions(n_folds=0))
+    moves, _ = calibrate_moves(recording, segments, alone, truth.gravity_m_s2)
     assert np.abs((moves.S - joint.gyroscope.S) / joint.gyroscope.sigma_S).max() < 1.0
     np.testing.assert_allclose(moves.sigma_S, joint.gyroscope.sigma_S, rtol=0.25)
     free = np.diag(alone.covariance) > 0.0

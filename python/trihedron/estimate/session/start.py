@@ -186,24 +186,15 @@ MOST_TRIED = 6
 """Number of initial scales: neighbours of the best one, and those that differ by a whole turn."""
 
 
-@dataclass(frozen=True)
-class MoveOptions:
-    """Options of the fit of moves: ``n_folds`` of the cross-validation, 0 for none; ``nominal_scale`` (3, 3) or a
-    number, rad/s per raw unit, for moves that do not determine an initial scale."""
+def scale_matrix(nominal_scale: FloatArray | float) -> FloatArray:
+    """Nominal scale (3, 3), rad/s per raw unit, from a number or a matrix.
 
-    n_folds: int = 5
-    nominal_scale: FloatArray | float | None = None
-
-    def nominal(self) -> FloatArray | None:
-        """Nominal scale as a matrix (3, 3)."""
-        if self.nominal_scale is None:
-            return None
-        value = np.asarray(self.nominal_scale, dtype=np.float64)
-        if value.ndim == 0:
-            return float(value) * np.eye(3)
-        if value.shape != (3, 3):
-            raise RefusedError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
-        return value
+    Raises ``RefusedError`` when it is neither.
+    """
+    value = np.asarray(nominal_scale, dtype=np.float64)
+    if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
+        raise RefusedError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
+    return value * np.eye(3) if value.ndim == 0 else value
 
 
 def integral_start(
@@ -254,7 +245,7 @@ def starts(
     """
     found = []
     if nominal is not None:
-        found.append(np.asarray(nominal, dtype=np.float64))
+        found.append(nominal)
     linear = integral_start(recording, measured, accelerometer)
     if linear is not None:
         found.append(linear)
