@@ -10,7 +10,7 @@ from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import REFUSALS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, with_prior
@@ -82,7 +82,8 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
 
     Raises ``RefusedError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
-    measured, near = begun(log, None if nominal_scale is None else scale_matrix(nominal_scale))
+    measured = measure_moves(log.recording, log.segments, log.accelerometer)
+    near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)
     measured, solution, seen = found.measured, found.solution, found.seen
     shown = solution.as_read(measured)
