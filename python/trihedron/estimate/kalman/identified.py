@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.errors import RefusedError
-from trihedron.estimate.noise.terms import unit_densities
+from trihedron.estimate.noise.terms import continuous_densities
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
 from trihedron.records.noise import NoiseAxis
@@ -119,7 +119,7 @@ def check_same_adc(
             )
         middles = np.array([math.sqrt(octave.low_hz * octave.high_hz) for octave in seen])
         squares = np.array([noise.quantisation, noise.white, noise.flicker, noise.walk]) ** 2
-        expected = squares @ unit_densities(middles, rate_hz)
+        expected = squares @ continuous_densities(middles, rate_hz)
         if not np.all(expected > 0.0):
             continue
         densities = np.array([(one.density.lower, one.density.value, one.density.upper) for one in seen])
