@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.session.solved import calibrate_moves
-from trihedron.estimate.session.start import MoveOptions
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose
@@ -24,7 +23,7 @@ def scenario(motion: Motion, gyro_noise=2e-4, accel_noise=1e-3, S=SCALE, b=BIAS,
     )
 
 
-def calibrated(recording, segments, truth, options=None, error=None, covariance=None):
+def calibrated(recording, segments, truth, nominal=None, error=None, covariance=None):
     """The gyro beside an accelerometer that is known, or off by ``error`` of a stated covariance."""
     error = np.zeros(12) if error is None else error
     given = SensorCalibration(
@@ -35,7 +34,7 @@ def calibrated(recording, segments, truth, options=None, error=None, covariance=
         "m/s^2",
         "given",
     )
-    return calibrate_moves(recording, segments, given, truth.gravity_m_s2, *([options] if options else []))
+    return calibrate_moves(recording, segments, given, truth.gravity_m_s2, nominal)
 
 
 def z_scores(found, truth):
@@ -58,7 +57,7 @@ def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate(s
     scores = []
     for seed in range(sessions):
         recording, truth = simulate(scenario(hand_session(12, pose_s=2.0, first_pose_s=3.0)), seed)
-        found, _ = calibrated(recording, segments_from_truth(recording, truth), truth, MoveOptions(n_folds=0))
+        found, _ = calibrated(recording, segments_from_truth(recording, truth), truth)
         scores.append(z_scores(found, truth))
     scores = np.array(scores)
     # 12 scores a session; the parameters of one run are correlated, so count 6 independent ones: three binomial sigmas.
@@ -76,7 +75,7 @@ def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_
     distance = []
     for _ in range(draws):
         error = rng.normal(size=12) * sigma
-        found, _ = calibrated(recording, segments, truth, MoveOptions(n_folds=0), error, np.diag(sigma**2))
+        found, _ = calibrated(recording, segments, truth, None, error, np.diag(sigma**2))
         e = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
         distance.append(e @ np.linalg.solve(found.covariance, e))
     # Draws of χ²(12), whose variance is 24: four standard deviations of their sum.
@@ -100,7 +99,7 @@ def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
         steps += [MoveTo(direction, 2.0, wobble_deg=0.0), SimulatedPose(3.0)]
     recording, truth = simulate(scenario(Motion(tuple(steps))), seed=1)
     segments = segments_from_truth(recording, truth)
-    found, findings = calibrated(recording, segments, truth, MoveOptions(nominal_scale=1.0))
+    found, findings = calibrated(recording, segments, truth, 1.0)
     finding = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
     assert "Y axis" in finding.action
     assert "Z axis" in finding.action
@@ -169,11 +168,11 @@ def test_held_out_moves_are_predicted_as_well_as_the_error_bars_say(quiet):
 def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
     recording, truth, segments = quiet
     rows = {name: getattr(recording, name)[:500] for name in ("time_s", "accelerometer", "gyroscope")}
-    for log, parts, options, words in (
+    for log, parts, nominal, words in (
         (replace(recording, gyroscope=None), segments, None, "no gyroscope"),
         (recording, replace(segments, moves=()), None, "no move between two poses"),
         (replace(recording, **rows), segments, None, "another log"),
-        (recording, segments, MoveOptions(nominal_scale=np.ones(3)), r"\(3, 3\)"),
+        (recording, segments, np.ones(3), r"\(3, 3\)"),
     ):
         with pytest.raises(ValueError, match=words):
-            calibrated(log, parts, truth, options)
+            calibrated(log, parts, truth, nominal)

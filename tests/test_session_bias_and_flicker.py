@@ -8,7 +8,6 @@ from confidence.sessions import hand
 from trihedron import _core, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
-from trihedron.estimate.session.start import MoveOptions
 from trihedron.records import Recording
 from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
@@ -40,7 +39,7 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
         alone, _ = calibrate_norm(
             segments.accelerometer_mean, segments.accelerometer_sigma_mean, truth.gravity_m_s2, raw_unit="m/s^2"
         )
-        found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given", MoveOptions(n_folds=0))
+        found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given")
         middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
         # f = S a' + b, so that b is minus the bias.
         away.append(found.accelerometer.b + drift * middle)

@@ -20,12 +20,11 @@ from trihedron.estimate.accelerometer.whole_turns import opposite_headings
 from trihedron.estimate.gyroscope import turn_axes
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
-from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
+from trihedron.estimate.gyroscope.turn_angles import SCALE_TOLERANCE, TurnAngleUnknownError
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.estimate.session.solved import calibrate_moves, scale_by_gravity
-from trihedron.estimate.session.start import MoveOptions
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -153,10 +152,9 @@ def calibrate(
         if loss != "linear" and method == "joint" and recording.gyroscope is not None:
             raise InputError(f"--loss {loss} belongs to --method separate: a fit of both sensors has none.")
         wanted = frame or "lower"
-        options = MoveOptions(nominal_scale=gyroscope_nominal)
         try:
             calibration = _by_poses(
-                recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
+                recording, segments, gravity, source, method, wanted, axis_signs, loss, gyroscope_nominal, turns_deg
             )
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
@@ -228,7 +226,7 @@ def _by_poses(
     frame: Frame,
     axis_signs: Sequence[int] | None,
     loss: Loss,
-    options: MoveOptions,
+    nominal: float | None,
     turns_deg: Sequence[float] | None,
 ) -> Calibration:
     assert segments.accelerometer_mean is not None
@@ -253,11 +251,11 @@ def _by_poses(
     try:
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
-            both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            return replace(both, findings=(*_still_said(found), *both.findings))
-        gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
+            both = calibrate_joint(recording, segments, accelerometer, gravity, source, nominal)
+            return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
+        gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
     except INPUT_ERRORS as error:
-        return _without_gyroscope(alone, str(error))
+        return _without_gyroscope(alone, error)
     return _together(alone, gyroscope, more)
 
 
@@ -309,7 +307,7 @@ def _by_faces(
     except INPUT_ERRORS as error:
         if turns_deg is not None:
             raise
-        return _without_gyroscope(alone, str(error))
+        return _without_gyroscope(alone, error)
     return _together(alone, gyroscope, more)
 
 
@@ -337,9 +335,10 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
     return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
 
 
-def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
-    if why == AMBIGUOUS:
+def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:
+    if isinstance(error, TurnAngleUnknownError):
         finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
     else:
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=words("because", sentence=why))
+        why = words("because", sentence=str(error))
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why)
     return replace(alone, findings=(*alone.findings, finding))

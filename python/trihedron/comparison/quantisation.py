@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY
+from trihedron.arrays import AXES
 from trihedron.comparison.draws import NAMES
 from trihedron.comparison.noise import SENSORS, Sampled, Sensor, measured_row
+from trihedron.estimate.noise.correlation_time import Octaves
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
@@ -22,7 +23,8 @@ STANDS_OUT = 4.0
 LEAST_RATIO = 1.5
 """Ratio of Q from which it differs, as of an octave's density."""
 FEWEST_OCTAVES = 4
-_ROUNDS = 5
+LEAST_MODEL = 0.1
+"""Smallest prediction, relative to the density, that an error is relative to."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class WhiteAndQuantisation:
 
 
 def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
-    """Least squares of N² + 4 Q² rate sin²(πf/rate) to the densities of the octaves, errors relative to the model.
+    """N² + 4 Q² rate sin²(πf/rate) fitted to the densities of the octaves, errors relative to the model.
 
     Rounding of an integral leaves the first difference over the time step of white noise of variance Q², with an Allan
     variance of 3 Q²/τ² (docs/noise.md, 8).
@@ -56,24 +58,16 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     is_filtered = axis.corner_hz is not None and axis.corner_hz.value < 0.5 * axis.rate_hz
     if len(octaves) < FEWEST_OCTAVES or is_filtered:
         return None
-    density = np.array([o.density.value for o in octaves])
-    relative = np.array([o.density.sigma_log for o in octaves])
-    rising = [4.0 * axis.rate_hz * _mean_sin2(o.low_hz, o.high_hz, axis.rate_hz) for o in octaves]
-    design = np.column_stack([np.ones(len(octaves)), rising])
-    model = density
-    solution, sigma = np.zeros(2), math.inf
-    for _ in range(_ROUNDS):
-        weight = 1.0 / np.maximum(model * relative, TINY)
-        scaled = design * weight[:, None]
-        norms = np.linalg.norm(scaled, axis=0)
-        solution = np.linalg.lstsq(scaled / norms, density * weight, rcond=None)[0] / norms
-        inverse = np.linalg.pinv((scaled / norms).T @ (scaled / norms))
-        # The misfit of the shape widens the error.
-        spread = (density - design @ solution) * weight
-        excess = max(float(spread @ spread) / max(len(octaves) - 2, 1), 1.0)
-        sigma = math.sqrt(excess * float(inverse[1, 1])) / float(norms[1])
-        model = np.maximum(design @ np.maximum(solution, 0.0), 0.1 * density)
-    return WhiteAndQuantisation(max(float(solution[0]), 0.0), max(float(solution[1]), 0.0), sigma)
+    seen = Octaves(octaves)
+    rising = np.array([4.0 * axis.rate_hz * _mean_sin2(o.low_hz, o.high_hz, axis.rate_hz) for o in octaves])
+    white, quantisation = seen.best(rising)
+    model = np.maximum(white + quantisation * rising, LEAST_MODEL * seen.density)
+    # The misfit of the shape widens the error of its size, beside a free floor.
+    weight = 1.0 / (model * seen.sigma) ** 2
+    spread = (seen.density - white - quantisation * rising) ** 2 @ weight
+    across = rising - weight @ rising / weight.sum()
+    excess = max(float(spread) / (len(octaves) - 2), 1.0)
+    return WhiteAndQuantisation(white, quantisation, math.sqrt(excess / float(weight @ across**2)))
 
 
 def _mean_sin2(low_hz: float, high_hz: float, rate_hz: float) -> float:

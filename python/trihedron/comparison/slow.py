@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -86,13 +86,10 @@ def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDiff
     as an effect, or disagrees without one: a walk would then describe the same drift twice.
     """
     out: list[NoiseDifference] = []
-    of_sensor: tuple[tuple[Sensor, Callable[..., tuple[PoseBiases, ...]]], ...] = (
-        ("gyroscope", gyro_biases), ("accelerometer", accel_norms)
-    )  # fmt: skip
-    for sensor, biases_of in of_sensor:
+    for sensor in reversed(SENSORS):
         # A free curve through a simulation's biases is its walk and no mechanism. A recording's may be one.
         has_curve = _has_curve(model[0], sensor)
-        both = biases_of(*model, with_curve=True), biases_of(*recording, with_curve=has_curve)
+        both = _biases(sensor, *model, with_curve=True), _biases(sensor, *recording, with_curve=has_curve)
         if both[0] and both[1]:
             is_open = _drifts(recording[0], sensor, but_curve=has_curve)
             out += _rows(sensor, compare_slow(*both), model[1].rate_hz, alpha, is_open=is_open)
@@ -144,37 +141,28 @@ def _has_curve(found: Diagnosis, sensor: Sensor) -> bool:
     return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") in FREE_CURVES
 
 
-def gyro_biases(
-    found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
+def _biases(
+    sensor: Sensor, found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool
 ) -> tuple[PoseBiases, ...]:
-    """Biases of a session's poses per axis, the effects on them compensated; none without a gyro.
+    """Biases of a session's poses, the effects on them compensated: the gyro's per axis, or the norms of gravity with
+    their directions; none without the sensor.
 
     ``with_curve``: a drift along a free curve is not compensated where it is the only effect.
     """
-    shown = _shown(found, "gyroscope", with_curve=with_curve)
-    if shown is None:
-        return ()
-    values, time_s, white = shown
-    length, _ = _poses(time_s, recording, segments)
-    return tuple(PoseBiases(values[:, k], white[k] / np.sqrt(length), time_s, length) for k in range(3))
-
-
-def accel_norms(
-    found: Diagnosis, recording: Recording, segments: Segments, *, with_curve: bool = False
-) -> tuple[PoseBiases, ...]:
-    """Norms of gravity in a session's poses, with their directions; otherwise like :func:`gyro_biases`."""
-    shown = _shown(found, "accelerometer", with_curve=with_curve)
+    shown = _shown(found, sensor, with_curve=with_curve)
     if shown is None:
         return ()
     values, time_s, density = shown
     length_s, means = _poses(time_s, recording, segments)
+    if sensor == "gyroscope":
+        sigma = density / np.sqrt(length_s)[:, None]
+        return tuple(PoseBiases(values[:, k], sigma[:, k], time_s, length_s) for k in range(3))
     if means is None:
         return ()
     S, b = (np.array(found.extended.accelerometer[name]) for name in ("S", "b"))
     force = correct(means, S, b)
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
-    white = np.sqrt((up**2 @ density**2) / length_s)
-    return (PoseBiases(values[:, 0], white, time_s, length_s, up),)
+    return (PoseBiases(values[:, 0], np.sqrt((up**2 @ density**2) / length_s), time_s, length_s, up),)
 
 
 def _shown(found: Diagnosis, sensor: Sensor, *, with_curve: bool) -> tuple[FloatArray, FloatArray, FloatArray] | None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
-from trihedron.estimate.accelerometer.verdict import covariance_scale
+from trihedron.arrays import FloatArray
+from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.estimate.session.carried import norm_quality
-from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.solved import solved
-from trihedron.estimate.session.start import Log, MoveOptions
-from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.estimate.session.start import Log
+from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
@@ -22,16 +20,16 @@ def calibrate_joint(
     accelerometer: SensorCalibration,
     gravity_m_s2: float,
     gravity_source: str,
-    options: MoveOptions | None = None,
+    nominal_scale: FloatArray | float | None = None,
 ) -> Calibration:
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
     lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
-    ``accelerometer``, calibrated alone; ``options`` and errors are those of ``calibrate_moves``.
+    ``accelerometer``, calibrated alone; ``nominal_scale`` and errors are those of ``calibrate_moves``.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
-    found = solved(log, options or MoveOptions())
+    found = solved(log, nominal_scale)
     solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
     held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
     quality = norm_quality(found.observed, solution, held)
@@ -57,21 +55,6 @@ def calibrate_joint(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=(*_poses_above_noise(quality, solution), *found.findings),
+        findings=(*residual_findings(quality.chi2, quality, solution.accel_bias_rms), *found.findings),
         averaging=solution.averaging,
-    )
-
-
-def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> Iterator[Finding]:
-    """Finding where the gravity error in static poses exceeds the noise of the means, with the bias repeatability."""
-    if covariance_scale(quality.chi2, quality.dof) == 1.0:
-        return
-    yield Finding.of(
-        FindingCode.RESIDUAL_ABOVE_NOISE,
-        "poses-joint",
-        rms_m_s2=quality.rms,
-        floor_m_s2=quality.floor,
-        chi2_per_dof=quality.chi2 / quality.dof,
-        dof=quality.dof,
-        bias_repeatability_m_s2=solution.accel_bias_rms,
     )

@@ -12,7 +12,6 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
-from trihedron.estimate.session.start import denies_cut
 from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
     Calibration,
@@ -180,14 +179,8 @@ def _carried(
 ) -> Carriage:
     """Tilt errors after rotations as in a calibration's report (docs/model-session.md): S of the calibration, a bias
     per pose, without moves that were at the gyro's range limit for long."""
-    accelerometer = calibration.accelerometer
-    measured = measure_moves(recording, segments, accelerometer)
+    measured = measure_moves(recording, segments, calibration.accelerometer)
     seen = carried_by(calibration, gyroscope.S, measured, segments)
-    if np.any(measured.is_lost) and not any(limit.is_word for limit in recording.facts.of("gyroscope").limits):
-        plain = measure_moves(recording, segments, accelerometer, is_bridged=False)
-        as_read = carried_by(calibration, gyroscope.S, plain, segments)
-        if denies_cut(gyroscope.S, as_read.angle_deg, measured, plain):
-            measured, seen = plain, as_read
     told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2
     by_scale2 = seen.by_scale2(gyroscope.covariance[:9, :9])

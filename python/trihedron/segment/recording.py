@@ -27,14 +27,13 @@ from trihedron.segment.runs import (
     SWAY_RAD,
     EdgeNoise,
     Run,
-    close_gaps,
     find_unsteady,
     join_quiet,
     long_enough,
     loose_blocks,
     set_down,
     trim_edges,
-    widen,
+    whole_windows,
     without_approaches,
 )  # fmt: skip
 from trihedron.segment.shaken import find_vibrating
@@ -93,7 +92,7 @@ def segment_blocks(
     if activity.is_drifting(channels):
         return _nothing_found(recording, channels)
     report(0.4, "static stretches")
-    quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
+    quiet = whole_windows(activity.is_quiet, channels.is_valid)
     gravity = _gravity_reading(recording, channels)
     scale = None
     if gravity is not None:

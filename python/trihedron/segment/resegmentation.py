@@ -1,4 +1,4 @@
-"""Poses for a joint model: cut at disturbances, and extended by poses that only vibrate or drift."""
+"""Poses for a joint model: cut at disturbances, and extended by poses that only drift."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import ranges_of
 from trihedron.records import Move, Pose, Recording, Segments
-from trihedron.segment.shaken import is_shaken_by_a_support
 
 SHORTEST_PIECE_S = 0.3
 """Least duration of a piece of a pose beside a disturbance; shorter ones are excluded."""
-RESTING = 1e-3
-"""Mean rate, over the rms of the moves, that counts as zero, times five: below 1 °/s after moves of 3 rad/s."""
 
 
 def resegment(recording: Recording, segments: Segments) -> Segments:
-    """Poses for a model of the whole session: cut at disturbances, and extended by those that only vibrate or drift.
+    """Poses for a model of the whole session: cut at disturbances, and extended by those that only drift.
 
     A disturbance inside a pose rotates the body; the mean over it contradicts the moves on both sides. Between the
-    pieces of a cut pose the gyro carries the attitude like in any move. A pose that vibrates is not quiet, but its mean
-    is static: it becomes a pose of its own, so that a bias that depends on vibration can be estimated.
+    pieces of a cut pose the gyro carries the attitude like in any move.
 
     ``whole`` of the result are the poses as they were found, each averaged over all of its samples.
     """
@@ -35,9 +31,9 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
         was_disturbed |= len(edges) > 2
         kept = [(a, b, i) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest]
         spans += kept or [(pose.start, pose.stop, i)]
-    shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
-    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
-    if len(merged) == segments.n_poses and not shaken and not was_disturbed:
+    drifting = _drifting(recording, segments)
+    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in drifting)]))
+    if len(merged) == segments.n_poses and not drifting and not was_disturbed:
         return segments
     return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
 
@@ -143,51 +139,3 @@ def _means_of(
         # Eight blocks detect a pose that goes on settling (several times the noise), not 20 % of its noise.
         error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
     return mean, error
-
-
-MAX_TURNING = 0.05
-"""Scatter of the rate in a vibrating pose, as a share of the fastest rate of the recording."""
-
-
-def _shaken(
-    recording: Recording, segments: Segments, block_s: float = 0.1, shortest_s: float = 0.8
-) -> list[tuple[int, int]]:
-    """Ranges of moves whose block means are static while the samples vibrate."""
-    if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
-        return []
-    assert segments.accelerometer_sigma is not None
-    assert segments.gyroscope_sigma is not None
-    block = max(round(block_s * recording.rate_hz), 5)
-    bias = np.median(segments.gyroscope_mean, axis=0)
-    spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
-    # A bias that depends on vibration is no motion: rates far below those of real moves count as zero.
-    moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
-    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - bias) ** 2))))
-    fastest = float(np.nanmax(np.abs(recording.gyroscope - bias)))
-    white = (segments.accelerometer_sigma**2, segments.gyroscope_sigma**2)
-    out: list[tuple[int, int]] = []
-    for move in segments.moves:
-        a, b = move.start, move.stop
-        n = (b - a) // block
-        if n * block < shortest_s * recording.rate_hz:
-            continue
-        gyro = recording.gyroscope[a : a + n * block].reshape(n, block, 3)
-        accel = recording.accelerometer[a : a + n * block].reshape(n, block, 3)
-        rate_mean = np.nanmean(gyro, axis=1)
-        own = np.nanstd(gyro, axis=1) / np.sqrt(block)
-        force_mean = np.nanmean(accel, axis=1)
-        force_own = np.nanstd(accel, axis=1)
-        # Zero rate within its own scatter, and force that changes between blocks by less than it vibrates in one.
-        still = (np.abs(rate_mean - bias) < 5.0 * np.hypot(own, spread)).all(axis=1)
-        step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
-        calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
-        shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
-        # A hand that swings back and forth is no pose: a vibrating one rotates slowly beside the session's moves.
-        turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
-        good = still & calm & shaking & ~turning
-        for first, last in ranges_of(good):
-            start, stop = a + first * block + block, a + last * block - block
-            is_long = stop - start >= shortest_s * recording.rate_hz
-            if is_long and is_shaken_by_a_support(recording, (start, stop), white):
-                out.append((start, stop))
-    return out

@@ -92,19 +92,17 @@ def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
     return loose | below
 
 
-def close_gaps(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
-    """Quiet blocks with gaps shorter than a window closed: a true disturbance raises every window that contains it."""
+def whole_windows(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
+    """The whole of the quiet windows: a quiet block is the centre of one, which extends further on either side.
+
+    Gaps shorter than a window are closed: a true disturbance raises every window that contains it.
+    """
     out = quiet.copy()
     for first, last in ranges_of(~quiet):
         if first > 0 and last < len(quiet) and last - first < WINDOW_BLOCKS and is_valid[first:last].all():
             out[first:last] = True
-    return out
-
-
-def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
-    """The whole of the quiet windows: a quiet block is the centre of one, which extends further on either side."""
     kernel = np.ones(2 * (WINDOW_BLOCKS // 2) + 1)
-    return (np.convolve(quiet.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
+    return (np.convolve(out.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
 
 
 def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:

@@ -19,11 +19,10 @@ from trihedron.segment.runs import (
     SWAY_RAD,
     EdgeNoise,
     Run,
-    close_gaps,
     run_mean,
     trim_edges,
     turns_on,
-    widen,
+    whole_windows,
 )  # fmt: skip
 
 SMOOTH_S = 1.0
@@ -77,7 +76,7 @@ def find_vibrating(
     rate = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - usual[gyro], 0.0) * radians_per_reading
     force = np.where(channels.is_valid[:, None], channels.mean[:, ~gyro], 0.0)
     seen = _Seen(_smoothed(force, channels) / gravity, rate * channels.step_s, steady)
-    quiet = widen(close_gaps(quiet_channels(channels, activity, gyro), channels.is_valid), channels.is_valid)
+    quiet = whole_windows(quiet_channels(channels, activity, gyro), channels.is_valid)
     calm = np.linalg.norm(rolling_mean(rate, WINDOW_BLOCKS), axis=1) < CALM_RAD_S
     white = (activity.white_variance[~gyro], activity.white_variance[gyro])
     settled = [run for run in taken if not run.is_unsteady]

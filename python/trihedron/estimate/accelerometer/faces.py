@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
@@ -22,6 +23,8 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
 METHOD = "faces of the case on a level table"
+LARGEST_TILT_RAD = 0.5
+"""Largest tilt that is estimated: no case stands on a table that leans by 29°."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,15 +161,15 @@ def _estimate(seen: _Faces) -> _Estimate:
     fit = fit_known(seen.rows())
     if fit.dof <= 0 or fit.chi2 <= probability.chdtri(fit.dof, verdict.SIGNIFICANCE):
         return _Estimate(fit, fit.covariance, 0.0, fit.chi2)
-    low, high = 0.0, 0.5
-    for _ in range(60):
-        tilt = 0.5 * (low + high)
-        is_too_small = fit_known(seen.tilted(fit.S_a, tilt).rows()).chi2 > fit.dof
-        low, high = (tilt, high) if is_too_small else (low, tilt)
-    widened = fit_known(seen.tilted(fit.S_a, high).rows())
+
+    def excess(tilt: float) -> float:
+        return fit_known(seen.tilted(fit.S_a, tilt).rows()).chi2 - fit.dof
+
+    tilt = float(brentq(excess, 0.0, LARGEST_TILT_RAD)) if excess(LARGEST_TILT_RAD) < 0.0 else LARGEST_TILT_RAD
+    widened = fit_known(seen.tilted(fit.S_a, tilt).rows())
     # A tilt estimated with few degrees of freedom has Student's tails: 1.96 standard uncertainties shall cover 95 %.
     covariance = widened.covariance * face_poses.widened(fit.dof, len(seen.values)) ** 2
-    return _with_doubt(_Estimate(widened, covariance, 0.0, fit.chi2), high**2, seen.g)
+    return _with_doubt(_Estimate(widened, covariance, 0.0, fit.chi2), tilt**2, seen.g)
 
 
 def _held_out(seen: _Faces, estimate: _Estimate, widened: KnownFit) -> FloatArray:

@@ -193,7 +193,7 @@ def _assemble(
         ),
         *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
-        *verdict.residual_findings(chi2, dof, quality.rms, quality.floor),
+        *verdict.residual_findings(chi2, quality),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
     sensor = SensorCalibration(

@@ -9,6 +9,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
+from trihedron.records.calibration import FitQuality
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
@@ -27,19 +28,24 @@ def covariance_scale(chi2: float, dof: int) -> float:
     return chi2 / dof
 
 
-def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> Iterator[Finding]:
-    """Finding where the stated noise does not explain the residuals."""
-    scale = covariance_scale(chi2, dof)
+def residual_findings(
+    chi2: float, quality: FitQuality, bias_repeatability_m_s2: float | None = None
+) -> Iterator[Finding]:
+    """Finding where the stated noise does not explain the residuals; a fit of the session has a bias repeatability."""
+    scale = covariance_scale(chi2, quality.dof)
     if scale == 1.0:
         return
+    case, told = "poses", {"widening": np.sqrt(scale)}
+    if bias_repeatability_m_s2 is not None:
+        case, told = "poses-joint", {"bias_repeatability_m_s2": bias_repeatability_m_s2}
     yield Finding.of(
         FindingCode.RESIDUAL_ABOVE_NOISE,
-        "poses",
-        rms_m_s2=rms,
-        floor_m_s2=floor,
+        case,
+        rms_m_s2=quality.rms,
+        floor_m_s2=quality.floor,
         chi2_per_dof=scale,
-        dof=dof,
-        widening=np.sqrt(scale),
+        dof=quality.dof,
+        **told,
     )
 
 

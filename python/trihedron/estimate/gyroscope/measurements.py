@@ -117,10 +117,8 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     return np.sqrt(np.maximum(variance, converter))
 
 
-def measure_moves(
-    recording: Recording, segments: Segments, accelerometer: SensorCalibration, *, is_bridged: bool = True
-) -> MoveMeasurements:
-    """Collect pose means, moves and noise; clipped gyro readings are bridged if ``is_bridged``.
+def measure_moves(recording: Recording, segments: Segments, accelerometer: SensorCalibration) -> MoveMeasurements:
+    """Collect pose means, moves and noise; clipped gyro readings are bridged.
 
     A significant dependence of the bias on specific force is subtracted sample by sample: interpolation between two
     poses would be wrong in the middle of a move. Raises ``InputError`` when a sensor is missing or there is no move
@@ -149,7 +147,7 @@ def measure_moves(
         bias = np.ascontiguousarray(bias - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope[rows]
-    clipped = bridge_clipping(recording) if is_bridged else None
+    clipped = bridge_clipping(recording)
     extra = rounding_variance(gyroscope, quantum, medians(gyroscope_mean), undithered)
     extra = None if extra is None else extra[rows]
     if clipped is not None:

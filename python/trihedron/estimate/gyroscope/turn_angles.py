@@ -14,6 +14,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
+from trihedron.estimate.session.start import scale_matrix
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
 
@@ -134,10 +135,15 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[
     return MeasuredTurns(raw_angle, np.array(duration), bias, var_rate, var_bias, spread, excess, static_rates, hidden)
 
 
-AMBIGUOUS = (
-    "the readings are counts, and turns of 90, 180 or 360° differ by their scale alone: was each turn 90, 180 or 360°? "
-    "Say --turns 90,-90,... (one angle a turn, 0 leaves it out), or the nominal scale (--gyro-nominal, rad/s per count)"
-)
+class TurnAngleUnknownError(InputError):
+    """Readings are counts, and neither the angles of the turns nor a scale are known: the question to the user."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the readings are counts, and turns of 90, 180 or 360° differ by their scale alone: was each turn 90, 180 "
+            "or 360°? Say --turns 90,-90,... (one angle a turn, 0 leaves it out), or the nominal scale "
+            "(--gyro-nominal, rad/s per count)"
+        )
 
 
 def nominal_matrix(
@@ -153,14 +159,11 @@ def nominal_matrix(
     if stated is not None:
         return stated
     if nominal_scale is not None:
-        value = np.asarray(nominal_scale, dtype=np.float64)
-        if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
-            raise InputError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
-        return value * np.eye(3) if value.ndim == 0 else value
+        return scale_matrix(nominal_scale)
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
         return unit * np.eye(3)
-    raise InputError(AMBIGUOUS)
+    raise TurnAngleUnknownError
 
 
 def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:

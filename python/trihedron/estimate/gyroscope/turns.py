@@ -10,10 +10,10 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.turn_angles import (
-    AMBIGUOUS,
     SCALE_TOLERANCE,
     KnownTurn,
     Turn,
+    TurnAngleUnknownError,
     identify_turns,
     measure_turns,
     nominal_matrix,
@@ -98,7 +98,7 @@ def _require_every_axis(known: Sequence[KnownTurn], used: BoolArray, recording_i
     if spans_three_axes(np.array([one.turn.direction for one in known])[used]):
         return
     if recording_is_counts and any(turn.is_ambiguous for turn in known):
-        raise InputError(AMBIGUOUS)
+        raise TurnAngleUnknownError
     raise InputError(
         f"the {np.count_nonzero(used)} usable turns, of {len(known)}, are about fewer than three directions that are "
         "not in one plane: turn the sensor on a table by known angles on three of its sides, there and back, or give "

@@ -15,7 +15,7 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried_by
+from trihedron.estimate.session.carried import carried_by, move_quality
 from trihedron.probability import fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
@@ -37,8 +37,13 @@ def with_own_residuals(calibration: Calibration, recording: Recording, segments:
         found = _of_poses(accelerometer, accelerometer.quality, segments, calibration.gravity_m_s2)
         accelerometer = replace(accelerometer, quality=found)
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
-        found = _of_moves(calibration, gyroscope, gyroscope.quality, recording, segments)
-        gyroscope = replace(gyroscope, quality=replace(found, chi2=found.chi2 + cost))
+        before = gyroscope.quality
+        measured = measure_moves(recording, segments, calibration.accelerometer)
+        seen = carried_by(calibration, gyroscope.S, measured, segments)
+        used = np.ones(len(seen.angle_deg)) if before.weights is None else before.weights
+        after = move_quality(calibration.gravity_m_s2, seen, None, used, (before.chi2 + cost, before.dof))
+        after = replace(after, n_iterations=before.n_iterations, stopped_because=before.stopped_because)
+        gyroscope = replace(gyroscope, quality=after)
     return replace(calibration, accelerometer=accelerometer, gyroscope=gyroscope)
 
 
@@ -49,27 +54,10 @@ def _of_poses(sensor: SensorCalibration, quality: FitQuality, segments: Segments
     residual = norms(segments.accelerometer_mean, sensor.S, sensor.b)[0] - gravity_m_s2
     seen = gravity_quality(residual, quality.sigma, None)
     rms_dof = seen.rms_dof * np.sqrt(seen.dof / quality.dof) if quality.dof else float("nan")
-    return replace(_seen_alone(quality), residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof))
-
-
-def _of_moves(
-    calibration: Calibration, gyro: SensorCalibration, quality: FitQuality, recording: Recording, segments: Segments
-) -> FitQuality:
-    measured = measure_moves(recording, segments, calibration.accelerometer)
-    seen = carried_by(calibration, gyro.S, measured, segments)
-    known = np.ones(len(seen.angle_deg), dtype=bool) if quality.weights is None else quality.weights > 0.0
-    total = float(np.sum((calibration.gravity_m_s2 * np.radians(seen.angle_deg[known])) ** 2))
     return replace(
-        _seen_alone(quality),
-        residual=seen.residual,
-        angle_deg=seen.angle_deg,
-        rms=float(np.sqrt(total / (2 * np.count_nonzero(known)))),
-        rms_dof=quality.rms_dof * float(np.sqrt(total / (2 * np.count_nonzero(known)))) / quality.rms,
-    )
-
-
-def _seen_alone(quality: FitQuality) -> FitQuality:
-    return replace(quality, held_out=None, held_out_sigma=None, held_out_rms=None, held_out_angle_deg=None)
+        quality, residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof),
+        held_out=None, held_out_sigma=None, held_out_rms=None,
+    )  # fmt: skip
 
 
 BLOCK_S = 0.2

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
+from trihedron.estimate.noise.terms import continuous_densities
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
 from trihedron.records.noise import NoiseAxis
@@ -116,30 +117,17 @@ def check_same_adc(
                 f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
                 f"{noise.resolution:.3g}, would have shown it; {remedy}"
             )
-        ratios = [
-            (octave.density.lower / expected, octave.density.upper / expected, octave.density.value / expected)
-            for octave in seen
-            for expected in [_density(noise, math.sqrt(octave.low_hz * octave.high_hz), rate_hz)]
-            if expected > 0.0
-        ]
-        if not ratios:
+        middles = np.array([math.sqrt(octave.low_hz * octave.high_hz) for octave in seen])
+        squares = np.array([noise.quantisation, noise.white, noise.flicker, noise.walk]) ** 2
+        expected = squares @ continuous_densities(middles, rate_hz)
+        if not np.all(expected > 0.0):
             continue
-        lowest, highest = min(r[0] for r in ratios), max(r[1] for r in ratios)
-        if lowest > MOST_ABOVE**2 or highest < 1.0 / MOST_BELOW**2:
-            middle = math.sqrt(sorted(r[2] for r in ratios)[len(ratios) // 2])
+        densities = np.array([(one.density.lower, one.density.value, one.density.upper) for one in seen])
+        lower, value, upper = (densities.reshape(-1, 3) / expected[:, None]).T
+        if len(seen) and (lower.min() > MOST_ABOVE**2 or upper.max() < 1.0 / MOST_BELOW**2):
+            middle = math.sqrt(sorted(value)[len(seen) // 2])
             words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
             raise InputError(
                 f"the noise of accelerometer {axis} inside the poses of {source} is {words} of the static log, "
                 f"at every frequency: another ADC, range or unit; {remedy}"
             )
-
-
-def _density(noise: AxisNoise, frequency_hz: float, rate_hz: float) -> float:
-    """Two-sided power spectral density of identified noise, raw²/Hz (docs/noise.md, section 3)."""
-    omega = 2.0 * math.pi * frequency_hz
-    return (
-        (omega * noise.quantisation) ** 2 / rate_hz
-        + noise.white**2
-        + noise.flicker**2 / omega
-        + (noise.walk / omega) ** 2
-    )

@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
-from trihedron.records.pose_noise import Measured, PoseNoise
+from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 
 TIMES_PER_OCTAVE = 8
 BEYOND_OCTAVES = 4.0
@@ -37,7 +37,7 @@ FEWEST_OCTAVES = 5
 
 def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     """τ [s] of a sensor's axes with its 95 % interval; ``None`` where none is detected."""
-    tables = [_Octaves(axis) for axis in axes if axis.white is not None and len(axis.octaves) >= FEWEST_OCTAVES]
+    tables = [Octaves(axis.octaves) for axis in axes if axis.white is not None and len(axis.octaves) >= FEWEST_OCTAVES]
     if not tables:
         return None
     lowest, highest = min(t.low[0] for t in tables), max(t.high[-1] for t in tables)
@@ -53,20 +53,20 @@ def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     inside = np.flatnonzero(misfit < misfit[best] + float(chi2.isf(0.05, 1)) * scale)
     if rival - float(misfit[best]) < BETTER * scale or inside[0] == 0 or inside[-1] == n - 1:
         return None
-    if min(t.floor(t.corner(float(tau[best]))) / t.density[-1] for t in tables) < FLOOR:
+    if min(t.best(t.corner(float(tau[best])))[0] / t.density[-1] for t in tables) < FLOOR:
         return None
     lower, upper = float(tau[inside[0] - 1]), float(tau[inside[-1] + 1])
     return Measured(float(tau[best]), lower, upper, math.log(upper / lower) / 3.92)
 
 
-class _Octaves:
+class Octaves:
     """Edges (m,) [Hz], densities (m,) and the standard errors of their logarithms (m,) of one axis."""
 
-    def __init__(self, axis: PoseNoise) -> None:
-        self.low = np.array([o.low_hz for o in axis.octaves])
-        self.high = np.array([o.high_hz for o in axis.octaves])
-        self.density = np.array([o.density.value for o in axis.octaves])
-        self.sigma = np.array([o.density.sigma_log for o in axis.octaves])
+    def __init__(self, octaves: Sequence[OctaveNoise]) -> None:
+        self.low = np.array([o.low_hz for o in octaves])
+        self.high = np.array([o.high_hz for o in octaves])
+        self.density = np.array([o.density.value for o in octaves])
+        self.sigma = np.array([o.density.sigma_log for o in octaves])
 
     def corner(self, tau: float) -> FloatArray:
         """(m,) mean over each octave of 1/(1 + (2πfτ)²)."""
@@ -82,16 +82,12 @@ class _Octaves:
 
     def misfit(self, shape: FloatArray) -> float:
         """χ² of the logarithms for the best floor and size of ``shape`` (m,)."""
-        floor, size = self._best(shape)
+        floor, size = self.best(shape)
         predicted = np.maximum(floor + size * shape, SMALLEST * self.density)
         away = np.log(self.density / predicted) / self.sigma
         return float(away @ away)
 
-    def floor(self, shape: FloatArray) -> float:
-        """White density beside ``shape`` (m,)."""
-        return self._best(shape)[0]
-
-    def _best(self, shape: FloatArray) -> tuple[float, float]:
+    def best(self, shape: FloatArray) -> tuple[float, float]:
         """Floor and size of ``shape``, both non-negative, by least squares of relative errors."""
         predicted, found = self.density, np.zeros(2)
         for _ in range(TURNS):

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import line_coefficients
-from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.estimate.noise.terms import SYMBOLS, continuous_densities
 from trihedron.records.noise import NoiseAxis, TermName
 
 LONGEST_S = 30 * 86400.0
@@ -25,12 +25,7 @@ def relative_sigma(axis: NoiseAxis, duration_s: float) -> dict[TermName, float]:
     edges = np.unique(np.round(np.geomspace(1.0, max(2.0, 2.0 * highest * duration_s), 1200)))
     count = np.diff(edges)
     f = 0.5 * (edges[:-1] + edges[1:] - 1.0) / (2.0 * duration_s)
-    density = {
-        "Q": (2 * np.pi * f) ** 2 / axis.rate_hz,
-        "N": np.ones_like(f),
-        "B": 1.0 / (2 * np.pi * f),
-        "K": 1.0 / (2 * np.pi * f) ** 2,
-    }
+    density = dict(zip(SYMBOLS, continuous_densities(f, axis.rate_hz), strict=True))
     there = [s for s in SYMBOLS if axis.terms[TermName(s)].is_present]
     if not there:
         return {}

@@ -37,12 +37,11 @@ ALIKE = 0.01
 
 @dataclass(frozen=True)
 class Alignment:
-    """``t_reference = t_log (1 + rate) + offset_s``; the correlation, and whether another lag fits equally."""
+    """``t_reference = t_log (1 + rate) + offset_s``, and the correlation."""
 
     offset_s: float
     rate: float
     correlation: float
-    is_ambiguous: bool
 
 
 def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> Alignment:
@@ -53,7 +52,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     """
     ours = _size_of_rate(grid)
     theirs = _reference_size(reference, grid.step_s)
-    offset, correlation, is_ambiguous = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
+    offset, correlation = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
     offset += reference.motion.time_s[0] - grid.time_s[0]
     # A clock jump reduces the correlation of the whole log: stretches are tested first.
     refined = _refined(ours, grid, reference, offset)
@@ -63,7 +62,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
             f"with a correlation of {correlation:.2f}; shared ones reach 0.93): name the reference of this very log, "
             "or check its rate and angle units."
         )
-    return Alignment(*refined, correlation, is_ambiguous)
+    return Alignment(*refined, correlation)
 
 
 def _size_of_rate(grid: Grid) -> FloatArray:
@@ -83,8 +82,9 @@ def _reference_size(reference: Reference, step: float) -> FloatArray:
     return np.asarray(size, dtype=np.float64)
 
 
-def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) -> tuple[float, float, bool]:
-    """Lag of b (seconds added to a's time give b's), the correlation there, and whether another lag is equivalent."""
+def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) -> tuple[float, float]:
+    """Lag of b (seconds added to a's time give b's) and the correlation there; the lag nearest to ``stamped`` among
+    equivalent ones."""
     keep = max(1, int(np.ceil((len(a) + len(b)) / 2**19)))
     a, b, step = a[::keep], b[::keep], step * keep
     correlation, lag, n = _correlations(a, b)
@@ -100,7 +100,7 @@ def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) 
     apart = np.abs(lag[peaks] - lag[best]) * step > 0.2
     if stamped is not None and np.any(apart):
         best = int(peaks[np.argmin(np.abs(lag[peaks] * step - stamped))])
-    return float(lag[best] * step), float(correlation[best]), bool(np.any(apart))
+    return float(lag[best] * step), float(correlation[best])
 
 
 def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:

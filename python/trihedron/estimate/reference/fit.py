@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
@@ -275,14 +276,8 @@ def _fit(S: FloatArray, b: FloatArray, covariance: FloatArray, solution: Solutio
 def _mounting(S: FloatArray, b: FloatArray, covariance: FloatArray) -> Estimate:
     """Rotation vector [rad] from the gyro triad's symmetric frame to the reference's body frame."""
     change = reframing(S, b, "symmetric")
-    turn = change.rotation.T
-    angle = float(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
-    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    size = float(np.linalg.norm(axis))
-    if size < 1e-9:
-        axis = np.sqrt(np.maximum((np.diag(turn) + 1.0) / 2.0, 0.0)) if angle > 1.0 else np.zeros(3)
-        size = 1.0
-    return Estimate(AXES, axis / size * angle, change.tilt @ covariance @ change.tilt.T, "rad")
+    turn = Rotation.from_matrix(change.rotation.T).as_rotvec()
+    return Estimate(AXES, turn, change.tilt @ covariance @ change.tilt.T, "rad")
 
 
 def _estimates(found: MotionFit, k: int, effects: list[Scored]) -> dict[str, Estimate]:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trihedron._core import rotation_from_vector
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import INPUT_ERRORS
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
@@ -73,28 +73,16 @@ def replay(
     ``rate`` (n, 3) is in the reference's body, ``where`` (n,) the part to use; ``None`` where it is too short.
     """
     n = round(HORIZON_S / grid.step_s)
-    middle = 0.5 * (rate[1:] + rate[:-1])
-    # Second term: coning correction.
-    turn = middle * grid.step_s + np.cross(rate[:-1], rate[1:]) * grid.step_s**2 / 12.0
-    steps = rotation_from_vector(np.ascontiguousarray(turn))
     bad = np.concatenate([[0], np.cumsum(~where)])
     errors = []
     for start in range(0, len(rate) - n, max(n // 2, 1)):
         if bad[start + n + 1] != bad[start]:
             continue
-        carried = _product(steps[start : start + n])
+        here = slice(start, start + n + 1)
+        carried = integrate_rate(grid.time_s[here], rate[here], last_only=True)
         C = reference.attitude(time[[start, start + n]])
         off = (C[0].T @ C[1]).T @ carried
         errors.append(float(np.arccos(np.clip((np.trace(off) - 1.0) / 2.0, -1.0, 1.0))))
     if not errors:
         return None
     return ReplayStage(stage, HORIZON_S, float(np.sqrt(np.mean(np.square(errors)))), len(errors))
-
-
-def _product(rotations: FloatArray) -> FloatArray:
-    """Product (3, 3) of rotations (n, 3, 3) in order, pairwise."""
-    while len(rotations) > 1:
-        if len(rotations) % 2:
-            rotations = np.concatenate([rotations, np.eye(3)[None]])
-        rotations = rotations[0::2] @ rotations[1::2]
-    return np.asarray(rotations[0], dtype=np.float64)

@@ -24,6 +24,8 @@ from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
 
 N_GYROSCOPE = 9
+N_FOLDS = 5
+"""Folds of the cross-validation: a fifth of the poses, then of the moves."""
 
 
 def norm_quality(
@@ -59,7 +61,7 @@ class HeldOut:
 
 
 def held_out(
-    observed: Observed, measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution, n_folds: int
+    observed: Observed, measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution
 ) -> HeldOut | None:
     """Cross-validation over every k-th pose, then every k-th move; ``None`` where too few would remain.
 
@@ -67,26 +69,26 @@ def held_out(
     linear step from the optimum (eq. 11.15).
     """
     n, m = len(observed.pose_force), len(observed.before)
-    if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_PARAMETERS:
+    if m - -(-m // N_FOLDS) < N_GYROSCOPE // 2 + 1 or n - -(-n // N_FOLDS) < N_PARAMETERS:
         return None
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
     is_pose = is_reading & (labels[:, 0] == STATIC_ACCEL)
     is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
-    is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
+    is_of_fold = labels[:, 1] % N_FOLDS == np.arange(N_FOLDS)[:, None]
     rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
-    for fold, (S, b, _, covariance) in enumerate(rests[:n_folds]):
-        holds = np.arange(n) % n_folds == fold
+    for fold, (S, b, _, covariance) in enumerate(rests[:N_FOLDS]):
+        holds = np.arange(n) % N_FOLDS == fold
         residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
         norm[holds] = residual[holds]
         norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
     which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
     models = [
-        Linear(which[fold::n_folds], S, b - S @ observed.force_origin, S_w)
-        for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
+        Linear(which[fold::N_FOLDS], S, b - S @ observed.force_origin, S_w)
+        for fold, (S, b, S_w, _) in enumerate(rests[N_FOLDS:])
     ]
     return HeldOut(norm, norm_sigma, carried_each(measured, anchors_s, models))
 
@@ -99,11 +101,14 @@ def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covarian
 
 
 def move_quality(
-    measured: MoveMeasurements, solution: SessionSolution, seen: Carried, held: Carried | None, used: FloatArray
+    gravity_m_s2: float, seen: Carried, held: Carried | None, used: FloatArray, misfit: tuple[float, int]
 ) -> FitQuality:
-    """The gyro's residuals in sample and held out; a tilt error has two components, and rms is per component."""
+    """The gyro's residuals in sample and held out; a tilt error has two components, and rms is per component.
+
+    ``used`` (m,) are the weights of the moves, ``misfit`` their χ² and its degrees of freedom.
+    """
     is_used = used > 0.0
-    g = np.linalg.norm(measured.reading @ solution.S_a.T + solution.b_a, axis=1).mean()
+    g = gravity_m_s2
     n = 2 * int(np.count_nonzero(is_used))
     dof = max(n - N_GYROSCOPE, 0)
     total = float(np.sum((g * np.radians(seen.angle_deg[is_used])) ** 2))
@@ -115,8 +120,8 @@ def move_quality(
         unit="m/s^2",
         residual=seen.residual,
         sigma=seen.sigma,
-        chi2=solution.moves_chi2,
-        dof=round(solution.moves_dof),
+        chi2=misfit[0],
+        dof=misfit[1],
         rms=float(np.sqrt(total / n)),
         rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
         floor=float(np.sqrt(np.sum(seen.floor2[is_used]) / n)),
@@ -126,8 +131,6 @@ def move_quality(
         angle_deg=seen.angle_deg,
         held_out_angle_deg=None if held is None else held.angle_deg,
         weights=used,
-        n_iterations=solution.iterations,
-        stopped_because=solution.stopped_because,
     )
 
 

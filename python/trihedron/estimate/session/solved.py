@@ -10,11 +10,11 @@ from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, with_prior
-from trihedron.estimate.session.start import Log, MoveOptions, Near, begun, is_enough, lower, near_one_another
+from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import chdtri
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
@@ -27,15 +27,17 @@ def calibrate_moves(
     segments: Segments,
     accelerometer: SensorCalibration,
     gravity_m_s2: float,
-    options: MoveOptions | None = None,
+    nominal_scale: FloatArray | float | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from the tilt errors after rotations between poses (equations 5.1-5.7).
+
+    ``nominal_scale`` (3, 3) or a number [rad/s per raw unit] is needed where the moves do not determine an initial one.
 
     The frame of the calibrated ``accelerometer`` becomes the gyro's, its covariance enters the gyro's. Raises
     ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
-    found = solved(log, options or MoveOptions())
+    found = solved(log, nominal_scale)
     return in_frame_of(accelerometer, found), found.findings
 
 
@@ -75,16 +77,17 @@ class _Fit:
         return tuple(np.flatnonzero(~self.used & ~self.measured.is_lost).tolist())
 
 
-def solved(log: Log, options: MoveOptions) -> SolvedSession:
+def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedSession:
     """Fit the session model from the initial scale with the least tilt errors (docs/model-session.md).
 
     Raises ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
-    measured, near = begun(log, options.nominal())
+    measured = measure_moves(log.recording, log.segments, log.accelerometer)
+    near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)
     measured, solution, seen = found.measured, found.solution, found.seen
     shown = solution.as_read(measured)
-    left_out = held_out(found.observed, shown, log.anchors_s(measured), solution, options.n_folds)
+    left_out = held_out(found.observed, shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -92,6 +95,13 @@ def solved(log: Log, options: MoveOptions) -> SolvedSession:
     losses = _losses(log, found)
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
     covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w, solution.inflation[0] ** 2)
+    quality = move_quality(
+        log.gravity_m_s2,
+        seen,
+        None if left_out is None else left_out.moves,
+        np.where(found.used, 1.0, 0.0),
+        (solution.moves_chi2, round(solution.moves_dof)),
+    )
     gyroscope = SensorCalibration(
         S=solution.S_w,
         b=solution.b_w,
@@ -99,9 +109,7 @@ def solved(log: Log, options: MoveOptions) -> SolvedSession:
         raw_unit=log.recording.gyroscope_unit.value,
         si_unit="rad/s",
         method="moves" if log.is_given else "joint",
-        quality=move_quality(
-            measured, solution, seen, None if left_out is None else left_out.moves, np.where(found.used, 1.0, 0.0)
-        ),
+        quality=replace(quality, n_iterations=solution.iterations, stopped_because=solution.stopped_because),
         observability=describe(covariance[12:21, 12:21], solution.S_w),
     )
     said = findings_of(found.outliers, measured, solution, gyroscope, seen)
@@ -151,7 +159,7 @@ def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
     Unchanged where lost samples may explain the tilt errors: these are tested first.
     """
     measured = plain.measured
-    if not np.any(measured.is_undithered) or _is_asked_for_losses(log, plain):
+    if not np.any(measured.is_undithered) or is_asked_for_losses(plain.outliers, plain.solution):
         return plain
     known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
     best, likeliest = measured, plain.solution.core.log_marginal
@@ -194,13 +202,9 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
     return np.asarray((size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T)
 
 
-def _is_asked_for_losses(log: Log, found: _Fit) -> bool:
-    return is_asked_for_losses(log.recording.time_s, found.measured, found.outliers, found.solution, found.seen)
-
-
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
     """Undetected lost samples that may explain the tilt errors."""
-    if not _is_asked_for_losses(log, found):
+    if not is_asked_for_losses(found.outliers, found.solution):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
     return losses_that_fit(
@@ -229,7 +233,7 @@ def scale_by_gravity(
     if recording.gyroscope is None or recording.accelerometer is None:
         return None
     try:
-        gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2, MoveOptions(n_folds=0))
+        gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2)
     except INPUT_ERRORS:
         return None
     quality, seen = gyroscope.quality, gyroscope.observability

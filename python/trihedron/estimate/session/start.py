@@ -1,4 +1,4 @@
-"""Initial values for the fit of a session: whether the gyro clipped, and the scale with the least tilt errors."""
+"""Initial values for the fit of a session: the scale with the least tilt errors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
@@ -25,9 +25,6 @@ from trihedron.units import rate_to_si
 ASTRAY_DEG = 5.0
 """Median tilt error that shows a wrong minimum: there half of a dozen moves are off by 10°; of the real recordings none
 has a median of 2° (`benches/recordings.py`)."""
-DENIED = 0.1
-"""Tilt error without bridging, relative to the angle that bridging adds, below which nothing was clipped."""
-
 CAUCHY = 3.0
 """Distance, in usual ones, at which a move has half the weight in the robust fit (Cauchy)."""
 ROUNDS = 20
@@ -47,10 +44,6 @@ class Log:
     gravity_m_s2: float
     is_given: bool
 
-    def measured(self, *, is_bridged: bool) -> MoveMeasurements:
-        """Measurements of its moves; clipped readings are bridged if ``is_bridged``."""
-        return measure_moves(self.recording, self.segments, self.accelerometer, is_bridged=is_bridged)
-
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
         """The session with the moves ``used`` (m,)."""
         out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, used)
@@ -67,23 +60,6 @@ class Log:
     def usual_deg(self, measured: MoveMeasurements, near: Near) -> float:
         """Median of these tilt errors as of :func:`usual_deg`."""
         return usual_deg(self.carried(measured, near).angle_deg, measured, *near[:2])
-
-
-def begun(log: Log, nominal: FloatArray | None) -> tuple[MoveMeasurements, Near]:
-    """Moves of a session and initial values of its fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
-
-    A machine that always turns at one speed, logged by an ADC coarser than its noise, ends at one code as a clipping
-    gyro does. With clipping the tilt errors of the readings as logged would be as large as the angle that bridging
-    adds. Where they are far smaller nothing was clipped, unless the code is the end of an ADC's word.
-    """
-    bridged = log.measured(is_bridged=True)
-    is_word = any(limit.is_word for limit in log.recording.facts.of("gyroscope").limits)
-    if np.any(bridged.clipped_s > 0.0) and not is_word:
-        plain = log.measured(is_bridged=False)
-        near = _near(log, plain, nominal)
-        if denies_cut(near[2], log.carried(plain, near).angle_deg, bridged, plain):
-            return plain, near
-    return bridged, _near(log, bridged, nominal)
 
 
 def lower(S: FloatArray, b: FloatArray) -> Near:
@@ -120,7 +96,8 @@ def is_enough(used: BoolArray) -> bool:
     return 2 * int(np.count_nonzero(used)) > N_GYROSCOPE + 2
 
 
-def _near(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
+def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
+    """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given."""
     if np.all(measured.is_lost):
         raise InputError("the gyro clipped in every move: turn more slowly or set a wider range")
     first = starts(log.recording, measured, log.accelerometer, nominal)
@@ -164,17 +141,6 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
     return median(angle_deg[tells if np.any(tells) else ~measured.is_lost])
 
 
-def denies_cut(S: FloatArray, missed_deg: FloatArray, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:
-    """Whether the tilt errors of seemingly clipped moves are too small for readings that are clipped.
-
-    ``missed_deg`` (m,) are the tilt errors of the readings as logged (``measured``), with the scale S.
-    """
-    added = (bridged.rate - measured.rate) @ S.T * measured.nominal_step_s
-    cut = bridged.clipped_s > 0.0
-    short = np.array([np.linalg.norm(np.nansum(added[a:b], axis=0)) for a, b in measured.edges[cut]])
-    return bool(np.median(np.radians(missed_deg[cut])) < DENIED * np.median(short))
-
-
 # Initial gyro scales: from integrals over the moves, as given, or nominal of the unit.
 
 
@@ -186,24 +152,15 @@ MOST_TRIED = 6
 """Number of initial scales: neighbours of the best one, and those that differ by a whole turn."""
 
 
-@dataclass(frozen=True)
-class MoveOptions:
-    """Options of the fit of moves: ``n_folds`` of the cross-validation, 0 for none; ``nominal_scale`` (3, 3) or a
-    number, rad/s per raw unit, for moves that do not determine an initial scale."""
+def scale_matrix(nominal_scale: FloatArray | float) -> FloatArray:
+    """Nominal scale (3, 3), rad/s per raw unit, from a number or a matrix.
 
-    n_folds: int = 5
-    nominal_scale: FloatArray | float | None = None
-
-    def nominal(self) -> FloatArray | None:
-        """Nominal scale as a matrix (3, 3)."""
-        if self.nominal_scale is None:
-            return None
-        value = np.asarray(self.nominal_scale, dtype=np.float64)
-        if value.ndim == 0:
-            return float(value) * np.eye(3)
-        if value.shape != (3, 3):
-            raise InputError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
-        return value
+    Raises ``InputError`` when it is neither.
+    """
+    value = np.asarray(nominal_scale, dtype=np.float64)
+    if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
+        raise InputError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
+    return value * np.eye(3) if value.ndim == 0 else value
 
 
 def integral_start(
@@ -254,7 +211,7 @@ def starts(
     """
     found = []
     if nominal is not None:
-        found.append(np.asarray(nominal, dtype=np.float64))
+        found.append(nominal)
     linear = integral_start(recording, measured, accelerometer)
     if linear is not None:
         found.append(linear)

@@ -12,7 +12,7 @@ group's mean depends on the unknown σ_u: (1) is averaged over the distribution 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -111,10 +111,11 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     dof = len(members) - 1
     one_group = [np.arange(len(members))]
     points = (np.arange(QUANTILES) + 0.5) / QUANTILES
-    inner = _solved(values, variances, members, _chi_square(points, dof_within))
+    inner = _solved(*_padded(values, variances, members), _chi_square(points, dof_within))
     targets = _chi_square(points, dof)
     at_each = [_group_means(values, variances, members, s2) for s2 in inner]
-    draws = _solved_for_all(np.array([m for m, _ in at_each]), np.array([v for _, v in at_each]), targets)
+    level, own = (np.array(one)[:, None, :] for one in zip(*at_each, strict=True))
+    draws = _solved(level, own, np.ones((1, len(members)), dtype=bool), targets)
     ends = np.sqrt(np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
     means, variance = _group_means(values, variances, members, within.sd**2)
     point = _restricted(means, variance, one_group)
@@ -181,21 +182,21 @@ def _members(groups: Sequence[object]) -> list[IntArray]:
 def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], dof: int) -> Spread:
     tail = 0.5 - LEVEL / 2.0
     targets = _chi_square([tail, 1.0 - tail], dof)
-    low, high = np.sqrt(_solved(values, variances, members, targets))
+    y, v, is_there = _padded(values, variances, members)
+    low, high = np.sqrt(_solved(y, v, is_there, targets))
     if high == 0.0:
         # Sessions agree better than their uncertainties allow: these are reduced for the upper limit, which is not 0.
-        q = float(_q(values, variances, members, np.zeros(1))[0])
-        high = float(np.sqrt(_solved(values, variances * max(q / dof, 1e-6), members, targets[1:])[0]))
+        q = float(_q(y, v, is_there, np.zeros(1))[0])
+        high = float(np.sqrt(_solved(y, v * max(q / dof, 1e-6), is_there, targets[1:])[0]))
     point = _restricted(values, variances, members)
     return Spread(float(np.clip(point, low, high)), float(low), float(high), dof)
 
 
-def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: FloatArray) -> FloatArray:
-    """Q (m,) of equation (1) at every σ² (m,)."""
-    y, v, is_there = _padded(values, variances, members)
-    weights = np.where(is_there, 1.0 / (v + s2[:, None, None]), 0.0)
-    mean = (weights * y).sum(axis=2) / weights.sum(axis=2)
-    return np.asarray((weights * (y - mean[:, :, None]) ** 2).sum(axis=(1, 2)))
+def _q(y: FloatArray, v: FloatArray, is_there: BoolArray, s2: FloatArray) -> FloatArray:
+    """Q (..., m) of equation (1) at every σ² (..., m), of values and variances (..., g, most) by group."""
+    weights = np.where(is_there, 1.0 / (v[..., None, :, :] + s2[..., None, None]), 0.0)
+    mean = (weights * y[..., None, :, :]).sum(axis=-1) / weights.sum(axis=-1)
+    return np.asarray((weights * (y[..., None, :, :] - mean[..., None]) ** 2).sum(axis=(-1, -2)))
 
 
 def _padded(
@@ -210,39 +211,19 @@ def _padded(
     return y, v, is_there
 
 
-def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], targets: FloatArray) -> FloatArray:
-    """σ² (m,) at which Q, which decreases with σ², equals each target (m,); 0 where Q(0) is below it."""
-    scale = max(
-        sum(float(np.sum((values[g] - values[g].mean()) ** 2)) for g in members), float(variances.max()), 1e-300
-    )
-    return _crossed(lambda s2: _q(values, variances, members, s2), targets, scale, targets.shape, BISECTIONS)
-
-
-def _crossed(
-    q: Callable[[FloatArray], FloatArray], targets: FloatArray, scale: float, shape: tuple[int, ...], n: int
-) -> FloatArray:
-    """σ² (``shape``) at which the decreasing function ``q`` equals the targets, by ``n`` bisections of its logarithm; 0
-    where q(0) is below."""
+def _solved(y: FloatArray, v: FloatArray, is_there: BoolArray, targets: FloatArray) -> FloatArray:
+    """σ² (..., m) at which Q, which decreases with σ², equals each target (m,); 0 where Q(0) is below it."""
+    centre = np.sum(y, axis=-1, where=is_there) / is_there.sum(axis=-1)
+    squares = np.sum((y - centre[..., None]) ** 2, axis=(-1, -2), where=is_there)
+    scale = max(float(squares.max()), float(v.max()), 1e-300)
+    shape = (*y.shape[:-2], len(targets))
     low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
-    is_zero = q(np.full(shape, 1e-12 * scale)) <= targets
-    for _ in range(n):
+    is_zero = _q(y, v, is_there, np.exp(low)) <= targets
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        above = q(np.exp(middle)) > targets
+        above = _q(y, v, is_there, np.exp(middle)) > targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
-
-
-def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArray) -> FloatArray:
-    """:func:`_solved` for many sets of means and variances (m, n) at once, one group each: σ² (m, targets)."""
-
-    def q(s2: FloatArray) -> FloatArray:
-        weights = 1.0 / (variances[:, None, :] + s2[:, :, None])
-        centre = (weights * means[:, None, :]).sum(axis=2) / weights.sum(axis=2)
-        return np.asarray((weights * (means[:, None, :] - centre[:, :, None]) ** 2).sum(axis=2))
-
-    scale = max(float(np.max(np.ptp(means, axis=1)) ** 2 * means.shape[1]), float(variances.max()), 1e-300)
-    # Half the bisections: accurate to four decades more than the ends of an interval need.
-    return _crossed(q, targets, scale, (len(means), len(targets)), BISECTIONS // 2)
 
 
 def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
@@ -99,12 +100,10 @@ def _fit(y: FloatArray, v: FloatArray, X: FloatArray) -> tuple[FloatArray, Float
     c, covariance, q = solve(0.0)
     if dof < 1 or q <= dof:
         return c, covariance, 0.0
-    low, high = 0.0, float(np.var(y)) * len(y) + float(v.max())
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if solve(middle)[2] > dof else (low, middle)
-    c, covariance, q = solve(high)
-    return c, covariance, high
+    most = float(np.var(y)) * len(y) + float(v.max())
+    s2 = float(brentq(lambda s2: solve(s2)[2] - dof, 0.0, most, xtol=1e-12 * most))
+    c, covariance, _ = solve(s2)
+    return c, covariance, s2
 
 
 def _held_out(values: FloatArray, variances: FloatArray, X: FloatArray) -> float:
