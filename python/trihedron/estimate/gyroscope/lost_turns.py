@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
@@ -28,6 +30,10 @@ CERTAIN, DOUBTFUL = 1e-3, 0.05
 """p-value of χ² of the tilt errors below which losses are tested: where all moves are fitted, and where some are
 excluded. The nine elements of S absorb part of a loss in each move, moves with more losses are excluded, and the rest
 seems nearly consistent (sessions wrong by 20 standard uncertainties had χ² of 1.7 per degree of freedom)."""
+POINTS = 100
+"""Instants of a move at which each of two lost samples is tried: the effect changes slowly between them."""
+STRONG = 20.0
+"""Odds that are strong evidence (Kass, Raftery 1995): a fall between two samples causes a fraction of a loss."""
 OWN_CLOCK = 1.5
 """Deviation of timestamps from a straight line, in ranges of their steps, above which a real clock made them: rounding
 of a straight line deviates by at most one range."""
@@ -82,6 +88,49 @@ def could_be_remade(time_s: FloatArray, nominal_step_s: float) -> bool:
     return float(np.ptp(late)) <= max(OWN_CLOCK * float(np.ptp(each)), EVEN * nominal_step_s)
 
 
+def left_out_as_by_losses(
+    time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
+) -> bool:
+    """Whether the tilt errors of excluded moves are better explained by one or two lost samples than by a disturbance.
+
+    A sample lost at ``t`` removes the rotation ``h ω(t)`` and causes the error ``h R(t) (ω × f)(t)`` of gravity after
+    the move, R from ``t`` to its end. The likelihood of the error, averaged over all instants of one or two losses, is
+    compared with that of a disturbance of this size and unknown direction.
+    """
+    S, step_s = solution.S_w, measured.nominal_step_s
+    if not outliers or not could_be_remade(time_s, step_s):
+        return False
+    f = measured.reading @ solution.S_a.T + solution.b_a
+    log_odds = 0.0
+    for move in outliers:
+        begin, end = measured.edges[move]
+        before, after = measured.links[move]
+        rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.bias_mean) @ S.T
+        off = _lost_at_each_instant(rate, f[before], step_s)
+        _, _, axes = np.linalg.svd(f[after][None])
+        across = axes[1:]
+        off, missed = off @ across.T, across @ seen.residual[move]
+        # The scale absorbs the losses of the other moves: one sample per move is added to the variance.
+        short = off.mean(axis=0)
+        noise = across @ seen.covariance[move] @ across.T + np.outer(short, short)
+        inverse, size = np.linalg.inv(noise), 2.0 * np.pi * np.sqrt(np.linalg.det(noise))
+        some = off[:: max(len(off) // POINTS, 1)]
+        density = [
+            float(np.exp(-0.5 * np.einsum("...i,ij,...j->...", left, inverse, left)).mean()) / size
+            for left in (missed - off, missed - some[:, None] - some[None])
+        ]
+        impact = 1.0 / (np.pi * np.e * float(missed @ missed))
+        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / impact))
+    return log_odds > float(np.log(STRONG))
+
+
+def _lost_at_each_instant(rate: FloatArray, force: FloatArray, step_s: float) -> FloatArray:
+    """(n, 3) error of gravity after the move [m/s²] by a sample lost at each instant, from rates (n, 3) [rad/s]."""
+    to_start = integrate_rate(np.arange(len(rate)) * step_s, rate)
+    to_end = to_start[-1].T @ to_start
+    return np.cross(np.einsum("kij,kj->ki", to_end, rate), to_start[-1].T @ force) * step_s
+
+
 def losses_that_fit(
     time_s: FloatArray,
     measured: MoveMeasurements,
@@ -130,8 +179,11 @@ def losses_that_fit(
     return PossibleLosses(carried, among_all, scatter)
 
 
-def is_asked_for_losses(outliers: tuple[int, ...], solution: SessionSolution) -> bool:
+def is_asked_for_losses(
+    time_s: FloatArray, measured: MoveMeasurements, outliers: tuple[int, ...], solution: SessionSolution, seen: Carried
+) -> bool:
     """Whether losses may cause the tilt errors: those of moves in use exceed noise (at a higher p where moves were
-    excluded)."""
+    excluded), or those of excluded moves have the size of whole samples."""
     dof, chance = solution.moves_dof, DOUBTFUL if outliers else CERTAIN
-    return dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
+    is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
+    return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)

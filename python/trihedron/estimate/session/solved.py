@@ -159,7 +159,7 @@ def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
     Unchanged where lost samples may explain the tilt errors: these are tested first.
     """
     measured = plain.measured
-    if not np.any(measured.is_undithered) or is_asked_for_losses(plain.outliers, plain.solution):
+    if not np.any(measured.is_undithered) or _is_asked_for_losses(log, plain):
         return plain
     known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
     best, likeliest = measured, plain.solution.core.log_marginal
@@ -202,9 +202,13 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
     return np.asarray((size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T)
 
 
+def _is_asked_for_losses(log: Log, found: _Fit) -> bool:
+    return is_asked_for_losses(log.recording.time_s, found.measured, found.outliers, found.solution, found.seen)
+
+
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
     """Undetected lost samples that may explain the tilt errors."""
-    if not is_asked_for_losses(found.outliers, found.solution):
+    if not _is_asked_for_losses(log, found):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
     return losses_that_fit(
