@@ -14,7 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
-from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, fitted, select
+from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS
 from trihedron.probability import NORMAL_95
@@ -34,7 +34,7 @@ def straightened(selection: Selection) -> tuple[Selection, float]:
     its additional error is the spread of N over a, weighted by likelihood.
     """
     bent = [_bent(selection.spectrum, fall) for fall in FALLS]
-    fits = [fitted(one) for one in bent]
+    fits = [one.likelihood().fit(selection.active, selection.has_ramp) for one in bent]
     deviance = np.array([fit.deviance for fit in fits])
     weight = np.exp(-0.5 * (deviance - deviance.min()))
     weight /= weight.sum()
@@ -154,12 +154,12 @@ def identify_axis(
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
     highest, at_nyquist = white_limit(bands, nyquist, None)
-    selection = select(bands, highest, None, TOLERANCE if highest < nyquist else 0.0)
+    selection = select(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
     lines, masks = find_lines(bands, selection, 1.0 / blank.rate_hz)
     if lines:
         findings.append(remarks.lines(lines, blank.unit))
         highest, at_nyquist = white_limit(bands, nyquist, masks)
-        selection = select(bands, highest, masks, TOLERANCE if highest < nyquist else 0.0)
+        selection = select(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
     bend = 0.0
@@ -235,7 +235,7 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
         return selection, 1.0, None
     factor = np.where(bad, z**2, 1.0)
     spectrum = replace(spectrum, count=spectrum.count / factor[group])
-    fit = fitted(spectrum)
+    fit = spectrum.likelihood().fit(selection.active, selection.has_ramp)
     worst = int(np.argmax(np.where(bad, np.abs(mean - 1.0), 0.0)))
     deviation, frequency_hz = float(mean[worst]) - 1.0, float(np.mean(spectrum.frequency_hz[group == worst]))
     large = (deviation, frequency_hz) if abs(deviation) > 0.1 else None

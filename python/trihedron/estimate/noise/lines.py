@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned, fitted
+from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
 from trihedron.records.noise import SpectralLine
@@ -144,7 +144,7 @@ def white_limit(
     highest = nyquist_hz
     while True:
         spectrum = binned(bands, highest, masked)
-        fit = fitted(spectrum)
+        fit = spectrum.likelihood().fit(range(len(SYMBOLS)), True)
         expected = spectrum.expectation(fit.strength)
         if not _deviates(spectrum, expected, fit.slope, highest) and not _droops(spectrum, highest):
             break

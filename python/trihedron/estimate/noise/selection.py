@@ -1,9 +1,10 @@
-"""All noise terms fitted to a spectrum together, and a Gauss-Markov process where it explains more."""
+"""Selection of the noise terms of a spectrum: every subset is fitted, and each term has a penalty."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +13,14 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import gauss_markov_density
+from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+
+EVIDENCE = 8.0
+"""Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
+a chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
 
 EVIDENCE_GAUSS_MARKOV = 16.0
-"""Least reduction of the deviance by a Gauss-Markov process, whose time constant is searched on a grid."""
+"""Penalty of a Gauss-Markov process, whose time constant is searched on a grid."""
 
 TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
@@ -42,8 +47,6 @@ class BinnedSpectrum:
 
     def capped(self, tolerance: float) -> BinnedSpectrum:
         """The bins with counts reduced so that no half octave has a relative uncertainty below ``tolerance``."""
-        if tolerance == 0.0:
-            return self
         key = np.floor(2.0 * np.log2(self.frequency_hz / self.frequency_hz[0])).astype(np.int64)
         total = np.bincount(key, weights=self.count)
         return replace(self, count=self.count * np.minimum(1.0, 2.0 / tolerance**2 / total[key]))
@@ -96,35 +99,52 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """All noise terms and a ramp fitted to a spectrum, with a Gauss-Markov process where it has a correlation time."""
+    """The chosen model: ``active`` indices of the basis, whether it has a ramp, its fit, its spectrum."""
 
+    active: tuple[int, ...]
+    has_ramp: bool
     fit: _core.SpectralFit
     spectrum: BinnedSpectrum
     correlation_time_s: float | None = None
     evidence_gauss_markov: float = 0.0
 
 
-def fitted(spectrum: BinnedSpectrum) -> _core.SpectralFit:
-    """The most likely strengths of all terms in the basis, 0 where absent, and slope of the ramp."""
-    return spectrum.likelihood().fit(range(len(spectrum.basis)), True)
-
-
 def select(
-    bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None, tolerance: float
+    bands: Sequence[Ordinates],
+    highest_hz: float,
+    masked: Sequence[BoolArray] | None = None,
+    evidence: float = EVIDENCE,
+    *,
+    tolerance: float = 0.0,
+    is_cornered: bool = False,
 ) -> Selection:
-    """{Q, N, B, K, R} fitted together, and a Gauss-Markov process if needed; ``tolerance`` as of ``capped``.
+    """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if needed.
 
     Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
-    spectrum = binned(bands, highest_hz, masked).capped(tolerance)
-    fit = fitted(spectrum)
-    cornered = _cornered(bands, fit.strength)
-    if any(c.any() for c in cornered):
-        both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
-        spectrum = binned(bands, highest_hz, both).capped(tolerance)
-        fit = fitted(spectrum)
+    spectrum = binned(bands, highest_hz, masked)
+    if tolerance > 0.0:
+        spectrum = spectrum.capped(tolerance)
+    likelihood = spectrum.likelihood()
+    table: dict[tuple[tuple[int, ...], bool], _core.SpectralFit] = {}
+    for size in range(1, len(SYMBOLS) + 1):
+        for active in combinations(range(len(SYMBOLS)), size):
+            for has_ramp in (False, True):
+                table[active, has_ramp] = likelihood.fit(active, has_ramp)
+
+    def price(key: tuple[tuple[int, ...], bool]) -> float:
+        return table[key].deviance + evidence * (len(key[0]) + key[1])
+
+    best = min(table, key=price)
+    if not is_cornered:
+        cornered = _cornered(bands, table[best].strength)
+        if any(c.any() for c in cornered):
+            both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
+            return select(bands, highest_hz, both, evidence, tolerance=tolerance, is_cornered=True)
+    active, has_ramp = best
+    plain = Selection(active, has_ramp, table[best], spectrum)
     step_s = min(band.step_s / band.block for band in bands)
-    return _with_gauss_markov(step_s, Selection(fit, spectrum))
+    return _with_gauss_markov(step_s, plain, evidence) or plain
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
@@ -140,29 +160,50 @@ def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[Boo
     return out
 
 
-def _with_gauss_markov(step_s: float, plain: Selection) -> Selection:
+def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Selection | None:
     # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
     spectrum = plain.spectrum.capped(TOLERANCE_GAUSS_MARKOV)
-    frequency, without = spectrum.frequency_hz, fitted(spectrum).deviance
+    frequency = spectrum.frequency_hz
+    price_plain = spectrum.likelihood().fit(plain.active, plain.has_ramp).deviance
+    price_plain += evidence * (len(plain.active) + plain.has_ramp)
     # With a shorter time constant the process is white in this log, with a longer one a random walk.
     shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
+    extra = len(SYMBOLS)
+    # The process is added to the selected terms, or replaces B, K or both.
+    models = {(*(k for k in plain.active if k not in drop), extra) for drop in ((), (2,), (3,), (2, 3))}
     if not longest > 64 * shortest:
-        return plain
+        return None
 
-    def gain(time_s: float) -> float:
-        return without - fitted(spectrum.with_gauss_markov(step_s, time_s)).deviance
+    def best_at(time_s: float) -> tuple[float, tuple[int, ...], bool]:
+        likelihood = spectrum.with_gauss_markov(step_s, time_s).likelihood()
+        found = []
+        for model in models:
+            deviance = likelihood.fit(model, plain.has_ramp).deviance
+            price = deviance + evidence * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
+            found.append((price, model, plain.has_ramp))
+        return min(found)
 
     # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
-    coarse = [gain(time_s) for time_s in grid]
-    place = int(np.argmax(coarse))
-    if coarse[place] < EVIDENCE_GAUSS_MARKOV / 2:
-        return plain
+    coarse = [best_at(time_s)[0] for time_s in grid]
+    place = int(np.argmin(coarse))
+    if coarse[place] > price_plain + EVIDENCE_GAUSS_MARKOV / 2:
+        return None
     step = grid[1] / grid[0]
     fine = np.geomspace(max(grid[place] / step, grid[0]), grid[place] * step, 17)
-    finer = [gain(time_s) for time_s in fine]
-    place = int(np.argmax(finer))
-    if finer[place] < EVIDENCE_GAUSS_MARKOV:
-        return plain
-    full = plain.spectrum.with_gauss_markov(step_s, float(fine[place]))
-    return Selection(fitted(full), full, float(fine[place]), finer[place])
+    finer = [best_at(time_s) for time_s in fine]
+    place = int(np.argmin([item[0] for item in finer]))
+    price, model, has_ramp = finer[place]
+    if price > price_plain:
+        return None
+    time_s = float(fine[place])
+    full = plain.spectrum.with_gauss_markov(step_s, time_s)
+    fit = full.likelihood().fit(model, has_ramp)
+    return Selection(
+        active=model,
+        has_ramp=has_ramp,
+        fit=fit,
+        spectrum=full,
+        correlation_time_s=time_s,
+        evidence_gauss_markov=price_plain - price + EVIDENCE_GAUSS_MARKOV,
+    )
