@@ -56,10 +56,9 @@ pub struct Edges<'a> {
 }
 
 /// Blocks to trim from either end of a pose until no stretch there deviates from its middle half, at most a third each,
-/// and whether none deviates after that.
+/// and whether that leaves more than half: none is trimmed of a pose that moves throughout.
 ///
-/// `rows` are its block means, `bumps` ranges of blocks to exclude. `(0, 0)` where less than half would remain: such a
-/// pose moves throughout.
+/// `rows` are its block means, `bumps` ranges of blocks to exclude.
 #[must_use]
 pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize, bool) {
     let channels = edges.rounding.len().max(1);
@@ -109,16 +108,13 @@ pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize
     let clean = |off: &[f64]| {
         // The onset of a motion is below the detection limit: twice the length detected is trimmed, and one block, in
         // which the motion may begin.
-        let moving = first_clean(off, channels, most, &sizes, &variances, edges.limit)
-            .map_or(most + 1, |clean| 2 * clean + 1);
-        (moving.min(most), moving <= most)
+        first_clean(off, channels, most, &sizes, &variances, edges.limit)
+            .map_or(most, |clean| (2 * clean + 1).min(most))
     };
     let backward: Vec<f64> = off.rchunks(channels).flatten().copied().collect();
     match (clean(&off), clean(&backward)) {
-        ((start, _), (tail, _)) if start + tail > n / 2 => (0, 0, false),
-        ((start, is_start_still), (tail, is_tail_still)) => {
-            (start, tail, is_start_still && is_tail_still)
-        }
+        (start, tail) if start + tail > n / 2 => (0, 0, false),
+        (start, tail) => (start, tail, true),
     }
 }
 

@@ -252,7 +252,7 @@ def _by_poses(
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, nominal)
-            return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
+            return replace(both, findings=(*_still_said(found), *both.findings))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
     except INPUT_ERRORS as error:
         return _without_gyroscope(alone, error)

@@ -58,7 +58,7 @@ class Pose:
 @dataclass(frozen=True)
 class Move:
     """The samples between two neighbouring poses: from the trimmed end of one to the trimmed start of the next, or from
-    and to the middle of a pose that moves up to its ends.
+    and to the middle of a pose that moves throughout.
 
     Integration over ``[start, stop)`` therefore contains the whole motion whatever its duration; nothing is cut.
     """

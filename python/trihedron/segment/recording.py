@@ -175,7 +175,7 @@ def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: 
 
 
 def _move(index: int, before: tuple[Pose, Run], after: tuple[Pose, Run]) -> Move:
-    """From the end of one pose to the start of the next; from or to the middle of one whose ends still move, where the
+    """From the end of one pose to the start of the next; from or to the middle of one that moves throughout, where the
     attitude is the mean one: what the body rotates in its other half is part of the move."""
     first, last = before[0].stop, after[0].start
     if not before[1].is_still:

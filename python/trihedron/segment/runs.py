@@ -45,7 +45,7 @@ a slow move and in its pauses, almost nothing in a tremor of several swings."""
 class Run:
     """Blocks ``[first, last)`` of one pose; ``bumps`` are block ranges of disturbances in it, which are excluded.
 
-    ``is_still`` where its trimmed ends do not move; otherwise the rotation of a move begins and ends inside it.
+    Not ``is_still`` if it moves throughout: the rotation of the moves beside it begins and ends inside it.
     """
 
     first: int
