@@ -51,10 +51,10 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     assert "bias refitted per pose" in figures["tilt_error_after_rotations"]["definition"]
     table = figures_table(result.calibration, {})
     assert table is not None
-    assert table.head[2:4] == ("S and b, in sample", "cross-validated")
+    assert table.head[1:3] == ("S and b, in sample", "cross-validated")
     for text in (str(result), str(diagnosis)):
         flat = " ".join(text.split())
-        assert all(value in flat for row in table.rows for value in row[2:])
+        assert all(value in flat for row in table.rows for value in row[1:])
 
 
 def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):

@@ -52,6 +52,8 @@ _CAPTIONS = {
     "moves": "Tilt error after every rotation: gravity predicted with the gyro against gravity measured.",
     "dynamics": "Velocity error over a rotation: integral of acceleration between two poses; should be 0.",
 }
+EVEN = 1e-6
+"""Scatter of timestamps, in sample intervals, that is the rounding of their numbers."""
 MOST_PARAMETERS = 9
 
 
@@ -130,11 +132,11 @@ def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """Both figures of the time error side by side, where the timestamps scatter about an even clock."""
     recording = getattr(diagnosis, "recording", None)
     timing = next((one for one in diagnosis.domains if one.domain == "timing"), None)
-    scatter_s = 0.0 if recording is None else recording.sampling.timestamp_error_s
-    if timing is None or scatter_s == 0.0:
+    if recording is None or timing is None or recording.sampling.timestamp_error_s * recording.rate_hz < EVEN:
         return ()
-    head = ("time error", "timestamps about an even clock", "samples about that clock, seen in motion")
-    return (Table(head, (("rms", size_in_words(scatter_s, timing.unit), rms_in_words(timing)),)),)
+    scatter = size_in_words(recording.sampling.timestamp_error_s, timing.unit)
+    head = ("", "timestamps about an even clock", "samples about that clock, seen in motion")
+    return (Table(head, (("rms", scatter, rms_in_words(timing)),), "Time errors, by timestamps and by motion"),)
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
@@ -164,6 +163,8 @@ def _estimate(seen: _Faces) -> _Estimate:
 
     def excess(tilt: float) -> float:
         return fit_known(seen.tilted(fit.S_a, tilt).rows()).chi2 - fit.dof
+
+    from scipy.optimize import brentq
 
     tilt = float(brentq(excess, 0.0, LARGEST_TILT_RAD)) if excess(LARGEST_TILT_RAD) < 0.0 else LARGEST_TILT_RAD
     widened = fit_known(seen.tilted(fit.S_a, tilt).rows())

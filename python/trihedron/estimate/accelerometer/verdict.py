@@ -35,18 +35,17 @@ def residual_findings(
     scale = covariance_scale(chi2, quality.dof)
     if scale == 1.0:
         return
-    case, told = "poses", {"widening": np.sqrt(scale)}
-    if bias_repeatability_m_s2 is not None:
-        case, told = "poses-joint", {"bias_repeatability_m_s2": bias_repeatability_m_s2}
-    yield Finding.of(
-        FindingCode.RESIDUAL_ABOVE_NOISE,
-        case,
-        rms_m_s2=quality.rms,
-        floor_m_s2=quality.floor,
-        chi2_per_dof=scale,
-        dof=quality.dof,
-        **told,
-    )
+    rms, floor = quality.rms, quality.floor
+    if bias_repeatability_m_s2 is None:
+        yield Finding.of(
+            FindingCode.RESIDUAL_ABOVE_NOISE, "poses", rms_m_s2=rms, floor_m_s2=floor, chi2_per_dof=scale,
+            dof=quality.dof, widening=np.sqrt(scale),
+        )  # fmt: skip
+    else:
+        yield Finding.of(
+            FindingCode.RESIDUAL_ABOVE_NOISE, "poses-joint", rms_m_s2=rms, floor_m_s2=floor, chi2_per_dof=scale,
+            dof=quality.dof, bias_repeatability_m_s2=bias_repeatability_m_s2,
+        )  # fmt: skip
 
 
 def observability_findings(
