@@ -43,10 +43,7 @@ pub(crate) use binding::{run, run_long};
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     binding::keep_panics_quiet();
-    module.add(
-        "InputError",
-        module.py().get_type::<binding::InputError>(),
-    )?;
+    module.add("InputError", module.py().get_type::<binding::InputError>())?;
     allan::register(module)?;
     attitude::register(module)?;
     audit::register(module)?;
