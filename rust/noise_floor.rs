@@ -12,6 +12,9 @@ const USUALLY_STILL: f64 = 0.1;
 const ROUNDING_POWER: f64 = 1e-14;
 /// Least power relative to a channel's usual power: the logarithm of a window without any would be infinite.
 const LEAST_POWER: f64 = 1e-12;
+/// Largest variance of readings that toggle between two neighbouring codes, q²/4, over that of rounding, q²/12. Noise
+/// that does not dither the ADC has it in the pose whose reading is between two codes, and none in the next one.
+const BETWEEN_CODES: f64 = 3.0;
 /// Most iterations: sets that still change then alternate between two that hardly differ.
 const MOST_ROUNDS: usize = 60;
 
@@ -156,10 +159,8 @@ fn channel(blocks: &Blocks, width: usize, whole: &[bool], c: usize) -> Option<Ch
     }
     let square: Vec<f64> = mean.iter().map(|v| v * v).collect();
     let unbiased = width as f64 / (width.max(2) - 1) as f64;
-    let floor = [
-        blocks.rounding[c],
-        blocks.rounding[c] / blocks.length as f64,
-    ];
+    let between_codes = BETWEEN_CODES * blocks.rounding[c];
+    let floor = [between_codes, between_codes / blocks.length as f64];
     let mut inside = rolling_mean(&variance, 1, width);
     let mut between = rolling_mean(&square, 1, width);
     for (value, low) in between.iter_mut().zip(rolling_mean(&mean, 1, width)) {

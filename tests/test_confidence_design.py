@@ -71,6 +71,12 @@ WEAKNESSES = {
     ),
     # Half an LSB of its ADC represented the scatter of its mean readings, and pauses that turned lost 1.3 % of S_w.
     "coarse gyro that its noise dithers": Weakness(510002, drawn(510002), {"S_w": 4.0}),
+    # A pose whose readings toggle between two codes was one that moves, and S_w followed its ends by up to 7.8.
+    "poses between two codes": Weakness(764860, drawn(764860), {"S_w": 4.0}),
+    # A blow that no code of the gyro showed was a move without rotation, and b_w was off by 13.6 standard errors.
+    "move without a change of code": Weakness(764410, drawn(764410), {"b_w": 4.0}),
+    # One reading in five was of the other code, and the axis was never at rest: b_w was off by 6.7.
+    "bias near the edge of a code": Weakness(720303, drawn(720303), {"b_w": 4.0}),
     # Velocities over moves of 0.6 s were believed to 1e-4 of gravity: S_f was off by 5.4 and 4.4 standard errors.
     "rounding at the ends of quick moves": Weakness(900012, drawn(720498), {"S_f": 3.5}, is_trusted=True),
 }

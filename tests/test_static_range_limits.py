@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.turn_rounding import resting_ends
+from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
 
 AXES = np.array([True, True, True])
 
@@ -47,8 +47,12 @@ def test_an_axis_that_never_leaves_its_step_is_as_still_as_the_body():
     assert not still[102:198].any()
     assert not still[:80].any()
     assert not still[220:].any()
-    # Where nothing is seen to turn, nothing is said to be still.
-    assert not still_of(np.zeros((100, 3)), 10, 90).any()
+    # Where nothing is seen to rotate, any rate inside the LSB is possible: all readings of the move share the error.
+    still = still_of(np.zeros((100, 3)), 10, 90)
+    assert still[10:90].all()
+    assert not still[:10].any()
+    variance = unseen_rotation(still, np.full(3, 2.0), np.array([[10, 90]]))
+    assert variance[10:90].sum(axis=0) == pytest.approx(np.full(3, 80.0**2 * 2.0**2 / 12.0))
 
 
 def test_an_axis_that_turns_slowly_beside_a_quick_one_is_as_still_as_itself_shows():

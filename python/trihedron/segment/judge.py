@@ -11,6 +11,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.segment.channels import Channels
+from trihedron.segment.means import rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_POSE_S, Run, means_of
@@ -64,7 +65,9 @@ def _settling_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chanc
     n = np.array([sum(b - a for a, b in first) for first, _ in halves])
     means = means_of(channels.mean, [half for both in halves for half in both])
     difference = means[1::2] - means[::2]
-    variance = 2.0 * noise.variance(n[:, None] * channels.step_s) + channels.quantisation_variance / channels.length
+    # Without dither the mean of a half may be wrong by half an LSB as long as it lasts.
+    rounding = channels.quantisation_variance / channels.length + 2.0 * rounding_bias_variance(channels, runs)
+    variance = 2.0 * noise.variance(n[:, None] * channels.step_s) + rounding
     live = variance > 0.0
     statistic = np.sum(np.where(live, difference**2, 0.0) / np.where(live, variance, 1.0), axis=1)
     limit = {freedom: probability.chdtri(freedom, chance) for freedom in set(live.sum(axis=1).tolist()) if freedom}

@@ -13,9 +13,9 @@ from trihedron.ranges import ranges_of
 
 UNIFORM = 1.0 / 12.0
 """Variance of an error that is uniform over one step, in squares of the step."""
-IN_STEP = 0.75
-"""Distance from the bias, in LSB, within which a reading is in its step: it may toggle between its two nearest
-codes."""
+IN_STEP = 0.95
+"""Distance from the mean reading of the bias, in LSB, within which a code is one of the two between which the bias
+toggles; of a code read less often, one in twenty times, the running median leaves nothing."""
 UNDITHERED = 0.5
 """Noise, in LSB, below which it does not dither the ADC: the mean of rounded readings is wrong by up to half an LSB,
 however long it is taken."""

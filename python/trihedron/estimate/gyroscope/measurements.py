@@ -11,7 +11,7 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dependence, pool_biases, shrink
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
-from trihedron.estimate.gyroscope.turn_rounding import resting_ends
+from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median, medians
 from trihedron.ranges import rows_beside
@@ -148,8 +148,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     else:
         attitude, rate = None, gyroscope[rows]
     clipped = bridge_clipping(recording)
-    extra = rounding_variance(gyroscope, quantum, medians(gyroscope_mean), undithered)
-    extra = None if extra is None else extra[rows]
+    extra, hidden, shared = _rounded(gyroscope, quantum, medians(gyroscope_mean), undithered, (in_log, rows))
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
     time_s = recording.time_s[rows]
@@ -159,11 +158,6 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     if np.any(undithered):
         bias, var_bias = _with_hidden_bias(bias, var_bias, segments, quantum, undithered)
         mean = np.where(undithered, bias.mean(axis=0), mean)
-    hidden, shared = np.zeros(rate.shape), [np.zeros((len(rate), 3, 0))]
-    if np.any(undithered):
-        coarse = gyroscope, quantum, medians(gyroscope_mean), undithered
-        hidden[(resting_ends(*coarse, in_log) | resting_axes(*coarse))[rows]] = 1.0
-        shared += [error[rows][:, :, None] for error in shared_errors(*coarse)]
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)
@@ -193,8 +187,24 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         reading_variance=extra,
         quantum=quantum,
         is_hidden=hidden,
-        shared_errors=np.concatenate(shared, axis=2),
+        shared_errors=shared,
     )
+
+
+def _rounded(
+    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, where: tuple[IntArray, IntArray]
+) -> tuple[FloatArray | None, FloatArray, FloatArray]:
+    """Rounding of undithered ``axes`` (3,) at the ``rows`` (k,) of moves, ``where`` (edges in the log, rows): variance
+    (k, 3) or ``None`` without such axes, 1 where a reading is in its bias' LSB (k, 3), shared errors (k, 3, j)."""
+    in_log, rows = where
+    coarse = readings, quantum, rest, axes
+    variance = rounding_variance(*coarse)
+    if variance is None:
+        return None, np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
+    is_static = resting_ends(*coarse, in_log) | resting_axes(*coarse)
+    variance = np.maximum(variance, unseen_rotation(is_static, quantum, in_log))
+    shared = [np.zeros((len(rows), 3, 0)), *(error[rows][:, :, None] for error in shared_errors(*coarse))]
+    return variance[rows], is_static[rows].astype(np.float64), np.concatenate(shared, axis=2)
 
 
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:

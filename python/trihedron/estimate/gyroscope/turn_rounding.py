@@ -8,14 +8,14 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.session.rounding import CHATTER, undithered_axes
+from trihedron.session.rounding import CHATTER, IN_STEP, UNIFORM, undithered_axes
 
 HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
 """Table for a rate that settles as exp(-t/τ), then for rates that start as t⁴, t² and t: ratio of the time for the
 second LSB to that for the first; time before the first code change in which the bias's position inside the LSB acts
 as a rate, in times of the first LSB. With rate r reached at t(r), codes give Σ t'(k - ½) of the time in which it acts
 (first order, mean of both directions): τ(2 ln 2 + γ + ln k), √k + ζ(½, ½)/2 of √k; before it the axis is static."""
-STEPS = 0.75, 1.75, 2.75
+STEPS = IN_STEP, 1.0 + IN_STEP, 2.0 + IN_STEP
 """Limits, in LSB from the static reading, of the static code, of the next code and of the one after it."""
 
 
@@ -27,7 +27,8 @@ def resting_ends(
 
     Before its code changes an axis rotates undetected, further in the direction in which the bias is farther from the
     edge of the LSB: on the mean of both directions as if the position inside the LSB, as a rate, acted for a while;
-    that time is not static. It is taken from the axis' own code changes; an axis without any is as static as the body.
+    that time is not static. It is taken from the axis' own code changes; an axis without any is as static as the body,
+    and a body without any is static throughout, but for :func:`unseen_rotation`.
     """
     out = np.zeros(readings.shape, dtype=np.bool_)
     for first, last in edges.tolist():
@@ -37,9 +38,18 @@ def resting_ends(
         away = _away(part, quantum, rest)
         for ends, inside in ((out[first:last], away), (out[first:last][::-1], away[::-1])):
             own = {k: _still(inside[:, k] / quantum[k]) for k in np.flatnonzero(axes).tolist()}
-            body = min((n for n in own.values() if n is not None), default=0)
+            body = min((n for n in own.values() if n is not None), default=len(part))
             for k, n in own.items():
                 ends[: body if n is None else n, k] = True
+    return out
+
+
+def unseen_rotation(static: BoolArray, quantum: FloatArray, edges: IntArray) -> FloatArray:
+    """Variance (n, 3) of the readings in those moves ``edges`` (m, 2) in which an axis is ``static`` (n, 3) throughout:
+    it may rotate at any rate inside its LSB ``quantum`` (3,), which is one error of all their readings."""
+    out = np.zeros(static.shape)
+    for first, last in edges.tolist():
+        out[first:last] = np.where(static[first:last].all(axis=0), (last - first) * UNIFORM * quantum**2, 0.0)
     return out
 
 
