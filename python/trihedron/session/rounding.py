@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.quantiles import medians
 from trihedron.ranges import ranges_of
 
 UNIFORM = 1.0 / 12.0
@@ -116,10 +117,13 @@ def _turns_at_once(count: IntArray) -> BoolArray:
 
 
 def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
-    """(n, 3) whether a reading of ``axes`` (3,) is inside the LSB of its bias while another axis rotates."""
+    """(n, 3) whether an axis of ``axes`` (3,) rests: it is in the LSB of its bias for longer than it takes to leave it,
+    while others rotate, or while the body stops inside a move."""
     out = np.zeros(readings.shape, dtype=np.bool_)
-    for axis, begin, end in _standing(readings, quantum, rest, axes):
-        out[begin:end, axis] = True
+    for axis in np.flatnonzero(axes).tolist():
+        for first, last, left, right in _rests(_steady(readings[:, axis])[1], float(quantum[axis]), float(rest[axis])):
+            if last - right - first - left > max(left, right):
+                out[first + left : last - right, axis] = True
     return out
 
 
@@ -190,14 +194,20 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
     return np.where(axes, np.sqrt(rest), density)
 
 
-def common_bias(bias: FloatArray, var_bias: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
+def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
+    """(3,) mean of the means (n, 3) of the poses within an LSB of their median: a bias near the edge of a code has one
+    code in some poses, the next one in others."""
+    is_near = np.abs(means - medians(means)) <= quantum
+    return np.asarray(np.nanmean(np.where(is_near, means, np.nan), axis=0))
+
+
+def common_bias(
+    bias: FloatArray, var_bias: FloatArray, quantum: FloatArray, axes: BoolArray
+) -> tuple[FloatArray, FloatArray]:
     """Biases (n, 3) and variances of undithered axes: one bias for all poses, its scatter added to the variance.
 
     A mean biased by rounding does not determine its own pose's bias; the common bias is left to the moves.
     """
-    bias, var_bias = bias.copy(), var_bias.copy()
-    for axis in np.flatnonzero(axes):
-        scatter = float(np.var(bias[:, axis]))
-        bias[:, axis] = float(np.mean(bias[:, axis]))
-        var_bias[:, axis] = var_bias[:, axis] + scatter
-    return np.ascontiguousarray(bias), np.ascontiguousarray(var_bias)
+    one = np.broadcast_to(static_reading(bias, quantum), bias.shape)
+    scatter = np.var(bias, axis=0)
+    return np.where(axes, one, bias), var_bias + np.where(axes, scatter, 0.0)

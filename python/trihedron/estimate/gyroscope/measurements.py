@@ -13,7 +13,7 @@ from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dep
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
 from trihedron.probability import chdtrc
-from trihedron.quantiles import median, medians
+from trihedron.quantiles import median
 from trihedron.ranges import rows_beside
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
@@ -24,6 +24,7 @@ from trihedron.session.rounding import (
     resting_axes,
     rounding_variance,
     shared_errors,
+    static_reading,
     undithered_axes,
 )
 
@@ -148,7 +149,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     else:
         attitude, rate = None, gyroscope[rows]
     clipped = bridge_clipping(recording)
-    extra, hidden, shared = _rounded(gyroscope, quantum, medians(gyroscope_mean), undithered, (in_log, rows))
+    extra, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
     time_s = recording.time_s[rows]
@@ -192,12 +193,15 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
 
 
 def _rounded(
-    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, where: tuple[IntArray, IntArray]
+    readings: FloatArray, quantum: FloatArray, means: FloatArray, axes: BoolArray, where: tuple[IntArray, IntArray]
 ) -> tuple[FloatArray | None, FloatArray, FloatArray]:
-    """Rounding of undithered ``axes`` (3,) at the ``rows`` (k,) of moves, ``where`` (edges in the log, rows): variance
-    (k, 3) or ``None`` without such axes, 1 where a reading is in its bias' LSB (k, 3), shared errors (k, 3, j)."""
+    """Rounding of undithered ``axes`` (3,) in moves, ``where`` (their edges in the log, rows (k,) of the log): variance
+    (k, 3) or ``None`` without such axes, 1 where a reading is in the LSB of its bias (k, 3), shared errors (k, 3, j).
+
+    ``means`` (n, 3) are those of the poses.
+    """
     in_log, rows = where
-    coarse = readings, quantum, rest, axes
+    coarse = readings, quantum, static_reading(means, quantum), axes
     variance = rounding_variance(*coarse)
     if variance is None:
         return None, np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
@@ -234,7 +238,7 @@ def _with_hidden_bias(
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     assert segments.gyroscope_sigma_mean is not None
     own = np.maximum(segments.gyroscope_sigma_mean**2 - hidden, 0.0)
-    return common_bias(bias, np.where(undithered, own, var_bias), undithered)
+    return common_bias(bias, np.where(undithered, own, var_bias), quantum, undithered)
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
