@@ -197,8 +197,9 @@ def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: f
 def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
     """(3,) mean of the means (n, 3) of the poses within an LSB of their median: a bias near the edge of a code has one
     code in some poses, the next one in others."""
-    is_near = np.abs(means - medians(means)) <= quantum
-    return np.asarray(np.nanmean(np.where(is_near, means, np.nan), axis=0))
+    away = np.abs(means - medians(means))
+    is_near = away <= np.maximum(quantum, away.min(axis=0))
+    return np.asarray(np.mean(means, axis=0, where=is_near))
 
 
 def common_bias(
