@@ -18,6 +18,8 @@ def z_of_bias(found, trial):
     return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
 
 
+# Another walk whose truth wanders is below.
+@pytest.mark.slow
 def test_a_sound_truth_is_not_refused_for_the_filters_rounding():
     # The strengths' search passes by a white error of nothing beside slow ones: rounding was all that was left of a
     # variance, and every third walk was rejected.
