@@ -27,7 +27,9 @@ def errors(rng, n, name):
     return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(covariance_by_bends(up, residual, sigma, G)))
 
 
-@pytest.mark.parametrize(("n", "name"), [(13, None), (18, "quadratic"), (36, None), (36, "cubic")])
+@pytest.mark.parametrize(
+    ("n", "name"), [(13, None), pytest.param(18, "quadratic", marks=pytest.mark.slow), (36, None), (36, "cubic")]
+)
 def test_bars_hold_for_scatter_and_for_bending(name, n):
     rng, n_trials = np.random.default_rng([31, n]), 60
     before, after = (np.array(x) for x in zip(*(errors(rng, n, name) for _ in range(n_trials)), strict=True))

@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from trihedron.api.capturing import column_namer, open_device
 from trihedron.arrivals import ClockFit, paced
 from trihedron.capture.detection import find_protocol
 from trihedron.capture.errors import CaptureError
-from trihedron.capture.log import GrowingLog
+from trihedron.capture.log import FLUSH_S, SYNC_S, GrowingLog
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
@@ -147,6 +149,24 @@ def test_a_few_bytes_that_did_not_wait_as_the_others_do_tilt_no_line():
     assert max(missed) < 20.0
 
 
+def test_rows_wait_for_their_turn_to_be_written_and_synced(tmp_path, monkeypatch):
+    now, synced, saved = [100.0], [], []
+    monkeypatch.setattr(sys.modules[GrowingLog.__module__], "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr("os.fdatasync", synced.append)
+    log = GrowingLog(tmp_path / "log.csv")
+    log.begin({}, ["t"])
+    for k in range(round(2.5 * SYNC_S / (0.25 * FLUSH_S))):
+        now[0] += 0.25 * FLUSH_S
+        log.row(f"{k}", now[0])
+        log.flush()
+        saved.append(log.rows_saved)
+    # Four rows at a time, or five where a quarter falls short by rounding.
+    assert {after - before for before, after in pairwise(saved)} <= {0, 4, 5}
+    assert saved[-1] > len(saved) - 5
+    assert len(synced) == 2
+    log.close()
+
+
 class SlowLog(GrowingLog):
     def _write(self, text):
         time.sleep(0.4)
@@ -255,6 +275,16 @@ def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     recorder, _ = capture(str(raw), tmp_path / "log.csv")
     assert recorder.count.tally.saved == 100
     assert recorder.count.corrupt <= 1
+
+
+def test_a_board_whose_clock_runs_fast_writes_its_own_time(tmp_path):
+    raw = tmp_path / "raw.txt"
+    device = Device(counts_recording(1001, 100.0), "xio", Faults(drift_ppm=500.0))
+    raw.write_bytes(b"".join(piece for _, piece in device.pieces(Sent())))
+    _, blocks = capture(str(raw), tmp_path / "log.csv")
+    times = np.concatenate([block.time_s for block in blocks])
+    # Ten seconds and 5 ms, in whole microseconds.
+    assert times[-1] - times[0] == pytest.approx(10.005, abs=2e-6)
 
 
 def test_frames_without_a_clock_are_paced_by_all_of_their_arrivals_when_their_log_is_read():

@@ -120,7 +120,7 @@ def test_a_reader_that_leaves_early_is_no_error(session):
     assert "Exception" not in done.stderr
 
 
-@pytest.mark.parametrize("command", ["calibrate", "guide"])
+@pytest.mark.parametrize("command", ["calibrate", pytest.param("guide", marks=pytest.mark.slow)])
 def test_a_reader_that_never_came_costs_no_file_that_was_asked_for(tmp_path, command):
     asked = {
         "calibrate": ["--gravity", G, "-o", "c.json", "--report", "r.html", "--json", "-"],

@@ -49,7 +49,7 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     ("seed", "what"),
     [
         (87100100214, "20 Hz, one sample a gap: a join of six samples spans half the move"),
-        (87100100614, "50 Hz, two samples a gap, moves that do not join at all"),
+        pytest.param(87100100614, "50 Hz, two samples a gap, moves that do not join at all", marks=pytest.mark.slow),
     ],
 )
 def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, what):
@@ -60,7 +60,7 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1), what
 
 
-@pytest.mark.parametrize("flaw", ["gyro-saturation", "sensor-lag"])
+@pytest.mark.parametrize("flaw", ["gyro-saturation", pytest.param("sensor-lag", marks=pytest.mark.slow)])
 def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw):
     found, _ = diagnosed(tmp_path, flaw, 11, *MISSING)
     assert "dropped-samples" not in [effect.id for effect in found.effects]

@@ -7,10 +7,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
+from trihedron.report.findings.wording import filled
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 
@@ -97,3 +99,32 @@ def test_a_finding_carries_its_numbers_for_machines():
 
 def test_the_documents_list_the_catalogue_as_it_is():
     assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == {entry.code.value for entry in ENTRIES}
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        ("{x:.2g %}", 0.034, "3.4 %"),
+        ("{x:.3g mm/s²}", 0.0123, "12.3 mm/s²"),
+        ("{x:.2g mg}", 9.80665e-3, "1 mg"),
+        ("{x:.2g ms}", 0.0021, "2.1 ms"),
+        ("{x:.2g cm}", 0.15, "15 cm"),
+        ("{x:.2g deg}", 0.5 * np.pi, "90 deg"),
+        ("{x:abs .1f °/s}", -np.pi / 180.0, "1.0 °/s"),
+        ("{x:all .1f mg}", (9.80665e-3, 0.0196133), "1.0, 2.0 mg"),
+        ("{x:# pose}", 1, "1 pose"),
+        ("{x:# pose}", 0, "0 poses"),
+        ("{x:first 2}", ("a", "b"), "a, b"),
+        ("{x:first 2}", ("a", "b", "c"), "a, b and 1 more"),
+        ("{x:together}", ("a",), "a"),
+        ("{x:together}", ("a", "b"), "a, b in combination"),
+        ("{x:numbered}", ("a", "b"), "(1) a; (2) b"),
+        ("{x:axes and}", (1, 3), "X and Z"),
+        ("{x:?one|{x:.0f} of them}", 1, "one"),
+        ("{x:?one|{x:.0f} of them}", 2, "2 of them"),
+        ("{x:<less|more}", -1e-9, "less"),
+        ("{x:<less|more}", 0.0, "more"),
+    ],
+)
+def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_branch(place, value, said):
+    assert filled(place, {"x": value}, {}) == said

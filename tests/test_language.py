@@ -223,7 +223,10 @@ def remarks() -> Said:
 
 @pytest.mark.parametrize("source", [helps, catalogues, modules, schemas, pages, docstrings, remarks])
 def test_nothing_that_a_user_reads_uses_a_retired_word(source):
-    assert [(where, found) for where, text in source() for found in retired(text)] == []
+    said = list(source())
+    # All at once is ten times as quick; one after the other says where.
+    if retired("\n\n".join(text for _, text in said)):
+        assert [(where, found) for where, text in said for found in retired(text)] == []
 
 
 RETIRED_IN_NAMES = re.compile(

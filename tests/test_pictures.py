@@ -13,6 +13,7 @@ from trihedron.report.chart import Note, Panel, Scale
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
 from trihedron.report.diagnosis_overview_charts import traces_chart
+from trihedron.report.drawn import _path
 from trihedron.report.effect_charts import rest_panels
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
@@ -139,3 +140,9 @@ def test_the_bar_of_a_pose_that_determines_a_parameter_alone_does_not_hide_the_o
     low, high = residual_chart(quality).panels[0].y.limits
     # All points, mm/s²; of the bar a thousand times as long no more than three usual ones.
     assert 4.0 < high == -low < 10.0
+
+
+def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_a_gap():
+    x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
+    y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
+    assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"

@@ -152,7 +152,7 @@ def test_a_log_without_poses_is_calibrated_by_its_reference_and_a_rates_own_cloc
 
 def test_g_sensitivity_and_cubic_scale_are_told_from_the_linear_numbers():
     G_true = np.array([[3e-3, 0, 0], [0, -2e-3, 1e-3], [0, 0, 2e-3]])
-    trial = tracked(21, seconds=20, g_sensitivity=G_true)
+    trial = tracked(21, seconds=15, g_sensitivity=G_true)
     result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
     assert [e.id for e in result.effects] == ["gyro-g-sensitivity"]
     one = result.reference.effects["gyro-g-sensitivity"]
@@ -264,10 +264,10 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
 
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():
     # Four fifths are static, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
-    trial = tracked(4, 40, sigma_deg=0.2, rest_s=16.0)
+    trial = tracked(4, 30, sigma_deg=0.2, rest_s=12.0)
     assert np.abs(z_of(fit_reference(trial.log, trial.motion, G), trial)).max() < 4.5
     with pytest.raises(ValueError, match="share no motion"):
-        fit_reference(trial.log, tracked(54, 40, sigma_deg=0.2, rest_s=16.0).motion, G)
+        fit_reference(trial.log, tracked(54, 30, sigma_deg=0.2, rest_s=12.0).motion, G)
 
 
 def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_samples_a_radian():

@@ -44,7 +44,10 @@ def long_logs(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("name", ["calibrate", "allan", "simulate", pytest.param("diagnose", marks=pytest.mark.slow)])
+# Kernels of the slow ones are below.
+@pytest.mark.parametrize(
+    "name", ["calibrate", "simulate", *(pytest.param(name, marks=pytest.mark.slow) for name in ("allan", "diagnose"))]
+)
 def test_outputs_of_long_logs_do_not_depend_on_threads(long_logs, name):
     made = []
     for threads in ("1", "3"):

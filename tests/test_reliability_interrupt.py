@@ -22,12 +22,12 @@ LOADED = 4.0
 
 @pytest.fixture(scope="module")
 def long_log(tmp_path_factory):
-    """Eight million rows: every command on it takes seconds."""
+    """Five million rows: every command on it takes seconds."""
     import polars
 
     path = tmp_path_factory.mktemp("long") / "long.csv"
     rng = np.random.default_rng(1)
-    n = 8_000_000
+    n = 5_000_000
     noise = np.round(rng.normal([0.0, 0.0, 9.8, 0.0, 0.0, 0.0], 0.01, (1000, 6)), 4)
     columns = {"t": np.arange(n) / 1000.0}
     columns |= {name: np.tile(noise[:, k], n // 1000) for k, name in enumerate(("ax", "ay", "az", "gx", "gy", "gz"))}

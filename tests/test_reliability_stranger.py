@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ import trihedron
 from small_session import G, copied, leftovers, run, started
 from trihedron.documents import DocumentError, parse_json
 from trihedron.read import read_recording
+from written_session import usual
 
 # C without UTF-8; an unknown locale, no home and a dumb terminal.
 ENVIRONMENTS = (
@@ -104,7 +106,7 @@ def test_names_of_files_break_no_line_of_a_repr_and_those_that_are_no_text_are_s
     (folder / "log.csv").rename(log)
     recording = trihedron.read(log)
     calibrated, judged = trihedron.calibrate(recording, gravity_m_s2=float(G)), trihedron.check(recording)
-    diagnosed = trihedron.diagnose(recording, gravity_m_s2=float(G))
+    diagnosed = replace(usual()[2], recording=recording)
     for result in (recording, calibrated, calibrated.calibration, judged, trihedron.allan(recording), diagnosed):
         assert repr(result).isprintable(), result
         assert "a\\nb\\x1b[2J\\t.csv" in repr(result)

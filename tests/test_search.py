@@ -87,6 +87,8 @@ def test_every_candidate_says_why_it_was_not_taken():
             assert row["limit95"] > 0.0, row["id"]
 
 
+# Of a gyro: tests/test_diagnose_pairs.py.
+@pytest.mark.slow
 def test_a_drift_among_biases_that_scatter_is_named():
     scenario = _of(profile_by_name("mpu"), hand_session(32, layout=7), "session", 7)
     scenario = with_effect(scenario, "accel-bias-drift", amplitude=(0.15, -0.12, 0.13), tau_s=80.0)

@@ -153,6 +153,16 @@ def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, 
     assert not (tmp_path / "b.csv").exists()
 
 
+def test_the_scenario_to_begin_with_is_a_whole_one_and_is_not_written_over(tmp_path, capsys):
+    begun = tmp_path / "sensor.toml"
+    assert main(["simulate", "--template", str(begun)]) == 0
+    assert simulate(read_scenario(begun), 1)[0].n_samples > 1000
+    assert main(["simulate", "--template", str(begun)]) == 1
+    assert "left alone" in capsys.readouterr().err
+
+
+# Scenarios of a user's own are improved in tests/test_worked_example.py.
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_simulations")
 def test_the_scenario_to_begin_with_is_made_one_of_the_users_own_unit(tmp_path, capsys):
     begun, better, log = tmp_path / "sensor.toml", tmp_path / "better.toml", made_once() / "log.csv"

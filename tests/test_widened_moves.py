@@ -27,7 +27,7 @@ def solved(monkeypatch):
     return kept
 
 
-@pytest.mark.parametrize("seed", [820058, 820032])
+@pytest.mark.parametrize("seed", [820058, pytest.param(820032, marks=pytest.mark.slow)])
 def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, solved):
     # Ten readings a second of a hand that trembles: moves and velocities miss by tens of standard errors.
     f, w, rate, truth, _ = hand(seed, rate_hz=10.0)
@@ -48,7 +48,7 @@ def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, sol
 
 def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
     wider, scores = [], []
-    for seed in range(4):
+    for seed in range(2):
         f, w, rate, truth, _ = hand(seed + 840100)
         t = np.arange(len(f)) / rate
         kept = np.random.default_rng([14, seed]).random(len(t)) >= 0.03
@@ -59,7 +59,7 @@ def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
     # A cubic through four samples crosses one of a smooth move nearly without error: a rate that might be anywhere
     # between its neighbours made the bars 1.8 to 2.4 times as wide (1.02 to 1.04 now).
     assert max(wider) < 1.2
-    # 36 numbers of four sessions: rms 1 ± 0.12, each session's nine being weakly correlated.
+    # 18 numbers of two sessions: rms 1 ± 0.17, each session's nine being weakly correlated.
     assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.4
 
 
@@ -101,12 +101,12 @@ def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(
 def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     """Nine lengths of gravity separate no spread of the bias from none: moves that are not bent do."""
     scores = []
-    for seed in range(6):
+    for seed in range(3):
         f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)
         result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
         low = np.tril_indices(3)
         of_S = (result.accelerometer.S - lower(truth).S_f)[low] / result.accelerometer.sigma_S[low]
         scores.append([*of_S, *((result.accelerometer.b - lower(truth).b_f) / result.accelerometer.sigma_b)])
     rms = np.sqrt(np.mean(np.square(scores)))
-    # 54 numbers, correlated within a session: 1 +- 0.2. It was 0.36 to 0.40 over 40 and 60 sessions.
+    # 27 numbers, correlated within a session: 1 +- 0.3. It was 0.36 to 0.40 over 40 and 60 sessions.
     assert 0.55 < rms < 1.4

@@ -1,5 +1,6 @@
 """A session as people write it to a file, its calibration, and the one sentence with which a command rejects."""
 
+import pickle
 from dataclasses import replace
 from functools import cache
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import trihedron
+from this_run import once
 from trihedron.cli import main
 from trihedron.records import Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -25,10 +27,15 @@ def simulated(motion, seed=3):
 
 @cache
 def usual():
-    """A short session, its calibration and its diagnosis, for what is said of them."""
+    """A short session, its calibration and its diagnosis, for what is said of them: made once in a run."""
+    return pickle.loads((once("usual", _usual) / "results").read_bytes())
+
+
+def _usual(folder):
     log = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
     gravity = {"gravity_m_s2": float(G)}
-    return log, trihedron.calibrate(log, **gravity), trihedron.diagnose(log, **gravity)
+    results = log, trihedron.calibrate(log, **gravity), trihedron.diagnose(log, **gravity)
+    (folder / "results").write_bytes(pickle.dumps(results))
 
 
 @pytest.fixture(scope="module")
