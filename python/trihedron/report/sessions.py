@@ -84,9 +84,8 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
         ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
         beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
-        beside += (
-            "" if axes[k].within is None else f", session to session {found_or_limit(axes[k].within, factor)} {unit}"
-        )
+        within = axes[k].within
+        beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
         out.append(Headline(f"{words} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
 
