@@ -110,8 +110,8 @@ def calibrate(
     else:
         choices |= {"reference": _only(reference), "reference_columns": reference_columns}
         result = _calibrated(sources, place, choices, extended=extended)
+    from trihedron.report.extended import calibration_result_report
     from trihedron.report.machine import calibration_record
-    from trihedron.report.reference import calibration_result_report
 
     document = calibration_result_report(result)
     more = "Every pose and move: --full, or --report FILE.html with figures."
