@@ -5,9 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
 use trihedron::allan::{Column, Kind, octave_clusters, variances};
 use trihedron::attitude::{Form, IDENTITY, Samples};
-use trihedron::gauss_newton::Loss;
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
-use trihedron::norm_invariant::{Frame, Objective, Readings, Settings, fit};
+use trihedron::norm_invariant::{Frame, Readings, Settings, fit};
 use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare};
 use trihedron::rotation;
 use trihedron::simd::Instructions;
@@ -43,8 +42,6 @@ fn norm_fits(c: &mut Criterion) {
     let settings = Settings {
         gravity: 9.81,
         frame: Frame::Lower,
-        objective: Objective::Norm,
-        loss: Loss::Linear,
     };
     let noise = [Matrix3::identity() * 12.5];
     let mut group = c.benchmark_group("norm_invariant::fit");

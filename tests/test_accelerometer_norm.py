@@ -94,17 +94,12 @@ def test_noise_underrated_by_half_is_reported_and_paid_for():
     assert claimed.quality.covariance_scale > 5
 
 
-def test_a_touched_pose_is_found_and_a_robust_loss_ignores_it():
+def test_a_touched_pose_is_found():
     means = readings(cube_poses(), 31)
     means[7] += [20.0, -15.0, 10.0]
-    plain, findings = calibrate_norm(means, SIGMA, G)
+    _, findings = calibrate_norm(means, SIGMA, G)
     outliers = [f for f in findings if f.code is FindingCode.OUTLIER_POSE]
     assert [f.numbers["pose"] for f in outliers] == [8.0]
-    clean, _ = calibrate_norm(np.delete(means, 7, axis=0), SIGMA, G)
-    robust, _ = calibrate_norm(means, SIGMA, G, loss="cauchy")
-    # Cauchy's influence of a residual of 60 standard errors is 2.385²/60, a tenth of one.
-    assert np.all(np.abs(robust.b - clean.b) < clean.sigma_b)
-    assert np.any(np.abs(plain.b - clean.b) > 3 * clean.sigma_b)
 
 
 def test_the_same_six_faces_again_and_again_do_not_become_eighteen_poses():
@@ -139,7 +134,6 @@ def test_the_first_advised_pose_beats_every_other_candidate(kept):
     ("arguments", "words"),
     [
         ({"frame": "case"}, "do not determine the case"),
-        ({"loss": "tukey"}, "loss must be one of"),
         ({"axis_signs": (1, 2, 3)}, "axis signs"),
         ({"raw_unit": "furlong"}, "furlong"),
     ],
@@ -149,15 +143,15 @@ def test_malformed_questions_are_answered_in_words(arguments, words):
         calibrate_norm(readings(cube_poses(), 1), SIGMA, G, **arguments)
 
 
-@pytest.mark.parametrize(("n", "loss"), [(20_001, 0), (150_000, 1)])
-def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
+@pytest.mark.parametrize("n", [20_001, 150_001])
+def test_very_many_readings_are_fitted_as_carefully_as_few(n):
     """From a share's answer full steps are taken; a start of one's own takes the careful way."""
-    rng = np.random.default_rng(n + loss)
+    rng = np.random.default_rng(n)
     up = rng.standard_normal((40, 3))
     up = np.repeat(up / np.linalg.norm(up, axis=1, keepdims=True), -(-n // 40), axis=0)[:n]
     true = np.array([[1.02, 0.0, 0.0], [0.004, 0.985, 0.0], [-0.009, 0.012, 1.01]])
     raw = (9.81 * up - [0.1, -0.2, 0.05]) @ np.linalg.inv(true).T + 0.03 * rng.standard_normal((n, 3))
-    settings, noise = _core.NormSettings(9.81, loss=loss, loss_scale=1.5), 9e-4 * np.eye(3)[None]
+    settings, noise = _core.NormSettings(9.81), 9e-4 * np.eye(3)[None]
     near = _core.fit_norm(raw, noise, settings)
     careful = _core.fit_norm(raw, noise, settings, (true, np.zeros(3)))
     # The step that ends the way is 1e-7 long, and the remainder behind it a hundredth of it.

@@ -130,8 +130,6 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
     assert np.isnan(result.accelerometer.quality.residual[-1])
     with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
         calibrate(log, gravity_m_s2=G, method="faces", faces=up[:-1])
-    with pytest.raises(ValueError, match=r"belongs to method=.separate"):
-        calibrate(log, gravity_m_s2=G, loss="huber")
 
 
 def test_turns_on_three_faces_calibrate_the_gyro_and_the_accelerometer_is_not_to_be_trusted():

@@ -19,6 +19,8 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.files.diagnosis import complaint_about, read_diagnosis, schema
 from trihedron.files.log import write_recording
 from trihedron.records import FindingCode
+from trihedron.report.document import Picture
+from trihedron.report.extended import calibration_result_report
 from trihedron.simulate import (
     Accelerometer,
     Gyroscope,
@@ -221,3 +223,16 @@ def test_a_bent_accelerometer_is_no_loss_of_samples_once_its_effect_is_found():
     bent = trihedron.calibrate(recording, gravity_m_s2=9.80665)
     assert FindingCode.LOSSES_POSSIBLE in {one.code for one in bent.calibration.findings}
     assert trihedron.extend(bent).is_trustworthy
+
+
+def test_an_extended_calibration_shows_what_its_effects_change():
+    recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
+    document = calibration_result_report(trihedron.extend(trihedron.calibrate(recording, gravity_m_s2=9.80665)))
+    linear, extended = document.lead.chart().panels[:2]
+    assert linear.title.startswith("linear model: ")
+    before, after = (float(panel.title.split()[-3]) for panel in (linear, extended))
+    # What S and b leave of the quadratic is several times the noise.
+    assert after < 0.5 * before
+    assert document.headlines[0].beside == "rms, cross-validated, with the effects"
+    drawn = [b.name for section in document.sections for b in section.blocks if isinstance(b, Picture)]
+    assert "effect-accel-quadratic" in drawn

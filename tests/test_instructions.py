@@ -23,11 +23,8 @@ zero = np.full((2, 3), 0.01)
 noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)
 out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, noise)
 for symmetric in (False, True):
-    for squared in (False, True):
-        for loss in (0, 1):
-            settings = _core.NormSettings(9.8, symmetric=symmetric, squared=squared, loss=loss)
-            fit = _core.fit_norm(readings, 1e-6 * np.eye(3)[None], settings)
-            out += [fit.S, fit.b, fit.covariance / fit.covariance.max(), fit.residuals]
+    fit = _core.fit_norm(readings, 1e-6 * np.eye(3)[None], _core.NormSettings(9.8, symmetric=symmetric))
+    out += [fit.S, fit.b, fit.covariance / fit.covariance.max(), fit.residuals]
     out += list(_core.fit_ellipsoid(readings, 9.8, symmetric))
 print(json.dumps(np.concatenate([np.ravel(part) for part in out]).tolist()))
 """

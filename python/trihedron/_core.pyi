@@ -15,15 +15,7 @@ ANCHOR: float
 
 @final
 class NormSettings:
-    def __new__(
-        cls,
-        gravity_m_s2: float,
-        *,
-        symmetric: bool = False,
-        squared: bool = False,
-        loss: int = 0,
-        loss_scale: float = 1.0,
-    ) -> NormSettings: ...
+    def __new__(cls, gravity_m_s2: float, *, symmetric: bool = False) -> NormSettings: ...
 
 @final
 class NormFit:
@@ -32,9 +24,7 @@ class NormFit:
     covariance: FloatArray
     residuals: FloatArray
     sigmas: FloatArray
-    weights: FloatArray
     chi2: float
-    robust_chi2: float
     rank: int
     is_anchored: bool
     is_converged: bool

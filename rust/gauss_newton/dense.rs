@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::{Certainty, Linear, Scaled, certainty, column_norms, cosine, positive_or_one};
-use super::{Descent, Local, Loss, Options, Stop, descend};
+use super::{Descent, Local, Options, Stop, descend};
 use crate::error::{Error, Result};
 
-/// A problem for the solver, already weighted by the loss.
+/// A problem for the solver.
 pub trait Problem {
     /// The compressed problem at `x`.
     ///
@@ -32,13 +32,13 @@ pub struct Solution {
     pub iterations: usize,
     /// F of GN1.
     pub cost: f64,
-    /// Σ r² of the whitened residuals, without the loss.
+    /// Σ r² of the whitened residuals.
     pub chi2: f64,
     /// Left side of GN4.
     pub gradient: f64,
     /// Left side of GN3 over `|D x|`.
     pub step: f64,
-    /// `RᵀR = JᵀWJ` at the solution.
+    /// `RᵀR = JᵀJ` at the solution.
     pub r_factor: DMatrix<f64>,
     /// Number of residuals.
     pub n_residuals: usize,
@@ -50,7 +50,7 @@ pub struct Solution {
 /// `residuals` the same residuals alone (cheaper; used for trial steps).
 ///
 /// # Errors
-/// When there are no parameters, blocks do not divide the residuals, or the start gives a cost that is not finite.
+/// When there are no parameters or the start gives a cost that is not finite.
 pub fn minimise(
     linearise: impl Fn(&DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>)>,
     residuals: impl Fn(&DVector<f64>) -> Result<DVector<f64>>,
@@ -61,7 +61,6 @@ pub fn minimise(
         &Rows {
             linearise,
             residuals,
-            options: *options,
         },
         start,
         options,
@@ -94,11 +93,7 @@ pub fn minimise_problem(
         chi2: linear.chi2,
         gradient: ended.gradient,
         step: ended.step,
-        certainty: certainty(
-            &linear.r_factor,
-            options.loss.covariance_factor(options.block),
-            options.rank_tolerance,
-        ),
+        certainty: certainty(&linear.r_factor, options.rank_tolerance),
         n_residuals: linear.n_residuals,
         r_factor: linear.r_factor,
     })
@@ -192,31 +187,6 @@ impl Local for DenseLocal {
 struct Rows<L, R> {
     linearise: L,
     residuals: R,
-    options: Options,
-}
-
-impl<L, R> Rows<L, R> {
-    /// Cost of the residuals, and √ρ' of each block.
-    fn cost_and_roots(&self, residuals: &DVector<f64>) -> Result<(f64, Vec<f64>)> {
-        let block = self.options.block;
-        if block == 0 || !residuals.len().is_multiple_of(block) {
-            return Err(Error::bad_input(format!(
-                "{} residuals cannot be split into blocks of {block}",
-                residuals.len()
-            )));
-        }
-        let mut cost = 0.0;
-        let roots = residuals
-            .as_slice()
-            .chunks_exact(block)
-            .map(|chunk| {
-                let (value, slope, _) = self.options.loss.rho(chunk.iter().map(|r| r * r).sum());
-                cost += 0.5 * value;
-                slope.sqrt()
-            })
-            .collect();
-        Ok((cost, roots))
-    }
 }
 
 impl<L, R> Problem for Rows<L, R>
@@ -225,7 +195,7 @@ where
     R: Fn(&DVector<f64>) -> Result<DVector<f64>>,
 {
     fn linearise(&self, x: &DVector<f64>) -> Result<Linear> {
-        let (mut residuals, mut jacobian) = (self.linearise)(x)?;
+        let (residuals, jacobian) = (self.linearise)(x)?;
         if jacobian.nrows() != residuals.len() || jacobian.ncols() != x.len() {
             return Err(Error::bad_input(format!(
                 "a Jacobian of shape {:?} does not fit {} residuals and {} parameters",
@@ -235,19 +205,10 @@ where
             )));
         }
         let chi2 = residuals.norm_squared();
-        let (cost, roots) = self.cost_and_roots(&residuals)?;
-        if self.options.loss != Loss::Linear {
-            for (i, residual) in residuals.iter_mut().enumerate() {
-                let root = roots[i / self.options.block];
-                *residual *= root;
-                jacobian.row_mut(i).scale_mut(root);
-            }
-        }
-        Ok(Linear::from_rows(residuals, jacobian, cost, chi2))
+        Ok(Linear::from_rows(residuals, jacobian, 0.5 * chi2, chi2))
     }
 
     fn cost(&self, x: &DVector<f64>) -> Result<f64> {
-        let residuals = (self.residuals)(x)?;
-        Ok(self.cost_and_roots(&residuals)?.0)
+        Ok(0.5 * (self.residuals)(x)?.norm_squared())
     }
 }

@@ -111,11 +111,7 @@ impl Certainty {
 
 /// SVD of a Jacobian (or its R factor) scaled to unit columns: covariance, rank, weak directions.
 #[must_use]
-pub fn certainty(
-    r_factor: &DMatrix<f64>,
-    covariance_factor: f64,
-    rank_tolerance: f64,
-) -> Certainty {
+pub fn certainty(r_factor: &DMatrix<f64>, rank_tolerance: f64) -> Certainty {
     let p = r_factor.ncols();
     let scaled = Scaled::new(r_factor, &column_norms(r_factor), &DVector::zeros(0));
     let rank = scaled.rank(rank_tolerance);
@@ -125,7 +121,7 @@ pub fn certainty(
         covariance += &direction * direction.transpose();
     }
     Certainty {
-        covariance: covariance * covariance_factor,
+        covariance,
         rank,
         singular_values: scaled.s,
         directions: scaled.v,

@@ -4,14 +4,13 @@
 //! of `JᵀJ` at the solution is the covariance of the parameters. It minimises
 //!
 //! ```text
-//! F(x) = ½ Σ_k ρ(|r_k|²)                                                             (GN1)
+//! F(x) = ½ Σ_k r_k²                                                                  (GN1)
 //! ```
 //!
-//! over blocks `r_k` of residuals (single ones by default), ρ being the [`Loss`]. Each step solves the reweighted
-//! linear problem in scaled parameters `D x`, `D = diag|J_j|`:
+//! Each step solves the linear problem in scaled parameters `D x`, `D = diag|J_j|`:
 //!
 //! ```text
-//! δ(λ) = -D⁻¹ V diag(s/(s² + λ)) Uᵀ q,      U diag(s) Vᵀ = R D⁻¹,   RᵀR = JᵀWJ,  Rᵀq = JᵀWr   (GN2)
+//! δ(λ) = -D⁻¹ V diag(s/(s² + λ)) Uᵀ q,      U diag(s) Vᵀ = R D⁻¹,   RᵀR = JᵀJ,  Rᵀq = Jᵀr     (GN2)
 //! ```
 //!
 //! with λ = 0 (a pure Gauss-Newton step) whenever that lowers the cost. It converges when one of two inequalities is
@@ -19,12 +18,11 @@
 //!
 //! ```text
 //! |D δ(0)| ≤ step_tolerance · |D x|                     the undamped step no longer moves the parameters   (GN3)
-//! max_j |J_jᵀWr| / (|J_j| |r|) ≤ gradient_tolerance     the residual is orthogonal to every column         (GN4)
+//! max_j |J_jᵀr|  / (|J_j| |r|) ≤ gradient_tolerance     the residual is orthogonal to every column         (GN4)
 //! ```
 
 mod dense;
 mod linear;
-mod loss;
 
 use nalgebra::DVector;
 
@@ -33,9 +31,8 @@ use crate::interrupt;
 pub use dense::{Problem, Solution, minimise, minimise_problem};
 pub(crate) use linear::positive_or_one;
 pub use linear::{Certainty, Linear, certainty};
-pub use loss::Loss;
 
-/// Stopping criteria and loss.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// GN3.
@@ -44,10 +41,6 @@ pub struct Options {
     pub gradient_tolerance: f64,
     /// Largest number of linearisations.
     pub max_iterations: usize,
-    /// The loss of one block.
-    pub loss: Loss,
-    /// Residuals per block: 1, or 3 when a residual vector is weighted as a whole.
-    pub block: usize,
     /// A singular value of the column-scaled Jacobian below this fraction of the largest counts as zero.
     pub rank_tolerance: f64,
 }
@@ -58,8 +51,6 @@ impl Default for Options {
             step_tolerance: 1e-10,
             gradient_tolerance: 1e-12,
             max_iterations: 100,
-            loss: Loss::Linear,
-            block: 1,
             rank_tolerance: 1e-9,
         }
     }

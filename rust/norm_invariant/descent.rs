@@ -103,7 +103,7 @@ pub(super) struct Equations {
 
 impl Equations {
     /// Covariance, rank and directions of the parameters.
-    pub(super) fn certainty(&self, covariance_factor: f64) -> Certainty {
+    pub(super) fn certainty(&self) -> Certainty {
         let own =
             Square::from_fn(|i, j| self.normal.gram[(i, j)] / (self.norms[i] * self.norms[j]));
         let eigen = own.symmetric_eigen();
@@ -114,7 +114,6 @@ impl Equations {
             let direction = eigen.eigenvectors.column(k).component_div(&self.norms);
             covariance += direction * direction.transpose() / eigen.eigenvalues[k];
         }
-        covariance *= covariance_factor;
         Certainty {
             covariance: DMatrix::from_column_slice(
                 N_PARAMETERS,

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::problem::predicted;
-use super::{Fit, N_PARAMETERS, Objective, Readings, Settings, fit};
+use super::{Fit, N_PARAMETERS, Readings, Settings, fit};
 use crate::error::{Error, Result};
 
 /// One pose, predicted without it.
@@ -85,11 +85,6 @@ fn one_fold(
             let reading = &readings.values[i];
             let f = other.model.correct(reading);
             let (noise, excess) = predicted(readings, settings, &other.model, i);
-            // Reported as a norm error for either objective.
-            let excess = match settings.objective {
-                Objective::Norm => excess,
-                Objective::SquaredNorm => excess - noise * noise / (2.0 * settings.gravity),
-            };
             let u = f / f.norm();
             let mut slope = nalgebra::SVector::<f64, 12>::zeros();
             for row in 0..3 {

@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Frame, Model, N_PARAMETERS, Objective, Settings};
+use super::{Frame, Model, N_PARAMETERS, Settings};
 use crate::ellipsoid::Standardisation;
 use crate::simd::fma;
 
@@ -97,13 +97,8 @@ pub(super) fn misfit<const FUSED: bool>(
     excess: f64,
     settings: &Settings,
 ) -> (f64, f64) {
-    let g = settings.gravity;
-    let square = dot::<FUSED>(f, f);
-    let norm = square.sqrt();
-    match settings.objective {
-        Objective::Norm => (norm - g - excess, norm),
-        Objective::SquaredNorm => ((square - g * g) / (2.0 * g) - excess, g),
-    }
+    let norm = dot::<FUSED>(f, f).sqrt();
+    (norm - settings.gravity - excess, norm)
 }
 
 /// The columns of the six entries of `S` and of `b`, from `v` along the derivative and the reading `u`.

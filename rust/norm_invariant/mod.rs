@@ -27,7 +27,7 @@ pub use problem::residual_gradient;
 pub use crate::sensor_model::{Frame, Model};
 
 use crate::error::{Error, Result};
-use crate::gauss_newton::{Certainty, Loss, Stop};
+use crate::gauss_newton::{Certainty, Stop};
 
 /// Free parameters: six of `S`, three of `b`.
 pub const N_PARAMETERS: usize = 9;
@@ -40,15 +40,6 @@ impl Frame {
     const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 }
 
-/// The residual that is squared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Objective {
-    /// `|S a' + b| - |g|`.
-    Norm,
-    /// `(|S a' + b|² - |g|²) / 2|g|`, the manual's objective in m/s².
-    SquaredNorm,
-}
-
 /// Options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -56,10 +47,6 @@ pub struct Settings {
     pub gravity: f64,
     /// Body frame of the result.
     pub frame: Frame,
-    /// The residual that is squared.
-    pub objective: Objective,
-    /// Loss of a residual.
-    pub loss: Loss,
 }
 
 /// A fitted triad.
@@ -73,12 +60,8 @@ pub struct Fit {
     pub residuals: Vec<f64>,
     /// Predicted standard error of each residual, m/s².
     pub sigmas: Vec<f64>,
-    /// Weight of each residual by the loss; empty for least squares, where all are one.
-    pub weights: Vec<f64>,
     /// Σ (residual/sigma)².
     pub chi2: f64,
-    /// The same with outliers downweighted, Σψ²/E[ψ²]; `chi2` for least squares.
-    pub robust_chi2: f64,
     /// Rank, singular values of the Jacobian in the solver's parameters.
     pub certainty: Certainty,
     /// Whether the poses determine so little that each parameter was kept near its start, to [`ANCHOR`] of |g|.

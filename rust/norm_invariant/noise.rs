@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::lanes::{Eights, LANES, Row, ZERO, columns, dot, filler, force, load, mirrored, store};
 use super::sums::{At, SHARE, by_share};
-use super::{N_PARAMETERS, Objective, Readings};
+use super::{N_PARAMETERS, Readings};
 use crate::simd::{Instructions, fma, for_each_instruction_set};
 
 /// Noise of eight readings, row by row.
@@ -62,7 +62,6 @@ fn write_predictions_lanes<const FUSED: bool>(
     let s = &at.model.s;
     let metric = s.transpose() * s;
     let per_two_g = 0.5 / at.settings.gravity;
-    let is_norm = at.settings.objective == Objective::Norm;
     let (mut u, mut noise) = ([ZERO; 3], [ZERO; 9]);
     let (mut found_sigma, mut found_excess) = (ZERO, ZERO);
     let common = (readings.noise.len() == 1).then(|| {
@@ -99,7 +98,7 @@ fn write_predictions_lanes<const FUSED: bool>(
                 }
                 (along * per_square, trace)
             };
-            let across = if is_norm { trace - along } else { trace };
+            let across = trace - along;
             // A pose whose noisy axes all lie across gravity still has some noise along it.
             let floor = 1e-6 * trace;
             found_sigma[l] = if along > floor { along } else { floor }.sqrt();

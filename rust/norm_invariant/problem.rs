@@ -5,9 +5,7 @@ use nalgebra::{DMatrix, DVector, SVector, Vector3};
 use super::noise;
 use super::parameters::unpack_standardised;
 use super::sums::{self, At, WithNoise};
-use super::{
-    ANCHOR, Frame, Model, N_PARAMETERS, Objective, Parameters, Readings, Settings, UNKNOWN,
-};
+use super::{ANCHOR, Frame, Model, N_PARAMETERS, Parameters, Readings, Settings, UNKNOWN};
 use crate::ellipsoid::Standardisation;
 
 /// Least volume of `S` as a part of the start's: below it lies the minimum `S = 0, |b| = |g|`.
@@ -66,10 +64,7 @@ pub(super) fn predicted(
     let u = f / f.norm();
     let noise = model.s * readings.noise_of(i) * model.s.transpose();
     let along = u.dot(&(noise * u));
-    let across = match settings.objective {
-        Objective::Norm => noise.trace() - along,
-        Objective::SquaredNorm => noise.trace(),
-    };
+    let across = noise.trace() - along;
     // A pose whose noisy axes all lie across gravity still has some noise along it.
     let floor = 1e-6 * noise.trace();
     (along.max(floor).sqrt(), across / (2.0 * settings.gravity))
@@ -99,12 +94,7 @@ impl PoseProblem<'_> {
     }
 
     fn misfit(&self, f: &Vector3<f64>, i: usize) -> f64 {
-        let g = self.settings.gravity;
-        let raw = match self.settings.objective {
-            Objective::Norm => f.norm() - g,
-            Objective::SquaredNorm => (f.norm_squared() - g * g) / (2.0 * g),
-        };
-        raw - self.fixed.excess[i]
+        f.norm() - self.settings.gravity - self.fixed.excess[i]
     }
 
     fn collapses(&self, model: &Model) -> bool {
@@ -207,10 +197,7 @@ pub fn residual_gradient(
     u: &Vector3<f64>,
     settings: &Settings,
 ) -> SVector<f64, N_PARAMETERS> {
-    let along = match settings.objective {
-        Objective::Norm => f / f.norm(),
-        Objective::SquaredNorm => f / settings.gravity,
-    };
+    let along = f / f.norm();
     let mut slope = SVector::<f64, N_PARAMETERS>::zeros();
     for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
         slope[k] = along[i] * u[j];

@@ -12,7 +12,7 @@ use super::sums::{At, SHARE, by_share};
 use super::{Fit, Model, N_PARAMETERS, Parameters, ROWS_KEPT};
 use crate::ellipsoid::Standardisation;
 use crate::error::{Error, Result};
-use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
+use crate::gauss_newton::{self, Certainty, Options, Stop};
 
 pub(super) fn direct<'a>(problem: &'a PoseProblem<'_>, theta: &Parameters) -> Direct<'a> {
     Direct {
@@ -45,11 +45,7 @@ pub(super) enum Found {
 }
 
 pub(super) fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Settled> {
-    let settings = problem.settings;
-    let options = Options {
-        loss: settings.loss,
-        ..Options::default()
-    };
+    let options = Options::default();
     let direct = direct(problem, theta);
     let has_anchor = problem.anchor.is_some();
     if !has_anchor && let Ok(ended) = gauss_newton::descend(&direct, *theta, &options) {
@@ -96,9 +92,8 @@ pub(super) fn finish(
     iterations: usize,
 ) -> Result<Fit> {
     let settings = problem.settings;
-    let factor = settings.loss.covariance_factor(1);
     let held = match &settled.found {
-        Found::Direct(equations) => equations.certainty(factor),
+        Found::Direct(equations) => equations.certainty(),
         Found::Dense(certainty) => certainty.clone(),
     };
     // Noise in a reading enters residual and derivative alike: it biases S towards zero, by (σ/g)² of itself.
@@ -108,7 +103,6 @@ pub(super) fn finish(
         None => held,
         Some(_) => gauss_newton::certainty(
             &problem.data_jacobian(&DVector::from_column_slice(settled.theta.as_slice())),
-            factor,
             Options::default().rank_tolerance,
         ),
     };
@@ -123,23 +117,13 @@ pub(super) fn finish(
     let covariance = map * fixed(&certainty.covariance) * map.transpose();
     let residuals = problem.in_m_s2(&model);
     let sigmas = &problem.fixed.sigma;
-    let squares = || residuals.iter().zip(sigmas).map(|(r, s)| (r / s).powi(2));
     let chi2 = sum_of_squares(&residuals, sigmas);
-    let (weights, robust_chi2) = if settings.loss == Loss::Linear {
-        (Vec::new(), chi2)
-    } else {
-        let weights: Vec<f64> = squares().map(|z2| settings.loss.weight(z2)).collect();
-        let influence: f64 = squares().zip(&weights).map(|(z2, w)| w * w * z2).sum();
-        (weights, influence / settings.loss.expected_influence(1))
-    };
     Ok(Fit {
         model,
         covariance,
         chi2,
-        robust_chi2,
         residuals,
         sigmas: Vec::new(),
-        weights,
         certainty,
         is_anchored: problem.anchor.is_some(),
         stop: settled.stop,

@@ -16,7 +16,6 @@ use super::lanes::{
 };
 use super::{Model, N_PARAMETERS, Settings};
 use crate::ellipsoid::Standardisation;
-use crate::gauss_newton::Loss;
 use crate::simd::{Instructions, fma, for_each_instruction_set};
 
 /// Entries of the lower triangle of the normal equations.
@@ -70,7 +69,7 @@ impl WithNoise<'_> {
     }
 }
 
-/// `JᵀWJ`, `JᵀWr`, F and Σ r².
+/// `JᵀJ`, `Jᵀr`, F and Σ r².
 #[derive(Clone, Copy)]
 pub(super) struct Normal {
     pub gram: SMatrix<f64, N_PARAMETERS, N_PARAMETERS>,
@@ -207,7 +206,7 @@ fn add_rows_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sums: 
     let settings = &at.settings;
     let mirrored = mirrored(settings.frame);
     let mut u = [ZERO; 3];
-    let (mut rows, mut residual, mut weight) = ([ZERO; N_PARAMETERS], ZERO, [1.0; LANES]);
+    let (mut rows, mut residual) = ([ZERO; N_PARAMETERS], ZERO);
     let values = Eights::of(with_noise.values, filler(with_noise.values));
     let sigmas = Eights::of(with_noise.sigma, f64::INFINITY);
     let excesses = Eights::of(with_noise.excess, 0.0);
@@ -229,31 +228,17 @@ fn add_rows_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sums: 
             sums.chi2[l] += square;
             sums.cost[l] = fma::<FUSED>(0.5, square, sums.cost[l]);
         }
-        if settings.loss != Loss::Linear {
-            for l in 0..LANES {
-                let square = residual[l] * residual[l];
-                let (value, slope, _) = settings.loss.rho(square);
-                weight[l] = slope;
-                sums.cost[l] += 0.5 * (value - square);
-            }
-        }
-        add_products::<FUSED>(&rows, &residual, &weight, sums);
+        add_products::<FUSED>(&rows, &residual, sums);
     }
 }
 
 /// Lanes innermost: the triangle has too many entries for the compiler to unroll.
 #[inline(always)]
-fn add_products<const FUSED: bool>(
-    rows: &[Row; N_PARAMETERS],
-    residual: &Row,
-    weight: &Row,
-    sums: &mut Lanes,
-) {
+fn add_products<const FUSED: bool>(rows: &[Row; N_PARAMETERS], residual: &Row, sums: &mut Lanes) {
     let mut entry = 0;
     for i in 0..N_PARAMETERS {
-        let mut a = rows[i];
+        let a = rows[i];
         for l in 0..LANES {
-            a[l] *= weight[l];
             sums.slope[i][l] = fma::<FUSED>(a[l], residual[l], sums.slope[i][l]);
         }
         for b in &rows[..=i] {
@@ -288,7 +273,7 @@ fn add_directions_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, 
                 rows[k][l] = row[k] * (at.settings.gravity / sigma[l]);
             }
         }
-        add_products::<FUSED>(&rows, &ZERO, &[1.0; LANES], sums);
+        add_products::<FUSED>(&rows, &ZERO, sums);
     }
 }
 
@@ -311,14 +296,8 @@ fn add_costs_lanes<const FUSED: bool>(with_noise: &WithNoise<'_>, at: &At, sum: 
                 misfit::<FUSED>(f, excess[l], &at.settings).0 * (1.0 / (sigma[l] * at.widening));
             square[l] = residual * residual;
         }
-        if at.settings.loss == Loss::Linear {
-            for l in 0..LANES {
-                sum[l] = fma::<FUSED>(0.5, square[l], sum[l]);
-            }
-        } else {
-            for l in 0..LANES {
-                sum[l] += 0.5 * at.settings.loss.rho(square[l]).0;
-            }
+        for l in 0..LANES {
+            sum[l] = fma::<FUSED>(0.5, square[l], sum[l]);
         }
     }
 }

@@ -7,8 +7,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{as_vectors, flat3, matrices3, rows, rows3};
 use crate::ellipsoid;
-use crate::gauss_newton::Loss;
-use crate::norm_invariant::{self, Fit, Frame, Model, Objective, Readings, Settings};
+use crate::norm_invariant::{self, Fit, Frame, Model, Readings, Settings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ANCHOR", norm_invariant::ANCHOR)?;
@@ -20,47 +19,19 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Options of the norm fit. Losses: 0 linear, 1 Huber, 2 soft-L1, 3 Cauchy.
+/// Options of the norm fit.
 #[pyclass(frozen)]
 struct NormSettings(Settings);
 
 #[pymethods]
 impl NormSettings {
     #[new]
-    #[pyo3(signature = (gravity_m_s2, *, symmetric=false, squared=false, loss=0, loss_scale=1.0))]
-    fn new(
-        gravity_m_s2: f64,
-        symmetric: bool,
-        squared: bool,
-        loss: u8,
-        loss_scale: f64,
-    ) -> PyResult<Self> {
-        if !(loss_scale.is_finite() && loss_scale > 0.0) {
-            return Err(PyValueError::new_err(format!(
-                "the scale of a robust loss must be a positive number of standard errors, got {loss_scale}"
-            )));
-        }
-        let loss = match loss {
-            0 => Loss::Linear,
-            1 => Loss::Huber { scale: loss_scale },
-            2 => Loss::SoftL1 { scale: loss_scale },
-            3 => Loss::Cauchy { scale: loss_scale },
-            _ => {
-                return Err(PyValueError::new_err(format!(
-                    "there is no loss number {loss}"
-                )));
-            }
-        };
-        Ok(Self(Settings {
+    #[pyo3(signature = (gravity_m_s2, *, symmetric=false))]
+    fn new(gravity_m_s2: f64, symmetric: bool) -> Self {
+        Self(Settings {
             gravity: gravity_m_s2,
             frame: frame(symmetric),
-            objective: if squared {
-                Objective::SquaredNorm
-            } else {
-                Objective::Norm
-            },
-            loss,
-        }))
+        })
     }
 }
 
@@ -109,23 +80,9 @@ impl NormFit {
         self.0.sigmas.to_pyarray(py)
     }
 
-    /// Weight (n,) of each residual by the loss.
-    #[getter]
-    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        if self.0.weights.is_empty() {
-            return PyArray1::from_vec(py, vec![1.0; self.0.residuals.len()]);
-        }
-        self.0.weights.to_pyarray(py)
-    }
-
     #[getter]
     fn chi2(&self) -> f64 {
         self.0.chi2
-    }
-
-    #[getter]
-    fn robust_chi2(&self) -> f64 {
-        self.0.robust_chi2
     }
 
     #[getter]

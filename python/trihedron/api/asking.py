@@ -207,7 +207,7 @@ _JUDGED_BY_THE_VERB = {"Any", "Scenario"}
 _ALIASES = {"AnyReference": {"ReferenceMotion", "Recording", *_PATH}}
 _PLAIN: dict[str, Callable[[str, str, Any], Any]] = {"float": _number, "int": _whole, "str": _text, "bool": _switch}
 # Words of a closed list: the verb checks the choice, only the type is checked here.
-_PLAIN |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Loss", "Method", "NormFrame", "RateShape"), _word)
+_PLAIN |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Method", "NormFrame", "RateShape"), _word)
 _LISTED = {"float": " of numbers", "int": " of whole numbers", "str": " of texts", "tuple[float, float]": " of pairs"}
 
 

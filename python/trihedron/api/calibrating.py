@@ -40,8 +40,6 @@ if TYPE_CHECKING:
 Method = Literal["joint", "separate", "faces"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
-Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
-
 COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
 """Findings that already state the number of poses."""
 FEWEST_POSES = 3
@@ -65,7 +63,6 @@ def calibrate(
     faces: Sequence[int] | None = None,
     turns_deg: Sequence[float] | None = None,
     axis_signs: Sequence[int] | None = None,
-    loss: Loss = "linear",
     gyroscope_nominal: float | None = None,
     turntable_deg_s: Sequence[float] | None = None,
     turntable_sigma: float = 0.0,
@@ -94,8 +91,6 @@ def calibrate(
         turn. With ``"faces"`` multiples of 90° are recognised where the scale is known.
     axis_signs : three of ±1
         Sign of each raw axis along its axis of the body, from the board's documentation; not with ``"faces"``.
-    loss : "linear", "huber", "soft_l1" or "cauchy"
-        Weight of outlying poses; other than ``linear`` with ``"separate"`` or an accelerometer alone.
     gyroscope_nominal : float
         Nominal scale [rad/s per raw unit], for counts where too few moves determine it.
     turntable_deg_s : sequence of float
@@ -149,12 +144,10 @@ def calibrate(
     else:
         if faces is not None:
             raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
-        if loss != "linear" and method == "joint" and recording.gyroscope is not None:
-            raise InputError(f"--loss {loss} belongs to --method separate: a fit of both sensors has none.")
         wanted = frame or "lower"
         try:
             calibration = _by_poses(
-                recording, segments, gravity, source, method, wanted, axis_signs, loss, gyroscope_nominal, turns_deg
+                recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal, turns_deg
             )
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
@@ -225,7 +218,6 @@ def _by_poses(
     method: Method,
     frame: Frame,
     axis_signs: Sequence[int] | None,
-    loss: Loss,
     nominal: float | None,
     turns_deg: Sequence[float] | None,
 ) -> Calibration:
@@ -237,7 +229,6 @@ def _by_poses(
         gravity,
         raw_unit=recording.accelerometer_unit,
         frame=frame,
-        loss=loss,
         axis_signs=axis_signs,
     )
     alone = _alone(accelerometer, found, frame, gravity, source, recording)

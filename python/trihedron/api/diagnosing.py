@@ -255,7 +255,6 @@ def _opened(against: GivenModel | None) -> GivenModel | None:
 def _simulated_log(
     against: GivenModel, recording: Recording, segments: Segments, gravity: float
 ) -> tuple[Recording, Scenario | None]:
-    """The simulated log, and its scenario where that was given."""
     if isinstance(against, Recording):
         return against, None
     if not isinstance(against, Scenario):

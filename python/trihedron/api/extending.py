@@ -59,7 +59,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     )
     spoilt = _spoilt(diagnosis) if diagnosis.effects else None
     if diagnosis.effects and spoilt is None:
-        return replace(result, calibration=_extended(base, diagnosis, _modelled(diagnosis)))
+        extended = _extended(base, diagnosis, _modelled(diagnosis))
+        return replace(result, calibration=extended, diagnosis=diagnosis)
     finding = _modelled(diagnosis) if spoilt is None else spoilt
     return replace(result, calibration=replace(base, findings=(*base.findings, finding)))
 

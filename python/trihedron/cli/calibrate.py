@@ -36,7 +36,6 @@ OPTIONS = {
     ),
     "turntable_error": ("PERCENT", "Standard error of the turntable's speed, common to all turns."),
     "axis_signs": ("+++", "Sign of each raw axis relative to its documented direction, e.g. '-++'."),
-    "loss": "Loss of outlying poses: linear (least squares), huber, soft_l1, cauchy.",
     "gyro_nominal": ("X", "Nominal rad/s per gyro unit, where counts and few moves do not determine it."),
     "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log; one for each log."),
     "extended": "Diagnose the log too and store the accepted effects, which `trihedron apply` then compensates.",
@@ -60,7 +59,6 @@ def calibrate(
     turntable: str | None = None,
     turntable_error: float = 0.0,
     axis_signs: str | None = None,
-    loss: str = "linear",
     gyro_nominal: float | None = None,
     reference: list[Path] | None = None,
     reference_columns: str | None = None,
@@ -84,7 +82,6 @@ def calibrate(
         "faces": None if faces is None else whole_numbers("--faces", faces),
         "turns_deg": None if turns is None else numbers("--turns", turns),
         "axis_signs": None if axis_signs is None else signs("--axis-signs", axis_signs),
-        "loss": one_of("--loss", loss, ("linear", "huber", "soft_l1", "cauchy")),
     }
     if turntable is not None:
         choices |= {"turntable_deg_s": numbers("--turntable", turntable), "turntable_sigma": turntable_error / 100.0}
@@ -92,12 +89,12 @@ def calibrate(
         if reference:
             calibrate_beside(sources, reference, reference_columns, place, choices["frame"], output, results)
             return
-        if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:
+        if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "frame"}:
             raise typer.BadParameter(
                 "several logs are calibrated without --method faces, --turns and --turntable, without --extended"
             )
-        if method != "joint" or loss != "linear":
-            raise typer.BadParameter("several logs are calibrated with --method joint and --loss linear")
+        if method != "joint":
+            raise typer.BadParameter("several logs are calibrated with --method joint")
         calibrate_many(sources, place, by, labels, choices["frame"], output, results)
         return
     choices["gyroscope_nominal"] = gyro_nominal
@@ -110,8 +107,8 @@ def calibrate(
     else:
         choices |= {"reference": _only(reference), "reference_columns": reference_columns}
         result = _calibrated(sources, place, choices, extended=extended)
+    from trihedron.report.extended import calibration_result_report
     from trihedron.report.machine import calibration_record
-    from trihedron.report.reference import calibration_result_report
 
     document = calibration_result_report(result)
     more = "Every pose and move: --full, or --report FILE.html with figures."

@@ -155,7 +155,6 @@ def _pair(streams: list[Stream]) -> tuple[Stream, Stream] | None:
 
 
 def _without(table: Table, sensor: Any, dropped: str) -> Table:
-    """The table of one sensor, without the columns of the other."""
     pairs = zip(table.names or (), table.columns, strict=True)
     names, columns = zip(*(pair for pair in pairs if not pair[0].startswith(dropped)), strict=True)
     return replace(table, sensor=sensor, names=names, columns=columns)

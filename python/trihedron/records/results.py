@@ -30,6 +30,8 @@ class CalibrationResult(Printed):
         The log, in its own unit.
     reference : AgainstReference, optional
         The fit to the reference motion, where the calibration is from that.
+    diagnosis : Diagnosis, optional
+        Where the effects of an extended calibration come from.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class CalibrationResult(Printed):
     segments: Segments
     recording: Recording
     reference: AgainstReference | None = None
+    diagnosis: Diagnosis | None = None
 
     @property
     def accelerometer(self) -> SensorCalibration:

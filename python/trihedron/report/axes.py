@@ -23,9 +23,9 @@ TRIAD = "triad-alignment is the rotation of the gyro's axes against the accelero
 
 
 def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; other names unchanged."""
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; ``sigma_x`` as ``σ_x``."""
     sensor, gap, axis = name.rpartition(" ")
-    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
+    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name.replace("sigma_", "σ_")
 
 
 def channel_in_print(channel: str) -> str:

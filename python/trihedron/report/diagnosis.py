@@ -10,8 +10,9 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.axes import LETTERS
+from trihedron.report.axes import LETTERS, axis_in_print
 from trihedron.report.calibration_fit import figures_table
+from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_numbers import (
@@ -71,9 +72,9 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         about = (forest_picture(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
         sections.append(Section("Parameters that differ" if differs else "Parameters of the model", about))
     sections += [
-        Section("Missing effects", (*effects_blocks(diagnosis), *_physics(diagnosis))),
+        Section("Missing effects", (*effects_blocks(diagnosis), *effect_pictures(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
-        Section("Cross-validation: before and after", _held_out(diagnosis)),
+        *(Section("Cross-validation: before and after", (table,)) for table in _held_out(diagnosis)),
         Section("Candidates", candidates_blocks(diagnosis)),
         Section("Calibration and noise", _models(diagnosis)),
     ]
@@ -216,7 +217,7 @@ def _parameters(effect: AcceptedEffect) -> str:
         words = []
         for p in members[:MOST_PARAMETERS]:
             # A symbol with its axis (K2_x) stays as it is, words (accelerometer_delay) get spaces.
-            name = p.name if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
+            name = axis_in_print(p.name) if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
             words.append(f"{name} {value_in_words(scale * p.value, scale * p.std)}")
         words += [f"{len(members) - MOST_PARAMETERS} more"] if len(members) > MOST_PARAMETERS else []
         groups.append(", ".join(words) + (f" [{shared}]" if shared else ""))
@@ -269,7 +270,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
         for held in effect.held_out
     )
     if not rows:
-        return (Paragraph("No effect was added, so there is no before and after."),)
+        return ()
     head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
     caption = "Poses and moves, cross-validated: predicted by fits that did not see them; χ²/dof by the noise that the "
     caption += "model with the effect needs, 1 by that alone"
@@ -286,7 +287,7 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
     return () if picture is None else (picture,)
 
 
-def _physics(diagnosis: Diagnosis) -> list[Picture]:
+def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
     """One picture per effect, where the recording is given and the effect acts on single poses or moves."""
     # Forces are computed with the recording's own calibration: a given model's may be of another sensor and unit.
     own = getattr(diagnosis, "updated", None) or getattr(diagnosis, "calibration", None)
@@ -297,8 +298,7 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
     for effects in alike(diagnosis.effects, diagnosis.residuals):
         chart = effect_chart(effects[0], diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            said = " ".join(_without_strongest(effect.statement) for effect in effects)
-            caption = f"{listed([effect.id for effect in effects])}: {_drawn_in_words(effects[0])}. {said}"
+            caption = f"{listed([effect.id for effect in effects])}: {_drawn_in_words(effects[0])}."
             out.append(Picture(f"effect-{effects[0].id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
 
@@ -317,10 +317,14 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares the rest of it."
+    return Picture(residuals.domain, caption, partial(residuals_chart, diagnosis, residuals))
+
+
+def residuals_chart(diagnosis: Diagnosis, residuals: DomainResiduals) -> Chart:
+    """Residuals of one domain without and with the effects, with lines at poses that are not static."""
     segments = getattr(diagnosis, "segments", None) if residuals.kind == "pose" else None
     lines = () if segments is None else pose_lines(segments, segments.time_mid_s)
-    chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects), lines=lines)
-    return Picture(residuals.domain, caption, chart)
+    return before_after_chart(residuals, has_effects=bool(diagnosis.effects), lines=lines)
 
 
 def _counted(residuals: DomainResiduals) -> str:

@@ -8,6 +8,7 @@ from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
+from trihedron.report.axes import channel_in_print
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
 from trihedron.report.numbers import (
@@ -43,6 +44,7 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
+_CHANNELS = {"a": "accelerometer ", "g": "gyro "}
 _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""
 LEAST_SHARE = 0.005
@@ -223,8 +225,8 @@ def where_in_words(test: DomainTest) -> str:
     where = test.where
     parts = []
     if where.channels:
-        parts.append("channel " + ", ".join(where.channels))
-    spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
+        parts.append(", ".join(_CHANNELS.get(c[:-1], "") + channel_in_print(c) for c in where.channels))
+    spans = [f"{a:.1f}–{b:.1f} s" for a, b in where.times_s]
     if where.segments:
         named = [f"{name} ({span})" for name, span in zip(where.segments, spans, strict=False)]
         parts.append("most in " + ", ".join((named or where.segments)[:MOST_NAMED]))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
+from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
-from trihedron.records.sessions import PARAMETERS, Parameter
+from trihedron.records.sessions import PARAMETERS, Parameter, Spread
 from trihedron.report.axes import TRIAD, axis_in_print
-from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Panel, Points, Scale
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.numbers import capital, how_many, plain_number, shown
-from trihedron.report.sessions import change_in_words, repeated_cells
+from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
@@ -131,15 +133,19 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
         typical = plain_number(statistics.median(held) * factor, 3)
         out.append(Headline("gravity error in static poses", typical, unit, beside))
     for name, words in (("accel-bias", "accelerometer bias"), ("gyro-bias", "gyroscope bias")):
-        apart = [(one.between, one.within) for one in summary.repeated if one.parameter.id == name]
-        spreads = [between.sd for between, _ in apart if between is not None]
+        axes = [one for one in summary.repeated if one.parameter.id == name]
+        spreads = [one.between for one in axes if one.between is not None]
         if spreads:
             factor, unit = shown("m/s^2" if name == "accel-bias" else "rad/s")
-            own = [within.sd for _, within in apart if within is not None]
-            repeat = f"; session to session {plain_number(max(own) * factor, 2)}" if own else ""
+            own = [one.within for one in axes if one.within is not None]
+            repeat = f"; session to session {found_or_limit(_largest(own), factor)} {unit}" if own else ""
             beside = f"device to device, worst axis{repeat}"
-            out.append(Headline(words, plain_number(max(spreads) * factor, 2), unit, beside))
+            out.append(Headline(words, found_or_limit(_largest(spreads), factor), unit, beside))
     return tuple(out)
+
+
+def _largest(spreads: Sequence[Spread]) -> Spread:
+    return max(spreads, key=lambda one: (one.sd, one.high))
 
 
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
@@ -274,6 +280,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
     x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    good = np.array([log.is_trustworthy for log in logs], dtype=bool)
     panels = []
     apart = numbers - np.median(numbers, axis=0)
     strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
@@ -283,9 +290,14 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         factor, unit = shown(parameter.unit)
         centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
         values, error = (numbers[:, k] - centre) * factor, errors[:, k] * factor
-        is_stray = np.array([(log.serial, parameter) in strays for log in logs])
+        is_stray = good & np.array([(log.serial, parameter) in strays for log in logs])
         marks: list[Level | Points] = [Level(y=0.0)]
-        for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
+        kinds: tuple[tuple[BoolArray, Colour, str], ...] = (
+            (good & ~is_stray, AXIS_COLOURS[0], "a log"),
+            (is_stray, "accent", "unlike the others"),
+            (~good, "soft", "not to be trusted"),
+        )
+        for part, colour, name in kinds:
             if part.any():
                 tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))

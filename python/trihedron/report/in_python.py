@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from trihedron.records import Finding
 
 _SAME = (
-    "accuracy alpha baud by calibration columns current-parameters device instance labels loss noise protocol "
+    "accuracy alpha baud by calibration columns current-parameters device instance labels noise protocol "
     "reference reference-columns serial static time-unit topic workers"
 )
 """Options whose parameters have the same name."""

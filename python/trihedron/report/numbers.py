@@ -49,7 +49,8 @@ def with_sigma(value: float, sigma: float) -> str:
         # Digits before the point beyond the second of σ are not significant.
         step = 10.0 ** (math.floor(math.log10(sigma)) - 1)
         value, sigma = round(value / step) * step, round(sigma / step) * step
-    return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
+    # Adding 0.0 turns -0.0 into 0.0.
+    return f"{round(value, places) + 0.0:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
 
 
 def with_sigma_and_power(value: float, sigma: float) -> str:

@@ -29,6 +29,7 @@ from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.diagnosis import diagnosis_report, first_screen
 from trihedron.report.drawing import figures
+from trihedron.report.extended import calibration_result_report
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.kalman import kalman_record, kalman_report
 from trihedron.report.noise import curve_summary, noise_picture, noise_report
@@ -36,7 +37,6 @@ from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_fragment
 from trihedron.report.plan import plan_record, plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
-from trihedron.report.reference import calibration_result_report
 from trihedron.report.saved import written
 from trihedron.report.segments import recording_summary, segments_report
 from trihedron.report.sessions import sessions_report

@@ -10,7 +10,6 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
-from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -237,12 +236,6 @@ def _shown_from(ident: str, one: Estimate) -> str:
         return "; this reference drifts too much to show any"
     size, unit = _SHEET[ident]
     return f" (detectable here: about {plain_number(size * one.shown_from, 2)} {unit})"
-
-
-def calibration_result_report(result: CalibrationResult) -> Document:
-    """The report of a calibration, with the section on its reference where it has one."""
-    document = calibration_report(result.calibration, result.segments, result.recording)
-    return beside_reference(document, result.reference, 1)
 
 
 def error_picture(found: AgainstReference, name: str = "reference-error") -> Picture | None:

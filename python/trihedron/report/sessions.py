@@ -81,19 +81,24 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
         if not axes:
             continue
         factor, unit = shown(axes[0].parameter.unit)
-        spread = [0.0 if one.within is None else one.within.sd for one in axes]
-        ahead = [factor * math.hypot(one.std, sd) for one, sd in zip(axes, spread, strict=True)]
+        ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
-        common, repeats = (plain_number(factor * value, 2) for value in (axes[k].std, spread[k]))
-        beside = f"1 σ, worst axis: common value {common}, session to session {repeats} {unit}"
+        beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
+        within = axes[k].within
+        beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
         out.append(Headline(f"{words} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
+
+
+def found_or_limit(spread: Spread, factor: float) -> str:
+    """A standard deviation, or its upper limit (95 %) where none is detectable."""
+    return plain_number(factor * spread.sd, 2) if spread.sd else f"below {plain_number(factor * spread.high, 2)}"
 
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
     chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
-    has_band = model.thermal is None and any(one.within is not None for one in model.repeated)
+    has_band = model.thermal is None and any(one.within is not None and one.within.sd for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {ONE_SIGMA}"
     caption += "; band: session to session (1 σ)." if has_band else "."
     return Picture("drift", caption, chart)
@@ -289,7 +294,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
 def _band(model: SessionsModel, k: int, n: int) -> list[Mark]:
     """The spread of parameter ``k`` between sessions, where it is not described by temperature."""
     spread = model.repeated[k].within
-    if model.thermal is not None or spread is None:
+    if model.thermal is not None or spread is None or not spread.sd:
         return []
     reach = np.full(2, spread.sd * shown(PARAMETERS[k].unit)[0])
     return [Band(np.array([0.5, n + 0.5]), -reach, reach, REPEATS)]

@@ -122,8 +122,9 @@ def _facts(facts: Facts, style: Style) -> list[str]:
     columns = style.width
     rows = [(style.plain(label), style.plain(text)) for label, text in facts.rows]
     width = max((_width(label) for label, _ in rows), default=0) + 2
-    if width > columns // 2:
-        # Long labels on a narrow terminal: the text goes below them.
+    longest = max((_width(word) for _, text in rows for word in text.split()), default=0)
+    if width > columns // 2 or width + longest > columns:
+        # Long labels or paths on a narrow terminal: the text goes below the labels.
         hanging = [(_wrap(label, columns), _wrap(text, columns, "    ", "    ")) for label, text in rows]
         return [line for label, text in hanging for line in (*label, *text)]
     lines: list[str] = []

@@ -87,7 +87,6 @@ def _halves(run: Run) -> tuple[list[Range], list[Range]]:
 
 
 def _first_blocks(ranges: list[Range], count: int) -> list[Range]:
-    """The first ``count`` blocks of some ranges."""
     out, left = [], count
     for a, b in ranges:
         if left:

@@ -64,16 +64,6 @@ def ellipsoid(
     return _core.fit_ellipsoid(inputs.pose_means(means, 1.0)[0], inputs.gravity(gravity_m_s2), frame == "symmetric")
 
 
-Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
-
-# Number of the loss in the Rust core, and its scale (in standard errors) for 95 % efficiency on Gaussian noise.
-_LOSSES: dict[str, tuple[int, float]] = {
-    "linear": (0, 1.0),
-    "huber": (1, 1.345),
-    "soft_l1": (2, 1.0),
-    "cauchy": (3, 2.385),
-}
-
 METHOD = "norm of gravity in static poses"
 
 LEAVE_ONE_OUT_LIMIT = 200
@@ -87,17 +77,15 @@ def calibrate_norm(
     *,
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
     frame: Frame = "lower",
-    loss: Loss = "linear",
     axis_signs: npt.ArrayLike | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from the mean readings of poses, whatever their orientation.
 
-    Minimises ``Σ ρ(((|S a' + b| - |g|)/σ)²)`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
-    ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3), or covariances (n, 3, 3). Robust
-    losses keep 95 % efficiency on Gaussian noise. ``raw_unit`` is only used to question implausible scales.
-    ``axis_signs`` (3,) of ±1 is the sign of each raw axis against the body frame's axis, from the board's documentation
-    or method 1: gravity's magnitude does not determine the signs of the diagonal of S; the default is +1. An odd number
-    of minus signs is reported as a left-handed triad.
+    Minimises ``Σ ((|S a' + b| - |g|)/σ)²`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
+    ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3), or covariances (n, 3, 3).
+    ``raw_unit`` is only used to question implausible scales. ``axis_signs`` (3,) of ±1 is the sign of each raw axis
+    against the body frame's axis, from the board's documentation or method 1: gravity's magnitude does not determine
+    the signs of the diagonal of S; the default is +1. An odd number of minus signs is reported as a left-handed triad.
 
     When the poses do not determine nine parameters, these have a prior of 10 % about the sphere through the readings,
     which is the uncertainty of undetermined directions, and a SERIOUS finding names the poses to add. Raises
@@ -108,7 +96,7 @@ def calibrate_norm(
     g = inputs.gravity(gravity_m_s2)
     signs = inputs.axis_signs(axis_signs)
     unit = AccelerationUnit(raw_unit)
-    settings = _settings(g, frame, loss)
+    settings = _settings(g, frame)
     _enough(values)
     # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
     flip = np.outer(signs, signs)
@@ -119,16 +107,13 @@ def calibrate_norm(
     return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 
 
-def _settings(g: float, frame: str, loss: str) -> _core.NormSettings:
+def _settings(g: float, frame: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
         raise InputError(
             f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
             "they do not determine the case"
         )
-    if loss not in _LOSSES:
-        raise InputError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
-    number, scale = _LOSSES[loss]
-    return _core.NormSettings(g, symmetric=frame == "symmetric", loss=number, loss_scale=scale)
+    return _core.NormSettings(g, symmetric=frame == "symmetric")
 
 
 def _enough(values: FloatArray) -> None:
@@ -164,8 +149,7 @@ def _assemble(
     up = f / np.linalg.norm(f, axis=1)[:, None]
     residual, sigma = norm_residual(f, S, noise, g)
     dof = len(values) - N_PARAMETERS
-    # With a robust loss χ² excludes the rejected poses.
-    chi2 = fit.robust_chi2
+    chi2 = fit.chi2
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
@@ -177,7 +161,7 @@ def _assemble(
     observability = design.observability(relative_sigma)
     quality = replace(
         gravity_quality(residual, sigma, (apart[:, 0], apart[:, 1])),
-        weights=fit.weights,
+        weights=np.ones(len(values)),
         n_iterations=fit.n_iterations,
         stopped_because=words(fit.stopped_because),
         covariance_scale=scale,

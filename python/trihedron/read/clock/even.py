@@ -76,7 +76,6 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
 
 
 def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
-    """The clock of timestamps (n,) with the period ``found``."""
     n, period, is_seen = len(time_s), found.period_s, found.is_seen
     # One buffer for lateness, clock and error in turn: a second one takes memory and time for a long log.
     room = _core.new_array(n, 1).reshape(-1)

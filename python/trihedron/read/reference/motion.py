@@ -91,7 +91,6 @@ def roles_of(table: Table, said: str | None) -> list[Role]:
 
 
 def _role(column: int, name: str) -> Role | None:
-    """The meaning of one name, or ``None``."""
     bare, unit = _split(name)
     if _TIME.fullmatch(bare):
         suffix = bare.rsplit("_", 1)[-1] if "_" in bare else ""

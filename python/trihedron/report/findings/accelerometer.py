@@ -49,7 +49,7 @@ ENTRIES = {
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
         "The sensor was touched or not static in this pose, or a reading clipped.",
-        "Exclude the pose, or use a robust loss (--loss).",
+        "Exclude the pose.",
     ),
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_cubic:?a cubic nonlinearity|{is_quadratic:?a quadratic "

@@ -1,0 +1,83 @@
+"""The report of a calibration with what else its result has: a reference, and effects fitted together with S and b."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import DomainResiduals
+from trihedron.records.results import CalibrationResult
+from trihedron.report.calibration import calibration_report
+from trihedron.report.chart import Chart, Panel
+from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
+from trihedron.report.diagnosis_words import MEANING
+from trihedron.report.document import Document, Headline, Picture, Section
+from trihedron.report.numbers import listed, plain_number, shown
+from trihedron.report.reference import beside_reference
+
+FIRST = "static-accel"
+"""The domain that is always drawn: gravity error in static poses."""
+PREDICTED = ("static-accel", "moves")
+"""Domains whose cross-validated error with the effects is on the first screen."""
+
+
+def calibration_result_report(result: CalibrationResult) -> Document:
+    """The report of a calibration, with the sections on its reference and on its effects where it has them."""
+    document = calibration_report(result.calibration, result.segments, result.recording)
+    document = beside_reference(document, result.reference, 1)
+    return document if result.diagnosis is None else _with_effects(document, result.diagnosis)
+
+
+def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
+    """The report with the residuals without and with the effects as its lead, and every effect after the result."""
+    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *effect_pictures(diagnosis)))
+    return replace(
+        document,
+        sections=(document.sections[0], effects, *document.sections[1:]),
+        headlines=(*_headlines(diagnosis), *document.headlines),
+        lead=_changed_picture(diagnosis),
+    )
+
+
+def _headlines(diagnosis: Diagnosis) -> list[Headline]:
+    """Cross-validated errors with the effects."""
+    last = next((stage for stage in diagnosis.stages if stage.stage == "effects"), None)
+    found = []
+    for one in () if last is None else last.domains:
+        if one.domain in PREDICTED:
+            factor, unit = shown(one.unit)
+            beside = "rms, cross-validated, with the effects"
+            found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
+    return found
+
+
+def _changed_picture(diagnosis: Diagnosis) -> Picture | None:
+    """Residuals without and with the effects: gravity error, and the one in which the strongest effect acts."""
+    drawn = {held.domain for effect in diagnosis.effects for held in effect.held_out[:1]} | {FIRST}
+    chosen = [one for one in diagnosis.residuals if one.domain in drawn and len(one.before) and len(one.after)]
+    if not chosen:
+        return None
+    caption = f"{listed([MEANING[one.domain] for one in chosen]).capitalize()}, in sample: left by S and b alone, "
+    caption += f"right with {listed([effect.id for effect in diagnosis.effects])}; ± 2 σ of the predicted noise."
+    return Picture("effects", caption, partial(_changed_chart, diagnosis, chosen))
+
+
+def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> Chart:
+    """A row for every domain: without the effects, with them."""
+    panels: list[Panel] = []
+    for one in chosen:
+        factor, unit = shown(one.unit)
+        drawn = residuals_chart(diagnosis, one).panels
+        for panel, values in zip(drawn, (one.before, one.after), strict=True):
+            assert isinstance(panel, Panel)
+            panels.append(replace(panel, title=f"{panel.title}: {plain_number(factor * _rms(values))} {unit} rms"))
+    return Chart(tuple(panels), columns=2, is_linked=True)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
