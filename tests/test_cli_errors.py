@@ -37,6 +37,15 @@ def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, sai
     assert said in rejected(capsys, *arguments)
 
 
+def test_a_gyro_that_is_missing_from_every_third_row_leaves_the_accelerometer(tmp_path, capsys, recording):
+    gyroscope = recording.gyroscope.copy()
+    gyroscope[::3] = np.nan
+    log = tmp_path / "gaps.csv"
+    log.write_text(log_text(replace(recording, gyroscope=gyroscope)))
+    assert main(["check", str(log)]) in (0, 2)
+    assert "gyro" in capsys.readouterr().out
+
+
 def test_signs_of_axes_are_taken_in_their_order():
     assert signs("--axis-signs", "-+-") == [-1, 1, -1]
 

@@ -1,15 +1,26 @@
 """``trihedron kalman``: a log and a pose table in, report, JSON and calibration file out."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import trihedron
 from trihedron.cli import main
+from trihedron.estimate.kalman.identified import noise_from_identified
 from trihedron.read import ReadError, read_axis_noise
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG
-from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_static, simulate
+from trihedron.simulate import (
+    Accelerometer,
+    Clock,
+    NoiseTerms,
+    Scenario,
+    dividing_head,
+    long_static,
+    scenario_by_name,
+    simulate,
+)
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)
@@ -61,6 +72,15 @@ def test_the_noise_may_be_a_log_of_rest_or_the_json_of_allan(session, tmp_path, 
         assert axis["walk"] == pytest.approx(0.001, rel=0.6)
     # JSON keeps every digit.
     assert said[1] == said[0]
+
+
+def test_noise_of_a_log_with_both_sensors_in_counts_is_that_of_the_accelerometer():
+    motion = long_static(120.0)
+    static = simulate(replace(scenario_by_name("static-hour"), motion=motion), seed=3)[0]
+    noise = trihedron.allan(static)
+    assert {axis.unit for axis in noise.axes} == {"counts"}
+    of_accelerometer = [axis.fitted("N") for axis in noise.axes if axis.name.startswith("accel")]
+    assert [axis.white for axis in noise_from_identified(noise.axes, "counts")] == of_accelerometer
 
 
 def rest_log(path, seconds, **noise):

@@ -84,7 +84,7 @@ def test_topics_of_a_bag_are_listed_with_counts_and_chosen(tmp_path):
         read_recording(path)
     assert_same(read_recording(path, topic="/front/imu"))
     assert read_recording(path, topic="rear/imu").n_samples == 200
-    with pytest.raises(ReadError, match="there is no /imu in this bag"):
+    with pytest.raises(ReadError, match="there is no topic /imu in this bag"):
         read_recording(path, topic="/imu")
 
 

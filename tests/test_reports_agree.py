@@ -74,7 +74,7 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     given = next(one for one in again.parameters if (one.id, one.name) == ("accel-bias", "x"))
     assert given.model == pytest.approx(expected[0], abs=1e-9)
     for one in (result, several, again):
-        assert "the reading at zero input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
+        assert "the reading without input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
 
 
 def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
@@ -85,7 +85,7 @@ def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
         worst = max((row[2] for row in table.rows), key=float)
         headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
         assert (table.head[2], headline.unit, headline.value) == ("relative σ [%]", "%", worst)
-        # A bias stands once, in SI, over the sensitivity; the raw reading at zero input has another name.
-        assert table.head[-1].startswith("reading at zero input, −S⁻¹ b [count")
+        # A bias stands once, in SI, over the sensitivity; the raw reading without input has another name.
+        assert table.head[-1].startswith("reading without input, −S⁻¹ b [count")
     one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
-    assert "zero input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
+    assert "without input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)

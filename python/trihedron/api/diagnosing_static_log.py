@@ -35,12 +35,13 @@ def model_of_static_log(
     calibrated: Calibrated,
 ) -> Calibration | None:
     """The model that converts a log of one or two orientations to SI; ``None`` where the log is a session."""
-    if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
+    if recording.accelerometer is None or not is_static_log(recording, segments, calibrated):
         return None
     return nominal(recording, segments, gravity) if known is None else known
 
 
-def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
+def is_static_log(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
+    """Whether the log has one or two orientations, or too few poses for a session."""
     mean = segments.accelerometer_mean
     if mean is None or segments.n_poses < FEWEST_POSES:
         return True

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from trihedron.cli.options import LogSource, progress, with_options
-from trihedron.cli.output import FullResults, leave, say
+from trihedron.cli.output import FullResults, is_stdout, leave, say
 from trihedron.cli.streamed import needs_stream
 from trihedron.files.output import write_whole
 
@@ -89,7 +89,7 @@ def allan(
         say(f"plot: {plot}")
     more = "Data-sheet units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html."
     results.finish(document, lambda: noise_record(found, lengths, accuracy / 100.0), more)
-    leave(all_findings(found))
+    leave(all_findings(found), is_shown=not is_stdout(results.json))
 
 
 def _of_log(source: LogSource, calibration: Path | None, options: dict[str, Any]) -> Noise:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.cli.options import LogSource, progress, with_options
-from trihedron.cli.output import Results, leave
+from trihedron.cli.output import Results, is_stdout, leave
 
 
 @with_options(source=LogSource, results=Results)
@@ -19,4 +19,4 @@ def check(source: LogSource, results: Results) -> None:
         result = checking.check(recording, progress=notify)
     shown = (recording, result.segments, result.calibration, result.findings)
     results.emit(check_report(*shown), lambda: check_record(*shown))
-    leave(result.findings)
+    leave(result.findings, is_shown=not is_stdout(results.json))

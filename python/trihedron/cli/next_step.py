@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from trihedron.report import Document
 
 _COMMAND = re.compile(r"`[^`]+`")
-_NOT_AGAIN = ("--json", "--report", "--full", "--force", "-o", "--output")
+_NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from trihedron.cli.options import GravitySource, LogSource, numbers, progress, with_options
-from trihedron.cli.output import FullResults, leave, put, say
+from trihedron.cli.output import FullResults, is_stdout, leave, put, say
 from trihedron.files.output import write_whole
 
 FIRST_SCREEN = 2
@@ -66,4 +66,4 @@ def noise(
             say(f"noise for {to}: {output}")
     more = "The test on the other half: --full; with the picture: --report FILE.html."
     results.finish(document, lambda: filter_noise_record(found), more)
-    leave(found.findings)
+    leave(found.findings, is_shown=not is_stdout(results.json))

@@ -67,7 +67,7 @@ def write_json(machine: Machine, target: Path | None, *, force: bool, document: 
         return
     from trihedron.report.machine import json_text
 
-    if str(target) == "-":
+    if is_stdout(target):
         typer.echo(json_text(machine()), nl=False)
         return
     content = machine()
@@ -138,15 +138,20 @@ class FullResults(Results, _Extent):
             write_calibration(calibration, output, overwrite=self.force)
             say(f"calibration: {output}")
         self.finish(document, machine, more)
-        leave(calibration.findings)
+        leave(calibration.findings, is_shown=not is_stdout(self.json))
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
     """Print the report on stdout, unless that is for JSON."""
-    if json_target is None or str(json_target) != "-":
+    if not is_stdout(json_target):
         from trihedron.report import to_text
 
         put(to_text(with_arguments(document), sections=sections, style=style()))
+
+
+def is_stdout(target: Path | None) -> bool:
+    """Whether a result goes to stdout (``-``) in place of the report."""
+    return target is not None and str(target) == "-"
 
 
 def style() -> Style:
@@ -207,12 +212,18 @@ def step(sentence: str) -> None:
         say(sentence)
 
 
-def leave(findings: Iterable[Finding]) -> None:
-    """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted."""
-    reasons = [finding.seen for finding in findings if finding.severity.value == "serious"]
-    if reasons:
-        from trihedron.report.findings.wording import opening
+def leave(findings: Iterable[Finding], *, is_shown: bool = False) -> None:
+    """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted.
 
+    ``is_shown``: the report, which begins with the reason, was printed; a terminal that shows both needs it once.
+    """
+    from trihedron.report.findings import serious_ones
+    from trihedron.report.findings.wording import opening
+
+    reasons = serious_ones(findings)
+    if reasons:
         more = f" ({len(reasons) - 1} more)" if len(reasons) > 1 else ""
-        say(f"trihedron: not to be trusted: {opening(reasons[0])}.{more}")
+        is_seen = is_shown and sys.stdout.isatty()
+        why = ", for the reason above." if is_seen else f": {opening(reasons[0].seen)}.{more}"
+        say(f"trihedron: not to be trusted{why}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)

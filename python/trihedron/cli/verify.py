@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.next_step import note_file
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
-from trihedron.cli.output import FullResults, leave
+from trihedron.cli.output import FullResults, is_stdout, leave
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -62,7 +62,7 @@ def verify(
         note_file(next(path for path in paths if path.name == ranking.best.name))
         results.show(document, FIRST_SCREEN)
         results.write(document, lambda: ranking_record(ranking))
-        leave(ranking.best.verification.findings)
+        leave(ranking.best.verification.findings, is_shown=not is_stdout(results.json))
         return
     from trihedron.report import verification_report
 
@@ -74,7 +74,7 @@ def verify(
     results.show(document, FIRST_SCREEN)
     more = "Every pose and move: --full, or --report FILE.html with figures."
     results.finish(document, lambda: verification_record(result.verification), more)
-    leave(result.findings)
+    leave(result.findings, is_shown=not is_stdout(results.json))
 
 
 def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:

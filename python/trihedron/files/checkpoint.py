@@ -72,7 +72,8 @@ class Checkpoint:
         if time.monotonic() - self._kept_at < self.every_s:
             return
         stream = io.BytesIO()
-        np.savez(stream, **state(), **{_MADE_OF: np.array(self.made_of), _ROWS: np.array(rows)})  # type: ignore[arg-type]
+        own = {_MADE_OF: np.array(self.made_of), _ROWS: np.array(rows)}
+        np.savez(stream, **state(), **own)  # type: ignore[arg-type]
         write_whole(self.path, stream.getvalue(), overwrite=True)
         self._kept_at = time.monotonic()
 

@@ -69,7 +69,7 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
     if isinstance(error, FileNotFoundError):
         return ReadError(f"{path}: there is no such file; check the name and the folder.")
     if isinstance(error, IsADirectoryError):
-        return ReadError(f"{path}: this is a directory; name the log file inside it.")
+        return ReadError(f"{path}: this is a directory; name the log inside it, or --accel FILE --gyro FILE of two.")
     if isinstance(error, PermissionError):
         return ReadError(f"{path}: no permission to read this file; change its permissions or copy it.")
     return ReadError(f"{path}: the system cannot read this file ({error.strerror or error}); copy it to a local disk.")

@@ -62,7 +62,8 @@ def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream
         and (choice.instance is None or s.instance == choice.instance)
     ]
     if not fitting:
-        wanted = " ".join(word for word in (choice.topic, choice.instance) if word)
+        asked = (("topic", choice.topic), ("instance", choice.instance))
+        wanted = " and ".join(f"{kind} {word}" for kind, word in asked if word)
         raise ReadError(f"{path}: there is no {wanted} in {what}; it offers {listed(streams)}.")
     filled = [s for s in fitting if s.count]
     if not filled:

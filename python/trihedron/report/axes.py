@@ -16,7 +16,7 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
-BIAS = "the reading at zero input (sign opposite to b)"
+BIAS = "the reading without input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
 TRIAD = "triad-alignment is the rotation of the gyro's axes against the accelerometer's"
 """Definition of the parameter ``triad-alignment`` in every report."""
@@ -43,7 +43,7 @@ def calibrated_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibr
 class Axes:
     """Properties of the axes of one sensor.
 
-    ``sensitivity`` (3,) in raw unit per SI unit, ``at_zero`` (3,) the reading at zero input, raw, and ``bias`` (3,) the
+    ``sensitivity`` (3,) in raw unit per SI unit, ``at_zero`` (3,) the reading without input, raw, and ``bias`` (3,) the
     same over the sensitivity, SI; ``skew_rad`` (3,) the excess of the angles X-Y, X-Z, Y-Z over a right angle; each
     with its standard error.
     """

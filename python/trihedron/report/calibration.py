@@ -186,7 +186,7 @@ def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     ]
     if raw != si:
         # For readings in SI it equals the bias except for the scale, and is omitted.
-        head.append(f"reading at zero input, −S⁻¹ b [{raw}]")
+        head.append(f"reading without input, −S⁻¹ b [{raw}]")
         columns.append(each_with_sigma(axes.at_zero, axes.sigma_at_zero))
     skew = each_with_sigma(axes.skew_rad, axes.sigma_skew_rad, mrad_from_radians(1.0))
     beyond = ", ".join(f"{pair} {angle} mrad" for pair, angle in zip(("X-Y", "X-Z", "Y-Z"), skew, strict=True))

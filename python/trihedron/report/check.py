@@ -26,10 +26,12 @@ def check_report(
         head = ("", "scale", "bias", "angles between axes")
         blocks.append(Table(head, rows, "Expected standard uncertainty (1 σ), worst axis"))
         blocks += _advice(calibration)
+    alone = " of the accelerometer (no gyro in the log)" if recording.gyroscope is None else ""
+    good, bad = f"Fit for calibration{alone}", "NOT FIT for calibration"
     return Document(
         title="Check of a log",
         subtitle=recording.source,
-        verdict=verdict_of(findings, "Fit for calibration.", "Fit for calibration", "NOT FIT for calibration"),
+        verdict=verdict_of(findings, f"{good}.", good, bad),
         is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
         sections=(
             Section("Result", (Facts(recording_facts(recording, segments)), *blocks)),
@@ -60,6 +62,8 @@ def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]
         try:
             axes = axes_of(sensor)
         except ValueError:
+            axes = None
+        if axes is None or float(np.max(axes.scale_sigma)) > 1.0:
             cells[name] = ("not determined", "not determined", "not determined")
             continue
         factor, unit = shown(sensor.si_unit)

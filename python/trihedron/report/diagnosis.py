@@ -141,6 +141,8 @@ def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    if not diagnosis.domains:
+        return (Paragraph("No domain was tested."),)
     after = {d.domain: d for d in diagnosis.remaining}
     # Most important columns first: on a narrow terminal the others move below.
     head: tuple[str, ...] = ("residual", "linear model", "rms", "χ²/dof", "p")
@@ -186,7 +188,8 @@ def _after(before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.effects:
-        return (Paragraph("No effect of the catalogue is accepted."),)
+        said = "No effect of the catalogue is accepted." if diagnosis.domains else "None was tested."
+        return (Paragraph(said),)
     blocks: list[Block] = []
     for k, effect in enumerate(diagnosis.effects):
         rows = [
@@ -246,6 +249,8 @@ def _before_and_after(held: HeldOut) -> tuple[str, str]:
 
 def _remaining(diagnosis: Diagnosis) -> str:
     left = [d for d in diagnosis.remaining if d.disagrees]
+    if not diagnosis.domains:
+        return "Nothing was tested."
     if not left:
         beside = "beside the relation below" if diagnosis.relations else "in this recording"
         return f"Nothing detectable {beside}."

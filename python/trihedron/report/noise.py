@@ -13,7 +13,7 @@ from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
-from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
+from trihedron.report.noise_units import TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
@@ -142,11 +142,12 @@ def _value(term: NoiseTerm, factor: float = 1.0) -> str:
     return with_sigma_and_power(factor * term.value, factor * term.sigma)
 
 
+def _label(term: TermName, unit: str) -> str:
+    return f"{term.value}  {term_in_words(term, unit)} [{unit_of(term, unit)}]"
+
+
 def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
-    rows = []
-    for term in TermName:
-        label = f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]"
-        rows.append((label, *(_value(axis.terms[term]) for axis in axes)))
+    rows = [(_label(term, unit), *(_value(axis.terms[term]) for axis in axes)) for term in TermName]
     processes = [axis.gauss_markov for axis in axes]
     if any(processes):
         sigmas = ("–" if p is None else with_sigma_and_power(p.sigma_process, p.sigma) for p in processes)
@@ -172,10 +173,7 @@ def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
     def cell(term: NoiseTerm) -> str:
         return f"{plain_number(term.lower)} … {plain_number(term.upper)}"
 
-    rows = [
-        (f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]", *(cell(axis.terms[term]) for axis in axes))
-        for term in TermName
-    ]
+    rows = [(_label(term, unit), *(cell(axis.terms[term]) for axis in axes)) for term in TermName]
     if any(axis.is_slow_noise_unresolved for axis in axes):
         words = ("not both 0" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))

@@ -10,9 +10,11 @@ TERM_WORDS = {
     TermName.QUANTISATION: "quantisation",
     TermName.WHITE: "white",
     TermName.BIAS_INSTABILITY: "bias instability",
-    TermName.RATE_RANDOM_WALK: "rate random walk",
-    TermName.RATE_RAMP: "rate ramp",
+    TermName.RATE_RANDOM_WALK: "random walk",
+    TermName.RATE_RAMP: "ramp",
 }
+QUANTITIES = {"rad/s": "rate", "deg/s": "rate", "m/s^2": "acceleration", "g": "acceleration"}
+"""What a reading is, in the names of K and R."""
 PER_UNIT = {
     TermName.QUANTISATION: "·s",
     TermName.WHITE: "/√Hz",
@@ -20,6 +22,12 @@ PER_UNIT = {
     TermName.RATE_RANDOM_WALK: "/√s",
     TermName.RATE_RAMP: "/s",
 }
+
+
+def term_in_words(term: TermName, unit: str) -> str:
+    """Name of a noise term for readings in ``unit``: the random walk of a gyro is a rate random walk."""
+    quantity = QUANTITIES.get(unit, "") if term in (TermName.RATE_RANDOM_WALK, TermName.RATE_RAMP) else ""
+    return f"{quantity} {TERM_WORDS[term]}".lstrip()
 
 
 def unit_of(term: TermName, unit: str) -> str:

@@ -85,7 +85,9 @@ def unit_with_power(exponent: int, unit: str) -> str:
 
 
 def unit_in_print(unit: str) -> str:
-    """``m/s^2`` and ``sqrt(Hz)`` as ``m/s²`` and ``√Hz``."""
+    """``m/s^2``, ``sqrt(Hz)`` and ``us`` as ``m/s²``, ``√Hz`` and ``µs``."""
+    if unit == "us":
+        return "µs"
     return unit.replace("^2", "²").replace("^3", "³").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 

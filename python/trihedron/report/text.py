@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.report.findings import beyond_headline
 from trihedron.sanitise import escaped, one_line
 
 WIDTH = 100
@@ -60,7 +61,7 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     if document.what_next:
         lines += _wrap(style.plain(document.what_next), style.width, style.plain("→ "), "  ")
     for section in document.sections[:sections]:
-        shown = [_block(block, style) for block in section.blocks if not isinstance(block, Picture)]
+        shown = [_block(block, document, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
             continue
         heading = style.plain(one_line(section.heading))
@@ -70,7 +71,7 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
-def _block(block: Block, style: Style) -> list[str]:
+def _block(block: Block, document: Document, style: Style) -> list[str]:
     if isinstance(block, Paragraph):
         return _wrap(style.plain(block.text), style.width)
     if isinstance(block, Code):
@@ -80,7 +81,8 @@ def _block(block: Block, style: Style) -> list[str]:
     if isinstance(block, Table):
         return _table(block, style)
     if isinstance(block, FindingList):
-        return [line for finding in block.findings for line in _finding_lines(finding, style)]
+        said = [beyond_headline(finding, document) for finding in block.findings]
+        return [line for finding in said for line in _finding_lines(finding, style)]
     return []
 
 

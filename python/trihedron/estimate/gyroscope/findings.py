@@ -122,8 +122,8 @@ def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArra
     dof = len(bias) - 1
     if dof < 1 or chdtrc(dof, float(excess.max())) > FALSE_ALARM / 3.0:
         return
-    rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
-    change = np.ptp(bias, axis=0) * rates
+    # An axis that moves hardly determine may have no scale of its own on the diagonal.
+    change = np.ptp(bias, axis=0) * np.linalg.norm(S, axis=0)
     axis = int(np.argmax(excess))
     yield Finding.of(
         FindingCode.GYRO_BIAS_DRIFT,

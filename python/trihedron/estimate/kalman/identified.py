@@ -23,6 +23,8 @@ MOST_BELOW = 3.0
 LARGEST_MISS_OF_GRAVITY = 0.3
 """Largest relative gravity error of a static log under the session's calibration: ranges differ by factors of two;
 biases differ by less between days, and between units of a cheap part."""
+ACCELEROMETER = "accel"
+"""First letters of the names that a log with both sensors gives the axes of its accelerometer."""
 COARSER = math.sqrt(2.0)
 """Largest ratio of two resolutions of one ADC and range."""
 
@@ -32,7 +34,8 @@ def noise_from_identified(
 ) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
     """Noise of the three accelerometer axes among the identified ones, in the raw unit of the log to be calibrated.
 
-    The axes with a unit of acceleration are used; where there is none (counts), the first three. Raises
+    The axes with a unit of acceleration are used; where there is none (counts), those named after an accelerometer,
+    else the first three. Raises
     ``InputError`` when there are not three such axes, or their unit cannot be converted to the raw unit.
     """
     out = [_one(axis, AccelerationUnit(raw_unit)) for axis in _accelerometer_axes(axes)]
@@ -41,7 +44,8 @@ def noise_from_identified(
 
 def _accelerometer_axes(axes: Sequence[NoiseAxis]) -> list[NoiseAxis]:
     units = {unit.value for unit in AccelerationUnit} - {AccelerationUnit.COUNTS.value}
-    chosen = [axis for axis in axes if axis.unit in units] or list(axes[:3])
+    named = [axis for axis in axes if axis.name.startswith(ACCELEROMETER)]
+    chosen = [axis for axis in axes if axis.unit in units] or named or list(axes[:3])
     if len(chosen) != 3:
         names = ", ".join(axis.name for axis in axes)
         raise InputError(f"noise of three accelerometer axes is needed, and was identified for {names}")
@@ -113,8 +117,8 @@ def check_same_adc(
         fast = noise.sample_sigma
         if step > COARSER * noise.resolution and step > fast > 0.0:
             raise InputError(
-                f"the static log is of another ADC than {source}: accelerometer {axis} has a resolution of {step:.3g} "
-                f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
+                f"the static log is of another ADC than {source}: accelerometer {axis.upper()} has a resolution of "
+                f"{step:.3g} there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
                 f"{noise.resolution:.3g}, would have shown it; {remedy}"
             )
         middles = np.array([math.sqrt(octave.low_hz * octave.high_hz) for octave in seen])
@@ -128,6 +132,6 @@ def check_same_adc(
             middle = math.sqrt(sorted(value)[len(seen) // 2])
             words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
             raise InputError(
-                f"the noise of accelerometer {axis} inside the poses of {source} is {words} of the static log, "
+                f"the noise of accelerometer {axis.upper()} inside the poses of {source} is {words} of the static log, "
                 f"at every frequency: another ADC, range or unit; {remedy}"
             )

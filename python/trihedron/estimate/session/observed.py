@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -69,6 +70,8 @@ def arranged(
             continue
         ranges.append((a, b))
         before.append(pose)
+    if not ranges:
+        raise InputError("readings are missing in every move: each row needs both sensors")
     noise, unresolved = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
     force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
     assert noise.pose_rate_sigma is not None

@@ -46,8 +46,9 @@ def targets() -> list[str]:
 def needs(one: Format) -> list[str]:
     """The options that a format requires, from the error that its writer raises without them."""
     identity = (np.eye(3), np.zeros(3))
+    example = given("trihedron", {"accelerometer": identity, "gyroscope": identity})
     try:
-        one.write(given("trihedron", {"accelerometer": identity, "gyroscope": identity}), ExportOptions())  # type: ignore[misc]
+        one.write(example, ExportOptions())  # type: ignore[misc]
     except InputError as error:
         return list(dict.fromkeys(re.findall(r"--(?:noise|rate|current-parameters)", str(error))))
     return []

@@ -1,5 +1,12 @@
 """Findings in words: the closed catalogue of sentences, and findings merged in reading order."""
 
-from trihedron.report.findings.grouping import combined, findings_block, ranged, verdict_of
+from trihedron.report.findings.grouping import (
+    beyond_headline,
+    combined,
+    findings_block,
+    ranged,
+    serious_ones,
+    verdict_of,
+)
 
-__all__ = ["combined", "findings_block", "ranged", "verdict_of"]
+__all__ = ["beyond_headline", "combined", "findings_block", "ranged", "serious_ones", "verdict_of"]

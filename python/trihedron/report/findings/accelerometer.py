@@ -79,7 +79,7 @@ ENTRIES = {
         numbers=("det_S_sign",),
     ),
     (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(
-        "The scale of {axis:axis} is {scale_ratio:.4g} although the log is in {unit}.",
+        "The scale of {axis:axis} is {scale_ratio:.4g} although the log is in {unit:unit}.",
         "The log is in another unit than stated, or |g| is wrong.",
         "State the unit of the log and |g|.",
     ),

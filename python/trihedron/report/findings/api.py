@@ -30,7 +30,14 @@ _CALIBRATE = {
     (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
         "No calibration can be made from this log: {why}.",
         "The log does not contain what a calibration needs.",
-        "Keep the sensor still for 3 to 5 s in each of 18 or more different poses; turn it by hand between them.",
+        "Log both sensors while you set the sensor down in 18 or more different poses, still for 3 to 5 s in each.",
+    ),
+    (Code.NOT_FIT, "static-log", SERIOUS): Words(
+        "This is a static log: nearly all static time of its {duration_s:.0f} s is in one or two orientations, which "
+        "do not determine S and b.",
+        "A log for noise or of a temperature chamber.",
+        "For noise: `trihedron allan LOG`; for drift and temperature: `trihedron diagnose LOG`. For S and b record 18 "
+        "or more poses of 3 to 5 s in different directions.",
     ),
     (Code.NOT_FIT, "few-orientations", NOTE): Words(
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
@@ -141,7 +148,7 @@ _TAKES_OFF = (
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:&, } the cross-validated error grows ({domain} from "
-        "{rms_before:.3g} to {rms_after:.3g} {unit} rms).",
+        "{rms_before:.3g} to {rms_after:.3g} {unit:unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
         numbers=("n_effects",),

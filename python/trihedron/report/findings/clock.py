@@ -55,13 +55,13 @@ _TIMESTAMPS = {
         numbers=("row",),
     ),
     (Code.TIME_UNIT_DETECTED, "", NOTE): Words(
-        "The time column is in {unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
+        "The time column is in {unit:unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
         "possible too|}.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "unsure", WARNING): Words(
-        "The time column is in {unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
-        "possible too|}.",
+        "The unit of the time column is uncertain: taken as {unit:unit}, its median interval of {step:.6g} makes "
+        "{rate_hz:.4g} Hz{has_others:?; {others:&, } would be possible too|}.",
         "The interval alone does not determine the unit; every rate and every noise density depends on it.",
         "Give --time-unit s, ms, us or ns if this is wrong, or --rate HZ if the column counts rows.",
         numbers=("rate_hz",),

@@ -7,13 +7,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.report.document import FindingList, Paragraph
+from trihedron.report.document import Document, FindingList, Paragraph
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import MINUS, capital, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 _CONSEQUENCE = (
     FindingCode.SAME_RECORDING,
+    FindingCode.GRAVITY_MISSING,
+    FindingCode.UNIT_CONTRADICTED,
+    FindingCode.NOT_FIT,
+    FindingCode.RATE_ASSUMED,
     FindingCode.CALIBRATION_DOUBTED,
     FindingCode.WORSE_THAN_UNCALIBRATED,
     FindingCode.FILTER_NOISE_FOLLOWED,
@@ -25,7 +29,7 @@ _CONSEQUENCE = (
     FindingCode.WEAKLY_OBSERVABLE,
     FindingCode.GYRO_G_SENSITIVITY,
 )
-"""Findings about the whole result, the gravest first; they come before those about a part of the recording."""
+"""Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 # A number that is a value; a number in a name (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
@@ -39,6 +43,11 @@ def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     return FindingList(sentences) if sentences else Paragraph("None.")
 
 
+def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The serious findings, the one of the verdict first."""
+    return tuple(one for one in sorted(combined(findings), key=_weight) if one.severity is Severity.SERIOUS)
+
+
 def _weight(finding: Finding) -> tuple[int, int]:
     is_listed = finding.code in _CONSEQUENCE
     return _ORDER[finding.severity], _CONSEQUENCE.index(finding.code) if is_listed else len(_CONSEQUENCE)
@@ -46,12 +55,23 @@ def _weight(finding: Finding) -> tuple[int, int]:
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
     """``bad`` with the first clause of the gravest finding; ``usable`` with the number of warnings; or ``good``."""
-    found = sorted(combined(findings), key=_weight)
-    serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
-    n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
+    serious = serious_ones(findings)
+    n_warnings = sum(finding.severity is Severity.WARNING for finding in combined(findings))
     if serious:
         return f"{bad}: {capital(opening(serious[0].seen))}."
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+
+
+def beyond_headline(finding: Finding, document: Document) -> Finding:
+    """What verdict and next action of the document have not stated of a finding; unchanged where they do not."""
+    if finding.severity is not Severity.SERIOUS or finding is not document.foremost:
+        return finding
+    clause = opening(finding.seen)
+    rest = finding.seen[len(clause) :].lstrip(" .;")
+    is_stated = clause.lower() in document.verdict.lower()
+    seen = f"Stated above. {rest[:1].upper()}{rest[1:]}".rstrip() if is_stated else finding.seen
+    is_next = finding.action[1:] == document.what_next[1:]
+    return replace(finding, seen=seen, action="" if is_next else finding.action)
 
 
 def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:

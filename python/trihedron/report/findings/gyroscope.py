@@ -37,7 +37,7 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
-        "The gyro scale is {scale_ratio:.4g} although the log is in {unit}.",
+        "The gyro scale is {scale_ratio:.4g} although the log is in {unit:unit}.",
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
@@ -98,8 +98,8 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
-        "The tilt error after rotations exceeds noise, and the timestamps are so even that they may have been "
-        "regenerated: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
+        "The tilt error after rotations exceeds noise, and these timestamps do not show lost samples: "
+        "{lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew; or another cause of "
         "the error.",

@@ -148,8 +148,11 @@ def _number(value: float, how: str) -> str:
 
 
 def _digits(value: float, digits: str) -> str:
-    """A number with an exponent as in tables: ``7.3e−5``."""
-    mantissa, e, power = format(value, digits).partition("e")
+    """A number with an exponent as in tables: ``7.3e−5``; up to a million it is written out: ``110``."""
+    rounded = format(value, digits)
+    mantissa, e, power = rounded.partition("e")
+    if e and 0 <= int(power) < 6:
+        return f"{float(rounded):.0f}"
     return f"{mantissa}e{int(power)}".replace("e-", f"e{MINUS}") if e else mantissa
 
 
