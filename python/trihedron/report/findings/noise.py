@@ -13,12 +13,12 @@ _LOG = {
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
     (Code.LOG_JUMP, "", WARNING): Words(
-        "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit} at {time_s:.1f} s.",
+        "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit:unit} at {time_s:.1f} s.",
         "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
         "A jump of the mean looks like K and R; each side is fitted with a mean of its own, so that K excludes it.",
     ),
     (Code.LOG_IMPACT, "", NOTE): Words(
-        "{n_impacts:# short excursion} of up to {impact:abs .3g} {unit}, the largest at {time_s:.1f} s.",
+        "{n_impacts:# short excursion} of up to {impact:abs .3g} {unit:unit}, the largest at {time_s:.1f} s.",
         "an impact on the table, a door, a lost or damaged reading.",
         "They raise N and Q; these stretches are excluded.",
     ),
@@ -44,8 +44,8 @@ _LOG = {
         "Every term comes out too small; use a wider range or another orientation.",
     ),
     (Code.QUANTISATION_DEAD, "", SERIOUS): Words(
-        "One reading's noise ({sigma:.3g} {unit}) is below half the resolution (LSB {resolution:.3g} {unit}): "
-        "{repeated:.0f %} of the readings repeat the one before.",
+        "One reading's noise ({sigma:.3g} {unit:unit}) is below half the resolution (LSB {resolution:.3g} "
+        "{unit:unit}): {repeated:.0f %} of the readings repeat the one before.",
         "the resolution is coarser than the noise.",
         "N is that of the rounding, and slow terms may be smaller than the resolution; use a narrower range or a finer "
         "output.",
@@ -116,12 +116,12 @@ _TERMS = {
         numbers=("evidence",),
     ),
     (Code.LOG_DRIFT, "", WARNING): Words(
-        "The level drifts by {drift:.3g} {unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit}/s).",
+        "The level drifts by {drift:.3g} {unit:unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit:unit}/s).",
         "warming up, or a change of the room's temperature.",
         "R describes this log, not the sensor; let it warm up, or log the temperature.",
     ),
     (Code.LOG_DRIFT, "warm-up", WARNING): Words(
-        "The level changes by {drift:.3g} {unit} with a time constant of {time_s:.3g} s; that was subtracted.",
+        "The level changes by {drift:.3g} {unit:unit} with a time constant of {time_s:.3g} s; that was subtracted.",
         "warming up.",
         "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
     ),

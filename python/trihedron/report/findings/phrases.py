@@ -84,9 +84,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "both": "{one} and {other}",
         "streams": "{streams:each}{has_more:? and others|}",
         "this-container": "This {kind}",
-        "unit-with-rate": "{unit} ({rate_hz:.4g} Hz)",
-        "amount-of-scatter": "{value:.3g} {unit} in {name}",
-        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit} in {name}",
+        "unit-with-rate": "{unit:unit} ({rate_hz:.4g} Hz)",
+        "amount-of-scatter": "{value:.3g} {unit:unit} in {name}",
+        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit:unit} in {name}",
         # the text of an exception, a finding or an effect as a clause of another sentence
         "because": "{sentence:clause}",
         "quoted": "{sentence}",
@@ -98,7 +98,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "not-trusted": "its own calibration is not to be trusted: {seen:opening}",
         "sensor-not-calibrated": "its {sensor} was not calibrated",
         "first-lacks-sensor": "the first recording has no {sensor}",
-        "another-unit": "its {sensor} is in {unit}, that of the first recording in {first_unit}",
+        "another-unit": "its {sensor} is in {unit:unit}, that of the first recording in {first_unit}",
         "another-gravity": "it was calibrated with another gravity",
     }
 )

@@ -9,8 +9,8 @@ _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wron
 _ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
-    "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit} (1 "
-    "where the unit is right; correlation {correlation:.2f})"
+    "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit:unit} "
+    "(1 where the unit is right; correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
@@ -24,7 +24,7 @@ _UNITS = {
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
-        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s^2 (981); taken as {unit}.",
+        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s² (981); taken as {unit:unit}.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),
@@ -32,7 +32,7 @@ _UNITS = {
         "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("static_norm",)
     ),
     (Code.UNIT_DETECTED, "accelerometer-static", NOTE): Words(
-        "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit}."
+        "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit:unit}."
     ),
     (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
         "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
@@ -52,14 +52,14 @@ _UNITS = {
         "Log the accelerometer itself; nothing here can be calibrated without gravity.",
     ),
     (Code.UNIT_CONTRADICTED, "accelerometer", SERIOUS): Words(
-        f"The accelerometer is in {{unit}} {_SOURCE}, but while static it reads {{static_norm:.4g}} {{unit}}, "
-        "{gravities:.3g} times gravity.",
+        f"The accelerometer is in {{unit:unit}} {_SOURCE}, but while static it reads {{static_norm:.4g}} "
+        "{unit:unit}, {gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
         "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
     ),
-    (Code.UNIT_DETECTED, "stated", NOTE): Words(f"The {{sensor}} is in {{unit}} {_SOURCE}."),
+    (Code.UNIT_DETECTED, "stated", NOTE): Words(f"The {{sensor}} is in {{unit:unit}} {_SOURCE}."),
     (Code.UNIT_CONTRADICTED, "gyro-by-turning", SERIOUS): Words(
-        f"The gyro is in {{unit}} {_SOURCE}, but {_TURNING}.",
+        f"The gyro is in {{unit:unit}} {_SOURCE}, but {_TURNING}.",
         "A wrong unit; or, if the unit is right, each time interval lasts {factor:.3g} times as long as it was read.",
         "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
     ),
@@ -69,10 +69,10 @@ _UNITS = {
         "State the gyro's unit (--gyro-unit, counts if it has none) and the clock (--time-unit, --rate).",
     ),
     (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
-    (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit}}: {_TURNING}."),
+    (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit:unit}}: {_TURNING}."),
     (Code.UNIT_ASSUMED, "gyro", WARNING): Words(
         "Nothing states the gyro's unit; it reads {static:.3g} while static and {largest:.4g} at most, so it was taken "
-        "as {unit}.",
+        "as {unit:unit}.",
         "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
     ),

@@ -61,8 +61,8 @@ ENTRIES = {
         lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"},
     ),
     (Code.RAW_LSB, "", NOTE): Words(
-        "The {sensor}'s readings in {unit} are multiples of a count (LSB {steps:each} {unit}; {per_unit:.5g} counts "
-        "per {is_accelerometer:?g|°/s}).",
+        "The {sensor}'s readings in {unit:unit} are multiples of a count (LSB {steps:each} {unit:unit}; "
+        "{per_unit:.5g} counts per {is_accelerometer:?g|°/s}).",
         "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
         lines={"steps": "{v0:axis} {v1:.5g}"},
     ),

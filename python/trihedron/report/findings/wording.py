@@ -148,9 +148,9 @@ def _number(value: float, how: str) -> str:
 
 
 def _digits(value: float, digits: str) -> str:
-    """A number with an exponent as in tables: ``7.3e−5``."""
+    """A number as in tables: ``−2.9``, ``7.3e−5``."""
     mantissa, e, power = format(value, digits).partition("e")
-    return f"{mantissa}e{int(power)}".replace("e-", f"e{MINUS}") if e else mantissa
+    return (f"{mantissa}e{int(power)}" if e else mantissa).replace("-", MINUS)
 
 
 def _plural(noun: str) -> str:
