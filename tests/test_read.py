@@ -223,7 +223,8 @@ def test_the_unit_of_time_is_told_by_its_step_or_its_date(tmp_path, scale, unit,
     stamped = table.copy()
     stamped[:, 0] = np.round(table[:, 0] * scale + start, 3)
     recording = read_recording(write(tmp_path / "log.csv", stamped))
-    assert re.search(rf"is in {unit}\b", finding(recording, FindingCode.TIME_UNIT_DETECTED).seen)
+    shown = unit.replace("u", "µ")
+    assert re.search(rf"(is in|taken as) {shown}\b", finding(recording, FindingCode.TIME_UNIT_DETECTED).seen)
     # A date in seconds leaves 2.4e-7 s per digit of a float.
     np.testing.assert_allclose(recording.time_s, table[:, 0], atol=5e-7)
     assert recording.start_epoch_s == pytest.approx(start / scale)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from trihedron.cli.guide import DEFAULT_ACCURACY
-from trihedron.cli.options import GravitySource, with_options
+from trihedron.cli.options import GravitySource, LogSource, with_options
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Block, Recorder
@@ -96,6 +96,7 @@ def capture(
         return
     from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
+    from trihedron.cli.next_step import note_log
 
     with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         made = run_guided(
@@ -109,6 +110,7 @@ def capture(
             seconds=seconds,
         )
     conclude(recorder, output, recorder.count.tally.saved, is_ended_well=made.is_done)
+    note_log(LogSource(log=output))
     finish(read(output), made.cut_s, place, calibration, force=force)
 
 

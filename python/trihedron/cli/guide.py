@@ -7,6 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,17 +82,23 @@ def finish(
 ) -> None:
     """Calibrate, verify on the poses held out, report; status 2 where the answer is not to be trusted."""
     from trihedron.api.guiding import conclude
+    from trihedron.cli.next_step import UNSTORED, note_file, with_arguments
     from trihedron.cli.output import leave, put, say, style
     from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report, to_text, verification_report
 
     result, check = conclude(recording, cut_s, **place.said)
-    put(to_text(calibration_report(result.calibration, result.segments, result.recording), sections=2, style=style()))
+    note_file(Path(UNSTORED) if output is None else output)
+    laid_out = calibration_report(result.calibration, result.segments, result.recording)
+    if output is None and laid_out.next_step:
+        store = f"Store it (`trihedron calibrate LOG -o {UNSTORED}`). "
+        laid_out = replace(laid_out, next_step=store + laid_out.next_step)
+    put(to_text(with_arguments(laid_out), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
         put("\n")
         document = verification_report(check.verification, check.segments, check.recording)
-        put(to_text(document, sections=2, style=style()))
+        put(to_text(with_arguments(document), sections=2, style=style()))
     if output is not None:
         write_calibration(result.calibration, output, overwrite=force)
         say(f"calibration: {output}")

@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ
-from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST
 from trihedron.report.axes import Axes, axes_of, calibrated_sensors
 from trihedron.report.calibration_charts import correlations, strong_correlations
@@ -90,11 +90,14 @@ def _headlines(calibration: Calibration) -> list[Headline]:
         beside = f"rms, {kind}, {AFTER_MOVES}; noise alone {floor}°"
         value = plain_number(angles[-1][1])
         (held if is_held else in_sample).append(Headline("tilt error after a rotation", value, "°", beside))
+    is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibrated_sensors(calibration):
         with suppress(ValueError):
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
-            uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", "1 σ, worst axis"))
+            is_open = is_assumed and name == "accelerometer"
+            beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
+            uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
     return [*held, *uncertain, *in_sample]
 
 

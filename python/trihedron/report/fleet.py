@@ -154,7 +154,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     facts = [("calibrated", how_many(status["done"], "log"))]
     if doubtful:
         codes = Counter(code for log in doubtful for code in log.serious).most_common()
-        why = ", ".join(f"{code} ({count})" for code, count in codes)
+        why = ", ".join(f"{code.replace('-', ' ')} ({count})" for code, count in codes)
         facts.append(("not to be trusted", f"{how_many(len(doubtful), 'log')}: {why}"))
     if status["rejected"]:
         facts.append(("not calibrated", f"{how_many(status['rejected'], 'log')}: they do not allow a calibration"))

@@ -38,10 +38,11 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out the common parameters of many recordings, and the repeatability of each."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    agree = f"{how_many(n, 'recording')} differ by no more than their uncertainty"
+    used = f"{n} of {how_many(n + len(model.left_out), 'recording')}" if model.left_out else how_many(n, "recording")
+    agree = f"{used} differ by no more than their uncertainty"
     good = f"{agree} and the bias drift within one."
     if model.thermal is not None:
-        agree = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}"
+        agree = f"{used} make one model from {_range(model.thermal)}"
         good = f"{agree}."
     sections = [
         Section("Result", (Facts(_facts(model)), *_repeatability(model))),

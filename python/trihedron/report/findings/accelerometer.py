@@ -12,15 +12,15 @@ _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms, noise alone {floor_m_s2:.3g mm/s²} (χ²/dof "
-        "{chi2_per_dof:.3g}, {dof:.0f} degrees of freedom); all standard uncertainties of the accelerometer are "
-        "multiplied by {widening:.3g}.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
+        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom); all standard uncertainties of the accelerometer "
+        "are multiplied by {widening:.3g}.",
         _UNQUIET,
         _LOOK,
     ),
     (Code.RESIDUAL_ABOVE_NOISE, "poses-joint", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms, noise alone {floor_m_s2:.3g mm/s²} (χ²/dof "
-        "{chi2_per_dof:.3g}, {dof:.0f} degrees of freedom). The fit includes a bias repeatability of "
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
+        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom). The fit includes a bias repeatability of "
         "{bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, and so do the standard uncertainties.",
         _UNQUIET,
         _LOOK,

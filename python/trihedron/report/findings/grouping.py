@@ -22,6 +22,7 @@ _CONSEQUENCE = (
     FindingCode.WORSE_THAN_UNCALIBRATED,
     FindingCode.FILTER_NOISE_FOLLOWED,
     FindingCode.FILTER_NOISE_INCONSISTENT,
+    FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.GRAVITY_DEFAULTED,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
@@ -31,7 +32,7 @@ _CONSEQUENCE = (
 )
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 # A number that is a value; a number in a name (pose 3) is recognised by the word before it.
-_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
+_NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 

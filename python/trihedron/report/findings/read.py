@@ -24,7 +24,7 @@ _UNITS = {
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
-        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s^2 (981); taken as {unit:unit}.",
+        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s² (981); taken as {unit:unit}.",
         _ALIKE,
         _SAY_ACCEL_UNIT,
     ),

@@ -148,12 +148,12 @@ def _number(value: float, how: str) -> str:
 
 
 def _digits(value: float, digits: str) -> str:
-    """A number with an exponent as in tables: ``7.3e−5``; up to a million it is written out: ``110``."""
+    """A number as in tables: ``−2.9``, ``7.3e−5``; up to a million it is written out: ``110``."""
     rounded = format(value, digits)
     mantissa, e, power = rounded.partition("e")
     if e and 0 <= int(power) < 6:
-        return f"{float(rounded):.0f}"
-    return f"{mantissa}e{int(power)}".replace("e-", f"e{MINUS}") if e else mantissa
+        rounded, e = f"{float(rounded):.0f}", ""
+    return (f"{mantissa}e{int(power)}" if e else rounded).replace("-", MINUS)
 
 
 def _plural(noun: str) -> str:
