@@ -15,6 +15,8 @@ const LEAST_POWER: f64 = 1e-12;
 /// Largest variance of readings that toggle between two neighbouring codes, q²/4, over that of rounding, q²/12. Noise
 /// that does not dither the ADC has it in the pose whose reading is between two codes, and none in the next one.
 const BETWEEN_CODES: f64 = 3.0;
+/// Variance of readings, in that of rounding, below which noise does not dither the ADC: noise of half an LSB.
+const UNDITHERED: f64 = 4.0;
 /// Most iterations: sets that still change then alternate between two that hardly differ.
 const MOST_ROUNDS: usize = 60;
 
@@ -159,9 +161,15 @@ fn channel(blocks: &Blocks, width: usize, whole: &[bool], c: usize) -> Option<Ch
     }
     let square: Vec<f64> = mean.iter().map(|v| v * v).collect();
     let unbiased = width as f64 / (width.max(2) - 1) as f64;
-    let between_codes = BETWEEN_CODES * blocks.rounding[c];
-    let floor = [between_codes, between_codes / blocks.length as f64];
     let mut inside = rolling_mean(&variance, 1, width);
+    let still = quantile(&mut chosen(&inside, whole), USUALLY_STILL);
+    let toggling = if still < UNDITHERED * blocks.rounding[c] {
+        BETWEEN_CODES
+    } else {
+        1.0
+    };
+    let rounding = toggling * blocks.rounding[c];
+    let floor = [rounding, rounding / blocks.length as f64];
     let mut between = rolling_mean(&square, 1, width);
     for (value, low) in between.iter_mut().zip(rolling_mean(&mean, 1, width)) {
         *value = ((*value - low * low) * unbiased).max(floor[1]);
