@@ -7,7 +7,6 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,14 +87,12 @@ def finish(
     from trihedron.report import calibration_report, to_text, verification_report
 
     result, check = conclude(recording, cut_s, **place.said)
-    note_file(Path(UNSTORED) if output is None else output)
+    note_file(output)
     laid_out = calibration_report(result.calibration, result.segments, result.recording)
-    if output is None and laid_out.next_step:
-        store = f"Store it (`trihedron calibrate LOG -o {UNSTORED}`). "
-        laid_out = replace(laid_out, next_step=store + laid_out.next_step)
-    put(to_text(with_arguments(laid_out), sections=2, style=style()))
+    put(to_text(with_arguments(laid_out, "trihedron calibrate LOG"), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
+        note_file(output or Path(UNSTORED))
         put("\n")
         document = verification_report(check.verification, check.segments, check.recording)
         put(to_text(with_arguments(document), sections=2, style=style()))

@@ -69,12 +69,13 @@ def _word(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-def with_arguments(document: Document) -> Document:
-    """The document with LOG, FILE and ``...`` (the same command) in its next step replaced by those of this run."""
+def with_arguments(document: Document, stored_by: str = "...") -> Document:
+    """The document with LOG, FILE and ``...`` (the same command) in its next step replaced by those of this run; where
+    nothing was stored, ``stored_by`` is the command that does."""
     said = document.next_step
     commands = " ".join(_COMMAND.findall(said))
     if re.search(r"\bFILE\b", commands) and not _file.get():
-        said = f"Store it (`... -o {UNSTORED}`). {said}"
+        said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
     filled = _COMMAND.sub(lambda found: _filled(found[0]), said)
     return document if filled == document.next_step else replace(document, next_step=filled)
 

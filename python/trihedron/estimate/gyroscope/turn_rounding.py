@@ -71,10 +71,6 @@ def _still(away: FloatArray) -> int | None:
     return max(begin - round(took * float(np.interp((third - second) / took, *HIDDEN))), 0)
 
 
-AT_REST = 0.75
-"""LSB from the bias within which a reading at the ends of a turn is static: the code of a bias may toggle."""
-
-
 def hidden_angles(
     readings: FloatArray, step_s: float, quantum: FloatArray, turns: IntArray, static: IntArray, raw_angle: FloatArray
 ) -> FloatArray:
@@ -100,7 +96,7 @@ def hidden_angles(
             sense = (main + 1) * int(np.sign(raw_angle[row, main]))
             for first, last, level in _dwells(readings[a:b, axis]):
                 is_end = (first == 0) != (last == b - a)
-                is_rest = is_end and abs(level - rest[axis]) < AT_REST * quantum[axis]
+                is_rest = is_end and abs(level - rest[axis]) < IN_STEP * quantum[axis]
                 key = (axis,) if is_rest else (axis, round(level / float(quantum[axis])), sense)
                 error = columns.setdefault(key, np.zeros((len(turns) + 1, 3)))
                 error[row, axis] += size * (last - first) * step_s
