@@ -19,6 +19,7 @@ from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
+from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
@@ -165,10 +166,10 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     )
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.rejected | (sought - named))
-    remaining = accounted_for(answer, remaining)
+    remaining = with_relations(accounted_for(answer, remaining), found.related)
     if not answer.ids and not any(one.disagrees for one in remaining):
         domains = remaining  # 1/f noise inside the poses explains the disagreement
-    return replace(answer, domains=domains, remaining=remaining)
+    return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
 
 
 LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
@@ -231,6 +232,17 @@ def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[Do
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
     return tuple(
         replace(d, disagrees=False) if d.domain in explained and d.domain in SAMPLE_DOMAINS else d for d in remaining
+    )
+
+
+def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:
+    """The domains, where those in which a relation shows disagree: noise of any strength had absorbed it."""
+    score = {one.domain: one.score for one in found.relations}
+    return tuple(
+        replace(d, disagrees=True, p_value=min(d.p_value, float(np.exp(-0.5 * score[d.domain]))), limit=None)
+        if d.domain in score and not d.disagrees
+        else d
+        for d in domains
     )
 
 

@@ -10,12 +10,10 @@ from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import NOT_TURNED, WORLD_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
-from trihedron.records.domains import Domain, HeldOut
+from trihedron.records.domains import HeldOut
 from trihedron.records.words import relation_experiment, relation_resembles, words
 
 OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
-AT_REST: dict[str, Domain] = {"gyroscope": "static-gyro", "accelerometer": "static-accel"}
-IN_MOTION: dict[str, Domain] = {"gyroscope": "moves", "accelerometer": "dynamics"}
 WORLD_SIGMAS = 3.0
 """Standard uncertainties within which a coupling is that of Earth rate."""
 
@@ -27,8 +25,7 @@ def records(found: Related) -> tuple[Relation, ...]:
     out = []
     for k, (one, before, after) in enumerate(zip(found.relations, found.steps, models, strict=True)):
         value, covariance = found.model.value(first + k)
-        domain = (IN_MOTION if one.signal.is_motion else AT_REST)[one.signal.sensor]
-        held = next((h for h in held_out_records(before, after) if h.domain == domain), None)
+        held = next((h for h in held_out_records(before, after) if h.domain == one.domain), None)
         is_world = one.signal.family == "world"
         out.append(_of_world_vector(value, covariance, held) if is_world else _of_signal(one, value, covariance, held))
     return tuple(sorted(out, key=lambda relation: -relation.share))

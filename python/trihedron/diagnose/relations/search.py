@@ -14,6 +14,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, WORLD_VECTOR, Signal, signals, world_vector
+from trihedron.diagnose.relations.telegraph import telegraphs
+from trihedron.records.domains import Domain
 
 ALL_AXES = (0, 1, 2)
 ANY_BY_ANY = ("rate", HISTORY, "rate products")
@@ -33,7 +35,8 @@ EMPIRICAL = Empirical()
 
 @dataclass(frozen=True, eq=False)
 class Follows:
-    """One relation: its variables, the numbers of the axes that depend on them, and its term of the hypothesis.
+    """One relation: its variables, the numbers of the axes that depend on them, its term of the hypothesis, and its
+    ``score``.
 
     Parameters run over the axes, and for each over the names.
     """
@@ -41,6 +44,15 @@ class Follows:
     signal: Signal
     axes: tuple[int, ...]
     term: Term
+    score: float = 0.0
+
+    @property
+    def domain(self) -> Domain:
+        """The domain of residuals in which it shows."""
+        is_gyro, is_motion = self.signal.sensor == "gyroscope", self.signal.is_motion
+        if is_motion:
+            return "moves" if is_gyro else "dynamics"
+        return "static-gyro" if is_gyro else "static-accel"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,27 +64,41 @@ class Related:
     steps: tuple[Hypothesis, ...]
     """The hypothesis that each relation was added to."""
 
-    @property
-    def score(self) -> float:
-        """Twice the log-evidence of the whole, less the penalties of its terms."""
-        return 2.0 * self.model.log_evidence - sum(term.cost for term in self.model.terms)
+    score: float
+    """Twice the log-evidence of the whole, less the penalties of its terms."""
 
 
 def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
     found: list[Follows] = []
     steps: list[Hypothesis] = []
+    score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
     while len(found) < MOST_RELATIONS and model.context.moves:
-        best = _best(model, {(one.signal.sensor, one.signal.names) for one in found})
-        if best is None:
-            break
-        larger = again(model, [*model.terms, best.term])
-        if 2.0 * (larger.log_evidence - model.log_evidence) - best.term.cost <= limit:
+        known = {(one.signal.sensor, one.signal.names) for one in found}
+        leading = [*_by_evidence(model, known), *_by_levels(model.context, known)]
+        best = max(leading, key=lambda one: one.score, default=None)
+        if best is None or best.score <= limit:
             break
         found.append(best)
         steps.append(model)
-        model = larger
-    return Related(model, tuple(found), tuple(steps))
+        model = again(model, [*model.terms, best.term])
+        score += best.score
+    return Related(model, tuple(found), tuple(steps), score)
+
+
+def _by_evidence(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Iterator[Follows]:
+    """The relation whose columns gain most in evidence."""
+    best = _best(model, known)
+    if best is not None:
+        larger = again(model, [*model.terms, best.term])
+        yield replace(best, score=2.0 * (larger.log_evidence - model.log_evidence) - best.term.cost)
+
+
+def _by_levels(context: Context, known: Collection[tuple[str, tuple[str, ...]]]) -> Iterator[Follows]:
+    """Every random telegraph signal, which has a score of its own."""
+    for one in telegraphs(context):
+        if (one.signal.sensor, one.signal.names) not in known:
+            yield replace(_follows(context, one.signal, (one.axis,)), score=one.score)
 
 
 def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:

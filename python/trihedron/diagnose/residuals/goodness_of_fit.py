@@ -9,7 +9,6 @@ import numpy.typing as npt
 from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import f_upper
 from trihedron.records.domains import Domain, DomainTest, Where
@@ -52,12 +51,10 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         disagrees = p < share
         where = locate(fitted, label) if disagrees else Where()
         if not disagrees and label in (STATIC_ACCEL, STATIC_GYRO):
-            inside, changing = _inside_poses(fitted, label), _strayed(fitted, label)
-            other = min((inside, changing), key=lambda look: look[0])
-            # Two more tests in the same domain.
-            if 2.0 * other[0] < share:
-                p, disagrees, where = 2.0 * other[0], True, other[2]
-                per_dof, limit = max(per_dof, other[1]), None
+            ratio = _strayed(fitted, label)
+            if ratio is not None:
+                p, disagrees, where = 0.0, True, Where(_CHANNELS[label])
+                per_dof, limit = max(per_dof, ratio), None
         rms, unit = physical.get(label, 0.0), rms_unit.get(label, "")
         tests.append(DomainTest(name, per_dof, dof, p, disagrees, where, rms, unit, limit))
     return tuple(tests)
@@ -76,19 +73,6 @@ def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArr
     return out
 
 
-def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
-    """p, ratio of variances and location of biases that change inside poses: larger errors of the means hide these."""
-    side = fitted.distortion.force if label == STATIC_ACCEL else fitted.distortion.rate
-    if side is not None:
-        return 1.0, 1.0, Where()  # the change inside a pose that an effect causes is not known here
-    k = 0 if label == STATIC_ACCEL else 1
-    found = jumps_in_poses(fitted.obs)
-    poses, t = found.poses[k], fitted.obs.time_s
-    parts = [fitted.obs.segments.poses[i] for i in poses]
-    spans = tuple((float(t[pose.start]), float(t[pose.stop - 1])) for pose in parts)
-    return found.p_value[k], found.ratio[k], Where((), fitted.obs.pose_names(poses), spans)
-
-
 AT_END = 1.01
 """Ratio to a bound below which a strength counts as at the bound."""
 AT_EDGE = 1.5
@@ -97,13 +81,13 @@ healthy sessions (60 with consumer 1/f noise), where 57 gyros and 74 acceleromet
 jumps between poses, or drifts by two such errors, exceeds it."""
 
 
-def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
-    """p (0 or 1), ratio of variances and channels: a bias random walk at its upper bound absorbs another effect."""
+def _strayed(fitted: Fit, label: int) -> float | None:
+    """Ratio of variances where a bias random walk at its upper bound absorbs another effect."""
     k = 0 if label == STATIC_ACCEL else 1
     stray = None if fitted.has_free_strengths else hidden_biases(fitted)[k]
     if stray is None or not stray.is_at_edge or stray.rms < AT_EDGE * stray.noise:
-        return 1.0, 1.0, Where()
-    return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
+        return None
+    return (stray.rms / stray.noise) ** 2
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,10 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             "reach one pose by turns of either sign, small and large, waiting unlike times",
             ("play or slip in a mounting", "memory of the readout"),
         ),
+        "telegraph": FamilyWords(
+            "record an hour at rest: a histogram of means over a second has two peaks",
+            ("burst noise (popcorn noise) of the readout",),
+        ),
         "temperature": FamilyWords(
             "repeat a few poses while the temperature takes another course: up, down, and constant",
             ("a thermal bias of another shape",),

@@ -1,0 +1,324 @@
+"""Random telegraph signals: a bias that switches between two levels at random times (eq. 8.7a).
+
+The readings inside the poses show at what height they switch, and the means of poses that do not switch which level
+they have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import toeplitz
+from scipy.special import logsumexp
+
+from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.relations.signals import Sensor, Signal
+from trihedron.diagnose.session.observations import Observations
+
+N_BLOCKS, N_FINE = 16, 4
+"""Block means per pose; parts of a block in which its noise is computed."""
+LEAST_SAMPLES = 3 * N_BLOCKS
+"""Readings of a pose below which its blocks are not used."""
+FEWEST_AT_A_LEVEL = 3
+"""A level seen in fewer poses is a disturbance of these poses."""
+FLICKER, WALK = (0.5, 1.0, 2.0), (0.3, 0.5, 1.0, 4.0)
+"""Amplitudes of 1/f noise, or of a random walk, relative to the white noise of a part of a block."""
+VARIANCES = (0.8, 1.0, 1.25)
+"""Variance of the noise relative to that of neighbours' differences, whose median is uncertain by a tenth."""
+HEIGHTS = np.geomspace(1.0, 40.0, 14)
+"""Heights of a switch, in units of the noise of a block."""
+REFINED = 3
+"""Steps by which the likeliest height is refined."""
+RATES = (0.1, 0.4, 1.0)
+"""Switches per pose."""
+WALKS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""Variance of the bias walk between poses, relative to that of the scatter."""
+SHARES = (0.03, 0.1)
+"""Shares of poses that a jolt disturbs by any height: the alternative to equal heights."""
+UNLIKELY = 12.0
+"""Difference in log-likelihood below the best from which a colour of the noise is left out."""
+ROUNDING = 1e-9
+"""Relative gain below which a change of one state is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Telegraph:
+    """Path of the signal of one ``axis``, and its ``score``: twice the log-likelihood that it gains over biases that
+    scatter and drift, less the penalty of the choice among axes."""
+
+    signal: Signal
+    axis: int
+    score: float
+
+
+def telegraphs(context: Context) -> list[Telegraph]:
+    """The likeliest path on each axis of each sensor that has both levels.
+
+    Its score is that of the poses alone: in moves it switches at times that no column tells.
+    """
+    inside = _inside_poses(context.obs)
+    sensors: list[tuple[int, Sensor]] = [(0, "accelerometer")]
+    if context.obs.raw_rate is not None:
+        sensors.append((1, "gyroscope"))
+    out = []
+    for number, sensor in sensors:
+        for axis in range(3):
+            levels = _levels(context, number, axis, inside[number][axis])
+            if levels is not None:
+                state = context.between_poses(levels.state - levels.state.mean())
+                signal = Signal(sensor, "telegraph", (f"random telegraph signal {AXES[axis]}",), state[:, None], ("1",))
+                out.append(Telegraph(signal, axis, 2.0 * (levels.gain - float(np.log(3 * len(sensors))))))
+    return out
+
+
+class _Levels(NamedTuple):
+    """State in every pose, between -1 and 1, and what it gains in log-likelihood."""
+
+    state: FloatArray
+    gain: float
+
+
+class _Inside(NamedTuple):
+    """Per pose: whether the signal ``switches`` inside it, and if so its mean ``state``; the ``gain`` of equal steps up
+    and down over noise, and over a few steps of any height, in log-likelihood."""
+
+    switches: npt.NDArray[np.bool_]
+    state: FloatArray
+    gain: float
+
+
+def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> _Levels | None:
+    error, up = _static_errors(context, sensor), context.fitted.state.up
+    if sensor:
+        reading, seen = error @ np.linalg.inv(context.gyro_axes)[axis], np.ones(len(error))
+        known = np.ones((len(error), 1))
+    else:
+        # Gravity shows the component along the vertical only, less what S and b take of it.
+        reading, seen = np.einsum("ni,ni->n", up, error), up @ context.accel_axes[:, axis]
+        known = np.column_stack([up, *(up[:, j] * up[:, k] for j in range(3) for k in range(j, 3))])
+    rest = np.eye(len(error)) - known @ np.linalg.pinv(known)
+    state = _states(rest @ reading, seen, rest, inside)
+    if min(np.count_nonzero(state < 0.0), np.count_nonzero(state > 0.0)) < FEWEST_AT_A_LEVEL:
+        return None
+    # The level of a pose without a switch is one of two, chosen by the mean that it is to explain.
+    gain = inside.gain - float(np.log(2.0)) * np.count_nonzero(~inside.switches)
+    time = context.time_s[: len(error)]
+    time, dof = context.time_s[: len(error)], float(np.trace(rest))
+    levels = np.column_stack([known, seen * state])
+    gain += _likelihood(reading, levels, time, dof) - _likelihood(reading, known, time, dof)
+    return _Levels(state, gain - 0.5 * float(np.log(len(error))))
+
+
+def _static_errors(context: Context, sensor: int) -> FloatArray:
+    """(poses, 3) what the means over the poses read beyond gravity and the effects of the hypothesis, SI, body."""
+    obs, state, distortion = context.obs, context.fitted.state, context.fitted.distortion
+    if sensor:
+        assert obs.pose_rate is not None
+        error, effects = obs.pose_rate @ state.gyro_S.T, distortion.rate
+    else:
+        error, effects = obs.pose_force @ state.accel_S.T + state.accel_b - state.gravity * state.up, distortion.force
+    return np.asarray(error if effects is None else error - effects[: len(error)] @ state.effect)
+
+
+def _likelihood(reading: FloatArray, known: FloatArray, time: FloatArray, dof: float) -> float:
+    """Largest log-likelihood of a ``reading`` that scatters and walks at random about a combination of ``known``.
+
+    The size of the scatter is integrated over with ``dof`` degrees of freedom.
+    """
+    walk = np.minimum.outer(time, time) - time.min()
+    walk /= max(float(np.median(np.diff(time))), TINY)
+    best = -np.inf
+    for share in WALKS:
+        root = np.linalg.cholesky(np.eye(len(time)) + share * walk)
+        y, x = np.linalg.solve(root, reading), np.linalg.solve(root, known)
+        y = y - x @ np.linalg.lstsq(x, y)[0]
+        best = max(best, -float(np.log(np.diag(root)).sum() + 0.5 * dof * np.log(max(float(y @ y), TINY))))
+    return best
+
+
+def _states(reading: FloatArray, seen: FloatArray, rest: FloatArray, inside: _Inside) -> FloatArray:
+    """(poses,) states that explain most of the ``reading``, in which a state counts by ``rest @ seen``.
+
+    From the sign of every reading on, the state of one pose after another is changed while that explains more.
+    """
+    plain = ~inside.switches
+    state = np.where(plain, np.where(reading * seen < 0.0, -1.0, 1.0), inside.state)
+    own = seen**2 * np.diag(rest)
+    for _ in range(len(state) ** 2):
+        x = rest @ (seen * state)
+        turned = -2.0 * state * seen
+        # Inner products of the reading with the column, and of the column with itself, after each change.
+        along, norm = reading @ x + turned * reading, x @ x + 2.0 * turned * x + 4.0 * state**2 * own
+        explained = np.where(plain & (along > 0.0) & (norm > 0.0), along**2 / np.maximum(norm, TINY), 0.0)
+        k = int(explained.argmax())
+        if explained[k] <= max(float(reading @ x), 0.0) ** 2 / max(float(x @ x), TINY) * (1.0 + ROUNDING):
+            break
+        state[k] = -state[k]
+    return state
+
+
+@lru_cache(maxsize=4)
+def _inside_poses(obs: Observations) -> tuple[tuple[_Inside, ...], ...]:
+    """What the readings inside the poses show, by sensor and axis."""
+    poses = obs.segments.poses
+    which = np.flatnonzero([not pose.is_unsteady and pose.stop - pose.start >= LEAST_SAMPLES for pose in poses])
+    out: list[tuple[_Inside, ...]] = []
+    for raw in (obs.raw_force, obs.raw_rate):
+        if raw is None or not len(which):
+            nothing = _Inside(np.zeros(len(poses), dtype=bool), np.zeros(len(poses)), 0.0)
+            out.append((nothing,) * 3)
+            continue
+        blocks = _block_means(obs, raw, which)
+        # Means over longer blocks have less noise: a step of the same height is more of it.
+        lasts = np.sqrt([poses[i].stop - poses[i].start for i in which])
+        scale = lasts / np.median(lasts)
+        out.append(tuple(_path(blocks[:, :, k], scale, which, len(poses)) for k in range(3)))
+    return tuple(out)
+
+
+def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]) -> FloatArray:
+    """(poses, blocks, axes) means of equal parts in units of the noise between neighbours, whatever their length."""
+    out = []
+    for i in which:
+        values = raw[obs.segments.poses[i].samples()]
+        first = np.linspace(0, len(values), N_BLOCKS + 1).astype(np.intp)[:-1]
+        known = np.isfinite(values)
+        present = np.add.reduceat(known, first, axis=0, dtype=np.float64)
+        with np.errstate(invalid="ignore"):
+            mean = np.add.reduceat(np.where(known, values, 0.0), first, axis=0) / present
+        out.append(mean * np.sqrt(len(values) / N_BLOCKS))
+    blocks = np.array(out)
+    # Robust: the median over all poses of squared differences (0.455 of a chi-square's mean), half of it per block.
+    noise = np.sqrt(np.nanmedian(np.diff(blocks, axis=1) ** 2, axis=(0, 1)) / 0.4549 / 2.0)
+    return np.asarray(np.nan_to_num(blocks / np.where(noise > 0.0, noise, np.inf)))
+
+
+def _path(blocks: FloatArray, scale: FloatArray, which: npt.NDArray[np.intp], n_poses: int) -> _Inside:
+    """The likeliest path of one axis through each of the poses ``which``."""
+    noises = [_Noise.of(colour, variance, blocks, scale) for colour in _colours() for variance in VARIANCES]
+    without = max(one.without for one in noises)
+    likely = [one for one in noises if one.without > without - UNLIKELY]
+    best, kept = max((_of_one_height(one) for one in likely), key=lambda found: found[0])
+    switches, state = np.zeros(n_poses, dtype=bool), np.zeros(n_poses)
+    switches[which], state[which] = kept > 0, _STATES[kept]
+    return _Inside(switches, state, best - without)
+
+
+def _of_one_height(noise: _Noise) -> tuple[float, npt.NDArray[np.intp]]:
+    """Log-likelihood of steps of one height, and the path (poses,) that is likeliest."""
+    best, path, at = max((_at_height(noise, height) for height in HEIGHTS), key=lambda found: found[0])
+    for _ in range(REFINED):
+        moved = path > 0
+        if not moved.any():
+            break
+        at = float(noise.along[moved, path[moved]].sum() / noise.norm[moved, path[moved]].sum())
+        refined = _at_height(noise, at)
+        if refined[0] > best:
+            best, path, at = refined
+    return best, path
+
+
+def _at_height(noise: _Noise, height: float) -> tuple[float, npt.NDArray[np.intp], float]:
+    """Log-likelihood at the likeliest rate of switches, the path of every pose, and the height."""
+    each = height * noise.along - 0.5 * height**2 * noise.norm
+    top = each.max(axis=1, keepdims=True)
+    by_number = np.exp(each - top) @ _BY_NUMBER
+    totals = [float(np.log(by_number @ _prior(rate)).sum()) for rate in RATES]
+    k = int(np.argmax(totals))
+    path = (each + np.log(_prior(RATES[k]) / _N_PATHS)[_N_SWITCHES]).argmax(axis=1)
+    return float((noise.plain + top[:, 0]).sum()) + totals[k], path, height
+
+
+class _Noise(NamedTuple):
+    """Log-likelihood (poses,) without a step, and for unit steps of every path: whitened readings ``along`` it, its
+    squared ``norm`` (poses, paths); ``without`` the likelihood of all poses without switches."""
+
+    plain: FloatArray
+    along: FloatArray
+    norm: FloatArray
+    without: float
+
+    @classmethod
+    def of(cls, colour: _Colour, variance: float, blocks: FloatArray, scale: FloatArray) -> _Noise:
+        """Noise of one colour and variance for ``blocks`` (poses, blocks), whose steps have a ``scale`` (poses,)."""
+        y, shapes = blocks @ colour.whiten.T / np.sqrt(variance), colour.shapes / np.sqrt(variance)
+        plain = -0.5 * ((y**2).sum(axis=1) + colour.log_det + y.shape[1] * np.log(variance))
+        along, norm = scale[:, None] * (y @ shapes.T), np.outer(scale**2, (shapes**2).sum(axis=1))
+        without = max(float(plain.sum()), _of_any_height(plain, along[:, _ONCE], norm[:, _ONCE]))
+        return cls(plain, along, norm, without)
+
+
+def _of_any_height(plain: FloatArray, along: FloatArray, norm: FloatArray) -> float:
+    """Log-likelihood of steps whose heights differ from pose to pose, in a share of the poses."""
+    out = -np.inf
+    for spread in HEIGHTS[::3]:
+        variance = spread**2 * norm
+        each = 0.5 * spread**2 * along**2 / (1.0 + variance) - 0.5 * np.log1p(variance)
+        step = logsumexp(each, axis=1) - np.log(each.shape[1])
+        for share in SHARES:
+            out = max(out, float((plain + np.logaddexp(np.log1p(-share), np.log(share) + step)).sum()))
+    return out
+
+
+# Every path through a pose with two switches or fewer: none, up or down once, there and back.
+
+
+def _paths() -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """(paths, blocks) levels, 0 or 1, and (paths,) numbers of switches."""
+    at = np.arange(N_BLOCKS)
+    up = [(at >= k).astype(float) for k in range(1, N_BLOCKS)]
+    there = [((at >= j) & (at < k)).astype(float) for j, k in combinations(range(1, N_BLOCKS), 2)]
+    levels = [np.zeros(N_BLOCKS), *up, *(1.0 - one for one in up), *there, *(1.0 - one for one in there)]
+    n = np.array([0] + [1] * (2 * len(up)) + [2] * (2 * len(there)))
+    return np.array(levels), n
+
+
+_LEVELS, _N_SWITCHES = _paths()
+_ONCE = np.arange(1, N_BLOCKS)
+"""Paths that go up once."""
+_STATES = 2.0 * _LEVELS.mean(axis=1) - 1.0
+
+
+_N_PATHS = np.bincount(_N_SWITCHES)
+_BY_NUMBER = np.eye(3)[_N_SWITCHES] / _N_PATHS
+"""(paths, 3) mean over the paths with none, one or two switches."""
+
+
+def _prior(rate: float) -> FloatArray:
+    """(3,) probability of none, one and two switches: Poisson."""
+    weight = np.array([1.0, rate, rate**2 / 2.0])
+    return np.asarray(weight / weight.sum())
+
+
+class _Colour(NamedTuple):
+    """Noise of one colour: ``whiten`` (b - 1, b) blocks without their mean, its determinant, (paths, b - 1) levels
+    whitened."""
+
+    whiten: FloatArray
+    log_det: float
+    shapes: FloatArray
+
+
+@lru_cache(maxsize=1)
+def _colours() -> tuple[_Colour, ...]:
+    n = N_BLOCKS * N_FINE
+    # 1/f noise by Kasdin's filter (fractional integration of order one half); the walk is summed white noise.
+    taps = np.cumprod(np.concatenate([[1.0], (np.arange(1, n) - 0.5) / np.arange(1, n)]))
+    flicker, walk = toeplitz(taps, np.zeros(n)), np.tril(np.ones((n, n)))
+    mean = np.kron(np.eye(N_BLOCKS), np.ones((1, N_FINE)) / N_FINE)
+    about_mean = np.linalg.svd(np.eye(N_BLOCKS) - 1.0 / N_BLOCKS)[0][:, :-1].T
+    out = []
+    for filtered in (0.0 * walk, *(c * flicker for c in FLICKER), *(c * walk for c in WALK)):
+        cov = mean @ (np.eye(n) + filtered @ filtered.T) @ mean.T
+        change = np.diff(np.eye(N_BLOCKS), axis=0)
+        cov /= np.diag(change @ cov @ change.T).mean() / 2.0
+        root = np.linalg.cholesky(about_mean @ cov @ about_mean.T)
+        whiten = np.linalg.solve(root, about_mean)
+        out.append(_Colour(whiten, 2.0 * float(np.log(np.diag(root)).sum()), _LEVELS @ whiten.T))
+    return tuple(out)
