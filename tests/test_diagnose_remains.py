@@ -2,57 +2,52 @@
 
 import itertools
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
 import trihedron
+from diagnosed_session import simulated
 from trihedron.diagnose.effects.table import _error_of_mean
-from trihedron.diagnose.residuals import goodness_of_fit
-from trihedron.diagnose.residuals.jumps import jumps_in_poses
-from trihedron.records import Pose
-from trihedron.session.model import STATIC_ACCEL, STATIC_GYRO
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
-RATE_HZ = 100.0
-WHITE = 0.1 * np.sqrt(RATE_HZ)
 
-JUMPS = 1e-3
-"""p-value from which biases are said to change inside poses."""
-
-
-class Poses:
-    """What the test of steps looks at: 30 poses of 5 s at 100 Hz."""
-
-    def __init__(self, force, rate):
-        self.raw_force, self.raw_rate = force, rate
-        self.force_density = np.full(3, 0.1)
-        self.rate_density = np.full(3, 0.1)
-        poses = tuple(Pose(k, 500 * k, 500 * (k + 1), 500 * k, 500 * (k + 1)) for k in range(30))
-        self.segments = SimpleNamespace(poses=poses)
-        self.recording = SimpleNamespace(rate_hz=RATE_HZ)
+def _with_gyro_bias(seed, bias):
+    """A healthy session whose second gyro reads ``bias`` (rad/s; poses, samples, generator) more, and gravity."""
+    recording, truth = simulated(seed=seed)
+    scale = np.radians(1.0 / 131.0)
+    gyro = recording.gyroscope.copy()
+    gyro[:, 1] += bias(trihedron.segment(recording).poses, len(gyro), np.random.default_rng(seed)) / scale
+    return replace(recording, gyroscope=gyro), truth.gravity_m_s2
 
 
-def test_white_and_slow_noise_are_not_called_jumps():
-    called = 0
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        walk = np.cumsum(rng.normal(0.0, 0.01, (15000, 3)), axis=0)
-        force, rate = rng.normal(0.0, WHITE, (2, 15000, 3))
-        called += min(jumps_in_poses(Poses(force, rate + walk)).p_value) < JUMPS
-    assert called <= 1  # 80 looks at one in a thousand
+def _switching(_poses, n, rng):
+    at = np.sort(rng.integers(0, n, 20))
+    return 0.0003 * (-1.0) ** np.searchsorted(at, np.arange(n), side="right")
 
 
-def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not():
-    force, rate = np.random.default_rng(51).normal(0.0, WHITE, (2, 15000, 3))
-    moved = force.copy()
-    for k in (3, 9, 14, 22, 27):
-        rate[500 * k + 250 : 500 * k + 500, 1] += 1.0
-        moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
-    found = jumps_in_poses(Poses(force, rate))
-    assert found.p_value[1] < JUMPS
-    assert set(found.poses[1]) <= {3, 9, 14, 22, 27}
-    assert min(jumps_in_poses(Poses(moved, rate)).p_value) > JUMPS
+def _scattered(poses, n, rng):
+    of_pose = rng.normal(0.0, 0.0006, len(poses))
+    return np.interp(np.arange(n), [(pose.start + pose.stop) / 2 for pose in poses], of_pose)
+
+
+def test_a_bias_that_switches_between_two_levels_follows_a_random_telegraph_signal():
+    for seed in (1, 2):
+        recording, gravity = _with_gyro_bias(seed, _switching)
+        found = trihedron.diagnose(recording, gravity_m_s2=gravity)
+        assert found.verdict == "unexplained"
+        (relation,) = (one for one in found.relations if one.depends_on == ("random telegraph signal",))
+        (height,) = relation.coefficients
+        assert height.name.startswith("y")
+        assert abs(height.value - 0.0003) < 0.00006  # poses in which it switches more than twice dilute it
+        assert next(one for one in found.domains if one.domain == "static-gyro").disagrees
+
+
+def test_a_bias_of_any_other_distribution_is_bias_repeatability():
+    for seed in (1, 2, 3):
+        recording, gravity = _with_gyro_bias(seed, _scattered)
+        found = trihedron.diagnose(recording, gravity_m_s2=gravity)
+        assert [one.id for one in found.effects] == ["gyro-bias-repeatability"]
+        assert not found.relations
 
 
 def test_the_error_of_a_mean_of_few_turns_covers_it():
@@ -89,13 +84,3 @@ def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it()
     G = next(one for one in found.effects if one.id == "gyro-g-sensitivity")
     xx = next(p for p in G.parameters if p.name == "G_xx")
     assert abs(xx.value - np.radians(0.004)) < 4.0 * xx.std + 0.02 * np.radians(0.004)
-
-
-def test_an_effect_that_changes_one_sensor_inside_poses_leaves_the_other_judged(monkeypatch):
-    found = SimpleNamespace(p_value=(0.2, 0.3), ratio=(1.1, 1.2), poses=((), ()))
-    monkeypatch.setattr(goodness_of_fit, "jumps_in_poses", lambda _obs: found)
-    changed = np.zeros((2, 3))
-    obs = SimpleNamespace(time_s=(), pose_names=tuple, segments=SimpleNamespace(poses=()))
-    for force, rate, accel, gyro in ((changed, None, 1.0, 0.3), (None, changed, 0.2, 1.0), (None, None, 0.2, 0.3)):
-        line = SimpleNamespace(distortion=SimpleNamespace(force=force, rate=rate), obs=obs)
-        assert [goodness_of_fit._inside_poses(line, k)[0] for k in (STATIC_ACCEL, STATIC_GYRO)] == [accel, gyro]

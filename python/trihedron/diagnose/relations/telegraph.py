@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.linalg import toeplitz
 from scipy.special import logsumexp
 
-from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.relations.signals import Sensor, Signal
 from trihedron.diagnose.session.observations import Observations
@@ -72,7 +72,7 @@ def telegraphs(context: Context) -> list[Telegraph]:
             levels = _levels(context, number, axis, inside[number][axis])
             if levels is not None:
                 state = context.between_poses(levels.state - levels.state.mean())
-                signal = Signal(sensor, "telegraph", (f"random telegraph signal {AXES[axis]}",), state[:, None], ("1",))
+                signal = Signal(sensor, "telegraph", ("random telegraph signal",), state[:, None], ("1",))
                 out.append(Telegraph(signal, axis, 2.0 * (levels.gain - float(np.log(3 * len(sensors))))))
     return out
 
