@@ -168,15 +168,19 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
     if not best.relations:
         return judged, best
     for k, fewer in enumerate(judged.without):
-        # An effect that scores beside the relations too is kept.
-        without = again(best.model, [t for j, t in enumerate(best.model.terms) if j != k])
-        gained = 2.0 * (best.model.log_evidence - without.log_evidence) - judged.model.terms[k].cost
-        if gained > limit:
-            continue
         other = related(fewer, limit)
-        if other.relations and other.score > best.score + NEAR:
+        if other.relations and other.score > best.score + NEAR and not _scores_beside(k, best, other, limit):
             return _beside_relations(_pruned(fewer, limit), limit)
     return judged, best
+
+
+def _scores_beside(k: int, best: Related, other: Related, limit: float) -> bool:
+    """Whether term ``k`` scores beside the relations too, where ``other`` ones in its place explain more."""
+    if other.names == best.names:
+        return False
+    terms = best.model.terms
+    without = again(best.model, [*terms[:k], *terms[k + 1 :]])
+    return 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost > limit
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,10 @@ class Empirical(Effect):
 EMPIRICAL = Empirical()
 
 
+Name = tuple[str, tuple[str, ...]]
+"""Sensor and variables of a relation."""
+
+
 @dataclass(frozen=True, eq=False)
 class Follows:
     """One relation: its variables, the numbers of the axes that depend on them, its term of the hypothesis, and its
@@ -45,6 +49,11 @@ class Follows:
     axes: tuple[int, ...]
     term: Term
     score: float = 0.0
+
+    @property
+    def name(self) -> Name:
+        """Its sensor and variables."""
+        return self.signal.sensor, self.signal.names
 
     @property
     def domain(self) -> Domain:
@@ -67,6 +76,11 @@ class Related:
     score: float
     """Twice the log-evidence of the whole, less the penalties of its terms."""
 
+    @property
+    def names(self) -> set[Name]:
+        """Sensor and variables of every relation."""
+        return {one.name for one in self.relations}
+
 
 def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
@@ -74,7 +88,7 @@ def related(model: Hypothesis, limit: float) -> Related:
     steps: list[Hypothesis] = []
     score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
     while len(found) < MOST_RELATIONS and model.context.moves:
-        known = {(one.signal.sensor, one.signal.names) for one in found}
+        known = {one.name for one in found}
         leading = [*_by_evidence(model, known), *_by_levels(model.context, known)]
         best = max(leading, key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
@@ -86,7 +100,7 @@ def related(model: Hypothesis, limit: float) -> Related:
     return Related(model, tuple(found), tuple(steps), score)
 
 
-def _by_evidence(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Iterator[Follows]:
+def _by_evidence(model: Hypothesis, known: Collection[Name]) -> Iterator[Follows]:
     """The relation whose columns gain most in evidence."""
     best = _best(model, known)
     if best is not None:
@@ -94,14 +108,14 @@ def _by_evidence(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]
         yield replace(best, score=2.0 * (larger.log_evidence - model.log_evidence) - best.term.cost)
 
 
-def _by_levels(context: Context, known: Collection[tuple[str, tuple[str, ...]]]) -> Iterator[Follows]:
+def _by_levels(context: Context, known: Collection[Name]) -> Iterator[Follows]:
     """Every random telegraph signal, which has a score of its own."""
     for one in telegraphs(context):
         if (one.signal.sensor, one.signal.names) not in known:
             yield replace(_follows(context, one.signal, (one.axis,)), score=one.score)
 
 
-def _best(model: Hypothesis, known: Collection[tuple[str, tuple[str, ...]]]) -> Follows | None:
+def _best(model: Hypothesis, known: Collection[Name]) -> Follows | None:
     """The relation that gains most, noise strengths refitted, of the leading ones at fixed strengths."""
     context = model.context
     leading: list[list[Leader]] = []
