@@ -18,7 +18,6 @@ from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.diagnose.session.state import Distortion
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.threads import side_by_side
 
@@ -244,13 +243,18 @@ def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:
         return False
     before, _ = physical_rms(without.fitted, without.prediction.innovation)
     after, _ = physical_rms(model.fitted, model.prediction.innovation)
-    return any(after[d] < before[d] for d in own_domains(model.terms[k].distortion) if d in after and d in before)
+    return any(after[d] < before[d] for d in _own_domains(model, k) if d in after and d in before)
 
 
-def own_domains(distortion: Distortion) -> tuple[int, ...]:
-    """Row domains of the sensors whose readings an effect changes."""
-    sides = [own for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None]
-    return tuple(dict.fromkeys(d for own in sides for d in own))
+def _own_domains(model: Hypothesis, k: int) -> set[int]:
+    """Row domains in which term ``k`` changes the readings."""
+    n_poses = model.obs.n_poses
+    out: set[int] = set()
+    for side, (at_rest, *moving) in OWN_DOMAINS.items():
+        columns = getattr(model.terms[k].distortion, side)
+        if columns is not None:
+            out.update(moving, (at_rest,) if columns[:n_poses].any() else ())
+    return out
 
 
 def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesis, dict[str, list[str]]]:
