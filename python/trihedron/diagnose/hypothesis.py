@@ -16,7 +16,7 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
 from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
-from trihedron.session.model import Prior, SessionState, contiguous
+from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
 from trihedron.threads import side_by_side
 
@@ -27,6 +27,9 @@ ELSEWHERE = (
     strengths_of_all(2.0, moves=5.0),
 )
 """Low noise, biases that scatter, biases that walk: large noise strengths can absorb an effect that these show."""
+
+OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
+"""Row domains of one sensor's effects. Velocity depends on both sensors: a tilt error adds a component of gravity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +141,24 @@ class Hypothesis:
         n, at = self.fitted.distortion.n_parameters, self.span(k)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
+
+    def is_shown(self, without: Hypothesis, k: int) -> bool:
+        """Whether a parameter of term ``k`` exceeds its own σ and the held-out rms [SI] falls in one of its domains."""
+        value, covariance = self.value(k)
+        if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
+            return False
+        before, _ = physical_rms(without.fitted, without.prediction.innovation)
+        after, _ = physical_rms(self.fitted, self.prediction.innovation)
+        return any(after[d] < before[d] for d in self._domains(k) if d in after and d in before)
+
+    def _domains(self, k: int) -> set[int]:
+        """Row domains in which term ``k`` changes the readings."""
+        out: set[int] = set()
+        for side, (at_rest, *moving) in OWN_DOMAINS.items():
+            columns = getattr(self.terms[k].distortion, side)
+            if columns is not None:
+                out.update(moving, (at_rest,) if columns[: self.obs.n_poses].any() else ())
+        return out
 
 
 def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:

@@ -17,8 +17,6 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
 from trihedron.diagnose.relations.search import Related, related
-from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
@@ -31,8 +29,6 @@ MOST_EFFECTS = 4
 """Largest number of mechanisms in one session; disturbed poses do not count."""
 MOST_STEPS = 8
 """Largest number of effects and disturbed poses together."""
-OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
-"""Row domains of one sensor's effects. Velocity depends on both sensors: a tilt error adds a component of gravity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +103,7 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
         least = judged.without[-1]
         is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.cost > -process.price
         gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.cost
-        if is_likelier and gained > threshold(alpha) and _is_shown(bounded, least, len(bounded.terms) - 1):
+        if is_likelier and gained > threshold(alpha) and bounded.is_shown(least, len(bounded.terms) - 1):
             curve = found.tried.get(process.effect.id)
             return _State(judged, rivals={} if curve is None else {chosen.effect.id: [curve]})
     return None
@@ -124,7 +120,7 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         larger, chosen = _with_best(judged.model, standing)
         if chosen is None:
             break
-        if not _is_shown(larger, judged.model, len(larger.terms) - 1):
+        if not larger.is_shown(judged.model, len(larger.terms) - 1):
             state.dropped.add(chosen.effect.id)
             continue
         judged = _Judged(larger, (*judged.without, judged.model))
@@ -162,24 +158,26 @@ def _concluded(state: _State, alpha: float) -> Found:
 
 
 def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
-    """Relations without a mechanism; an effect is dropped where relations explain clearly more without it."""
+    """Relations without a mechanism; an effect that does not score beside them is dropped where relations in its place
+    explain clearly more than it does."""
     best = related(judged.model, limit)
     if not best.relations:
         return judged, best
+    alone = best.score - sum(one.score for one in best.relations)
     for k, fewer in enumerate(judged.without):
         other = related(fewer, limit)
-        if other.relations and other.score > best.score + NEAR and not _scores_beside(k, best, other, limit):
+        if other.relations and other.score > alone + NEAR and _beside(k, best, other) <= limit:
             return _beside_relations(_pruned(fewer, limit), limit)
     return judged, best
 
 
-def _scores_beside(k: int, best: Related, other: Related, limit: float) -> bool:
-    """Whether term ``k`` scores beside the relations too, where ``other`` ones in its place explain more."""
+def _beside(k: int, best: Related, other: Related) -> float:
+    """Score of term ``k`` beside the relations; ``other`` are those found without it."""
     if other.names == best.names:
-        return False
+        return best.score - other.score
     terms = best.model.terms
     without = again(best.model, [*terms[:k], *terms[k + 1 :]])
-    return 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost > limit
+    return 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,33 +226,12 @@ def _pruned(model: Hypothesis, limit: float) -> _Judged:
     while True:
         without = without_each(model)
         scores = [
-            2.0 * (model.log_evidence - one.log_evidence) - term.cost if _is_shown(model, one, k) else -np.inf
+            2.0 * (model.log_evidence - one.log_evidence) - term.cost if model.is_shown(one, k) else -np.inf
             for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
         ]
         if not scores or min(scores) > limit:
             return _Judged(model, without)
         model = without[int(np.argmin(scores))]
-
-
-def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:
-    """Whether a parameter exceeds its own σ and the held-out rms [SI] falls in a domain of the effect's own sensor."""
-    value, covariance = model.value(k)
-    if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
-        return False
-    before, _ = physical_rms(without.fitted, without.prediction.innovation)
-    after, _ = physical_rms(model.fitted, model.prediction.innovation)
-    return any(after[d] < before[d] for d in _own_domains(model, k) if d in after and d in before)
-
-
-def _own_domains(model: Hypothesis, k: int) -> set[int]:
-    """Row domains in which term ``k`` changes the readings."""
-    n_poses = model.obs.n_poses
-    out: set[int] = set()
-    for side, (at_rest, *moving) in OWN_DOMAINS.items():
-        columns = getattr(model.terms[k].distortion, side)
-        if columns is not None:
-            out.update(moving, (at_rest,) if columns[:n_poses].any() else ())
-    return out
 
 
 def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesis, dict[str, list[str]]]:

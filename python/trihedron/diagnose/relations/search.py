@@ -101,10 +101,10 @@ def related(model: Hypothesis, limit: float) -> Related:
 
 
 def _by_evidence(model: Hypothesis, known: Collection[Name]) -> Iterator[Follows]:
-    """The relation whose columns gain most in evidence."""
+    """The relation whose columns gain most in evidence, if they predict what is held out."""
     best = _best(model, known)
-    if best is not None:
-        larger = again(model, [*model.terms, best.term])
+    larger = None if best is None else again(model, [*model.terms, best.term])
+    if best is not None and larger is not None and larger.is_shown(model, len(model.terms)):
         yield replace(best, score=2.0 * (larger.log_evidence - model.log_evidence) - best.term.cost)
 
 

@@ -29,20 +29,18 @@ FEWEST_AT_A_LEVEL = 3
 """A level seen in fewer poses is a disturbance of these poses."""
 FLICKER, WALK = (0.5, 1.0, 2.0), (0.3, 0.5, 1.0, 4.0)
 """Amplitudes of 1/f noise, or of a random walk, relative to the white noise of a part of a block."""
-VARIANCES = (0.8, 1.0, 1.25)
-"""Variance of the noise relative to that of neighbours' differences, whose median is uncertain by a tenth."""
+FREEDOM = 8.0
+"""Degrees of freedom of the noise of a pose relative to the usual one: a tremble doubles it."""
 HEIGHTS = np.geomspace(1.0, 40.0, 14)
 """Heights of a switch, in units of the noise of a block."""
-REFINED = 3
-"""Steps by which the likeliest height is refined."""
+BETWEEN = (0.87, 0.93, 1.07, 1.15)
+"""Factors on the likeliest of them that are tried too."""
 RATES = (0.1, 0.4, 1.0)
 """Switches per pose."""
 WALKS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Variance of the bias walk between poses, relative to that of the scatter."""
 SHARES = (0.03, 0.1)
 """Shares of poses that a jolt disturbs by any height: the alternative to equal heights."""
-UNLIKELY = 12.0
-"""Difference in log-likelihood below the best from which a colour of the noise is left out."""
 ROUNDING = 1e-9
 """Relative gain below which a change of one state is none."""
 
@@ -200,70 +198,60 @@ def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]
 
 
 def _path(blocks: FloatArray, scale: FloatArray, which: npt.NDArray[np.intp], n_poses: int) -> _Inside:
-    """The likeliest path of one axis through each of the poses ``which``."""
-    noises = [_Noise.of(colour, variance, blocks, scale) for colour in _colours() for variance in VARIANCES]
-    without = max(one.without for one in noises)
-    likely = [one for one in noises if one.without > without - UNLIKELY]
-    best, kept = max((_of_one_height(one) for one in likely), key=lambda found: found[0])
+    """The likeliest path of one axis through each of the poses ``which``, whose steps have a ``scale``."""
+    noises = [_Noise.of(colour, blocks, scale) for colour in _colours()]
+    without = max(one.without() for one in noises)
+    best, path = max((_of_one_height(one) for one in noises), key=lambda found: found[0])
     switches, state = np.zeros(n_poses, dtype=bool), np.zeros(n_poses)
-    switches[which], state[which] = kept > 0, _STATES[kept]
+    switches[which], state[which] = path > 0, _STATES[path]
     return _Inside(switches, state, best - without)
+
+
+class _Noise(NamedTuple):
+    """Whitened readings of every pose in noise of one colour: their ``square`` (poses,), ``along`` a unit step of every
+    path and its squared ``norm`` (poses, paths)."""
+
+    square: FloatArray
+    along: FloatArray
+    norm: FloatArray
+    log_det: float
+
+    @classmethod
+    def of(cls, colour: _Colour, blocks: FloatArray, scale: FloatArray) -> _Noise:
+        """Noise of one colour for ``blocks`` (poses, blocks), whose steps have a ``scale`` (poses,)."""
+        y, shapes = blocks @ colour.whiten.T, colour.shapes
+        along, norm = scale[:, None] * (y @ shapes.T), np.outer(scale**2, (shapes**2).sum(axis=1))
+        return cls((y**2).sum(axis=1), along, norm, colour.log_det)
+
+    def likelihood(self, height: float) -> FloatArray:
+        """(poses, paths) log-likelihood of steps of a height. Poses differ in noise: by Student's t."""
+        left = self.square[:, None] - 2.0 * height * self.along + height**2 * self.norm
+        return np.asarray(-0.5 * (self.log_det + (FREEDOM + N_BLOCKS - 1) * np.log1p(left / FREEDOM)))
+
+    def without(self) -> float:
+        """Log-likelihood of noise alone, or with a step of any height in some poses."""
+        steps = np.array([logsumexp(self.likelihood(height)[:, _N_SWITCHES == 1], axis=1) for height in HEIGHTS])
+        step = logsumexp(steps, axis=0) - np.log(len(HEIGHTS) * _N_PATHS[1])
+        plain = self.likelihood(0.0)[:, 0]
+        mixed = [np.logaddexp(np.log1p(-share) + plain, np.log(share) + step).sum() for share in SHARES]
+        return float(max(plain.sum(), *mixed))
 
 
 def _of_one_height(noise: _Noise) -> tuple[float, npt.NDArray[np.intp]]:
     """Log-likelihood of steps of one height, and the path (poses,) that is likeliest."""
-    best, path, at = max((_at_height(noise, height) for height in HEIGHTS), key=lambda found: found[0])
-    for _ in range(REFINED):
-        moved = path > 0
-        if not moved.any():
-            break
-        at = float(noise.along[moved, path[moved]].sum() / noise.norm[moved, path[moved]].sum())
-        refined = _at_height(noise, at)
-        if refined[0] > best:
-            best, path, at = refined
-    return best, path
+    tried = [_at_height(noise, height) for height in HEIGHTS]
+    at = HEIGHTS[int(np.argmax([one[0] for one in tried]))]
+    return max((*tried, *(_at_height(noise, at * factor) for factor in BETWEEN)), key=lambda found: found[0])
 
 
-def _at_height(noise: _Noise, height: float) -> tuple[float, npt.NDArray[np.intp], float]:
-    """Log-likelihood at the likeliest rate of switches, the path of every pose, and the height."""
-    each = height * noise.along - 0.5 * height**2 * noise.norm
+def _at_height(noise: _Noise, height: float) -> tuple[float, npt.NDArray[np.intp]]:
+    each = noise.likelihood(height)
     top = each.max(axis=1, keepdims=True)
     by_number = np.exp(each - top) @ _BY_NUMBER
     totals = [float(np.log(by_number @ _prior(rate)).sum()) for rate in RATES]
     k = int(np.argmax(totals))
     path = (each + np.log(_prior(RATES[k]) / _N_PATHS)[_N_SWITCHES]).argmax(axis=1)
-    return float((noise.plain + top[:, 0]).sum()) + totals[k], path, height
-
-
-class _Noise(NamedTuple):
-    """Log-likelihood (poses,) without a step, and for unit steps of every path: whitened readings ``along`` it, its
-    squared ``norm`` (poses, paths); ``without`` the likelihood of all poses without switches."""
-
-    plain: FloatArray
-    along: FloatArray
-    norm: FloatArray
-    without: float
-
-    @classmethod
-    def of(cls, colour: _Colour, variance: float, blocks: FloatArray, scale: FloatArray) -> _Noise:
-        """Noise of one colour and variance for ``blocks`` (poses, blocks), whose steps have a ``scale`` (poses,)."""
-        y, shapes = blocks @ colour.whiten.T / np.sqrt(variance), colour.shapes / np.sqrt(variance)
-        plain = -0.5 * ((y**2).sum(axis=1) + colour.log_det + y.shape[1] * np.log(variance))
-        along, norm = scale[:, None] * (y @ shapes.T), np.outer(scale**2, (shapes**2).sum(axis=1))
-        without = max(float(plain.sum()), _of_any_height(plain, along[:, _ONCE], norm[:, _ONCE]))
-        return cls(plain, along, norm, without)
-
-
-def _of_any_height(plain: FloatArray, along: FloatArray, norm: FloatArray) -> float:
-    """Log-likelihood of steps whose heights differ from pose to pose, in a share of the poses."""
-    out = -np.inf
-    for spread in HEIGHTS[::3]:
-        variance = spread**2 * norm
-        each = 0.5 * spread**2 * along**2 / (1.0 + variance) - 0.5 * np.log1p(variance)
-        step = logsumexp(each, axis=1) - np.log(each.shape[1])
-        for share in SHARES:
-            out = max(out, float((plain + np.logaddexp(np.log1p(-share), np.log(share) + step)).sum()))
-    return out
+    return float(top.sum()) + totals[k], path
 
 
 # Every path through a pose with two switches or fewer: none, up or down once, there and back.
@@ -280,8 +268,6 @@ def _paths() -> tuple[FloatArray, npt.NDArray[np.intp]]:
 
 
 _LEVELS, _N_SWITCHES = _paths()
-_ONCE = np.arange(1, N_BLOCKS)
-"""Paths that go up once."""
 _STATES = 2.0 * _LEVELS.mean(axis=1) - 1.0
 
 
