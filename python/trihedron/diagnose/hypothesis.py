@@ -152,13 +152,9 @@ class Hypothesis:
         return any(after[d] < before[d] for d in self._domains(k) if d in after and d in before)
 
     def _domains(self, k: int) -> set[int]:
-        """Row domains in which term ``k`` changes the readings."""
-        out: set[int] = set()
-        for side, (at_rest, *moving) in OWN_DOMAINS.items():
-            columns = getattr(self.terms[k].distortion, side)
-            if columns is not None:
-                out.update(moving, (at_rest,) if columns[: self.obs.n_poses].any() else ())
-        return out
+        """Row domains of the sensors whose readings term ``k`` changes."""
+        distortion = self.terms[k].distortion
+        return {d for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None for d in own}
 
 
 def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
