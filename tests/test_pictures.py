@@ -55,7 +55,7 @@ def test_a_candidate_that_another_effect_made_needless_says_which():
         Candidate("accel-cubic", 0.6, True),
     )
     table = candidates_table(SimpleNamespace(effects=(), candidates=tried))
-    assert [row[-1] for row in table.rows] == ["redundant with gyro-g-sensitivity", "not needed"]
+    assert [row[-1] for row in table.rows] == ["redundant with gyro g-sensitivity", "not needed"]
 
 
 def traces(scale, shift=0.0, models=None, units=("m/s^2", "rad/s")):

@@ -38,7 +38,12 @@ def begin_next_step() -> None:
 def note_log(source: Any) -> None:
     """Store the first log that was read, with the options that say how to read it."""
     if _log.get() == "LOG":
-        _log.set(shlex.join(_words(source)))
+        name_log(source)
+
+
+def name_log(source: Any) -> None:
+    """Store a log instead of the first."""
+    _log.set(shlex.join(_words(source)))
 
 
 def note_place(source: Any) -> None:

@@ -5,6 +5,8 @@ All three are the same in every frame: they belong to the sensor, not to the cho
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -12,13 +14,14 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, SensorCalibration
+from trihedron.report.numbers import listed
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
 BIAS = "the reading without input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
-TRIAD = "triad-alignment is the rotation of the gyro's axes against the accelerometer's"
+TRIAD = "triad alignment is the rotation of the gyro's axes against the accelerometer's"
 """Definition of the parameter ``triad-alignment`` in every report."""
 
 
@@ -26,6 +29,18 @@ def axis_in_print(name: str) -> str:
     """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; ``sigma_x`` as ``σ_x``."""
     sensor, gap, axis = name.rpartition(" ")
     return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name.replace("sigma_", "σ_")
+
+
+def id_in_print(name: str, axis: str = "") -> str:
+    """An effect or a parameter in words: ``gyro-g-sensitivity`` as ``gyro g-sensitivity``, ``accel-bias`` and ``x`` as
+    ``accelerometer bias X``."""
+    words = re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name))
+    return axis_in_print(f"{words} {axis}".rstrip())
+
+
+def ids_in_print(names: Iterable[str]) -> str:
+    """Several of them as ``a, b and c``."""
+    return listed([id_in_print(name) for name in names])
 
 
 def channel_in_print(channel: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Comparison, Finding, Recording, Segments, Severity, Verification
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.report.axes import id_in_print
 from trihedron.report.calibration import parameter_table
 from trihedron.report.diagnosis import effects_blocks
 from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
@@ -185,7 +186,7 @@ def disagreement_report(
 
 def _opened(sealed: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Any]]) -> tuple[Block, ...]:
     said = sizes.get(str(sealed["effect"]), {})
-    rows = [("drawn", str(sealed["effect"]))]
+    rows = [("drawn", id_in_print(str(sealed["effect"])))]
     for key, true in sealed["size"].items():
         rows.append((key, f"drawn {_numbers(true)}; found {_numbers(said[key]) if key in said else '–'}"))
     return (Facts(tuple(rows)),)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.report.axes import BIAS, axis_in_print, term_in_print
+from trihedron.report.axes import BIAS, id_in_print, term_in_print
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
 from trihedron.report.numbers import (
@@ -220,7 +220,7 @@ def _stage(stage: Stage, domain: str) -> str:
 
 def named(p: ParameterDifference) -> str:
     """The parameter in words."""
-    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else f"{p.id} {axis_in_print(p.name)}"
+    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else id_in_print(p.id, p.name)
 
 
 def in_print(p: ParameterDifference) -> tuple[float, str]:

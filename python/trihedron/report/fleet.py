@@ -12,7 +12,7 @@ import numpy as np
 from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
-from trihedron.report.axes import TRIAD, axis_in_print
+from trihedron.report.axes import TRIAD, axis_in_print, id_in_print
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
@@ -186,7 +186,7 @@ def _mixed(summary: FleetSummary) -> list[Block]:
 def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
     """A parameter, and a difference of it."""
     factor, unit = shown(parameter.unit)
-    return f"{parameter.id} {axis_in_print(parameter.name)}", f"{plain_number(difference * factor, 2)} {unit}"
+    return id_in_print(parameter.id, parameter.name), f"{plain_number(difference * factor, 2)} {unit}"
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -196,7 +196,7 @@ def _physics(summary: FleetSummary) -> list[Block]:
     for effect in summary.effects:
         logs = f"{effect.n_logs} of {summary.n_diagnosed}"
         devices = f"{effect.n_devices} of {summary.n_devices_diagnosed}"
-        rows.append((effect.id, logs, devices, f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %"))
+        rows.append((id_in_print(effect.id), logs, devices, f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %"))
     return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows), "Effects by device")]
 
 
@@ -241,7 +241,7 @@ def _drift(summary: FleetSummary) -> list[Block]:
         how, sizes, unit = change_in_words(change)
         k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
         size = f"{sizes[k]} {unit} in {axis_in_print(change.names[k])}"
-        rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
+        rows.append((change.group, id_in_print(change.id), how, size, plain_number(change.p_adjusted, 1)))
     head = ("device", "parameter", "how", "by", "p")
     whole = f"Tested: {tested} A folder is taken for one device unless --serial names it ({BY_FILE})."
     return [Paragraph(whole), Table(head, tuple(rows), "Changes between sessions")]
@@ -254,7 +254,7 @@ def _logs(summary: FleetSummary) -> Table:
             log.serial,
             log.status if log.is_trustworthy or log.status != "done" else "done, not to be trusted",
             log.verdict or "–",
-            ", ".join(log.effects) or "–",
+            ", ".join(map(id_in_print, log.effects)) or "–",
             "–" if log.n_poses is None else str(log.n_poses),
             "–" if log.held_out_rms_m_s2 is None else plain_number(log.held_out_rms_m_s2 * shown("m/s^2")[0], 2),
         )
@@ -301,6 +301,6 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
             if part.any():
                 tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
-        y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
+        y = Scale(f"{id_in_print(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)

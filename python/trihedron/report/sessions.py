@@ -11,12 +11,12 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS, TRIAD, axis_in_print
+from trihedron.report.axes import BIAS, TRIAD, axis_in_print, id_in_print, ids_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import each_with_sigma, how_many, listed, plain_number, shown, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
 
 DRIFTING = {
     "accel-bias": "accelerometer bias",
@@ -28,10 +28,8 @@ DRIFTING = {
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = (
-    "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`. Their uncertainty is that "
-)
-NEXT += "of the next recording."
+NEXT = "Use the common parameters: `trihedron apply FILE OTHER_LOG`, `trihedron export FILE --to c`. Their uncertainty "
+NEXT += "is that of the next recording."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -60,7 +58,7 @@ def sessions_report(model: SessionsModel) -> Document:
     names = [session.name for session in model.sessions]
     usable = agree
     if changed:
-        parameters = listed(list(dict.fromkeys(change.id for change in changed)))
+        parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
         usable = f"{how_many(n, 'recording')} of which {parameters} changed"
     return Document(
         title="Calibration from many recordings",
@@ -158,7 +156,7 @@ def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[st
     common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
         common = f"± {plain_number(one.std * factor, 2)}"
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]", common]
+    cells = [f"{id_in_print(one.parameter.id, one.parameter.name)} [{unit}]", common]
     for spread in spreads:
         if spread is None:
             cells += ["–", "–"]
@@ -172,7 +170,7 @@ def _changes(model: SessionsModel) -> list[Block]:
     rows = []
     with_group = model.by == "device"
     for change in model.changes:
-        cells = [change.id, *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
+        cells = [id_in_print(change.id), *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
         rows.append((*cells, _said(change) if change.significant else "no"))
     head = ("parameter", *(["device"] if with_group else []), "p", "changed")
     return [
@@ -216,12 +214,12 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
                 continue
             sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) for axis in range(3)]
             cells = each_with_sigma(term.coefficients[k], sigma, factor)
-            rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
+            rows.append((f"{id_in_print(term.id)} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
         spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
-        rows.append((f"{term.id}, order {term.order}: residual [{unit}]", *spread))
+        rows.append((f"{id_in_print(term.id)}, order {term.order}: residual [{unit}]", *spread))
         if term.hysteresis is not None:
             cells = [plain_number(float(v) * factor, 2) for v in term.hysteresis]
-            rows.append((f"{term.id}: half of heating less cooling [{unit}]", *cells))
+            rows.append((f"{id_in_print(term.id)}: half of heating less cooling [{unit}]", *cells))
     return [
         Paragraph(
             f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
@@ -288,7 +286,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
         marks: list[Mark] = [*bands, Level(y=0.0)]
         for axis, k in enumerate(picked):
             marks += _deviations(model, k, axis, places)
-        panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
+        panels.append(Panel(x, Scale(f"{id_in_print(name)}  [{unit}]", unit), tuple(marks), height_px=170))
     return Chart(tuple(panels), columns=columns, is_linked=True)
 
 
