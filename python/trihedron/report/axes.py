@@ -26,21 +26,33 @@ TRIAD = "triad alignment is the rotation of the gyro's axes against the accelero
 
 
 def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; ``sigma_x`` as ``σ_x``."""
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``."""
     sensor, gap, axis = name.rpartition(" ")
-    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name.replace("sigma_", "σ_")
+    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
 
 
-def id_in_print(name: str, axis: str = "") -> str:
-    """An effect or a parameter in words: ``gyro-g-sensitivity`` as ``gyro g-sensitivity``, ``accel-bias`` and ``x`` as
-    ``accelerometer bias X``."""
-    words = re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name))
-    return axis_in_print(f"{words} {axis}".rstrip())
+def id_in_print(name: str) -> str:
+    """An effect or a group of parameters in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
+    ``gyro g-sensitivity``; with an axis after it: ``accelerometer bias X``."""
+    return axis_in_print(re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name)))
+
+
+def label_of(group: str, axis: str) -> str:
+    """A parameter as the label of a row or an axis: ``accel bias X``."""
+    return axis_in_print(f"{group.replace('-', ' ')} {axis}")
 
 
 def ids_in_print(names: Iterable[str]) -> str:
     """Several of them as ``a, b and c``."""
     return listed([id_in_print(name) for name in names])
+
+
+def parameter_in_print(name: str) -> str:
+    """A parameter of an effect: symbols as they are, with ``σ`` for ``sigma``; ``range_x`` as ``range X``."""
+    stem, _, axis = name.replace("sigma_", "σ_").rpartition("_")
+    if not re.fullmatch(r"[xyz]+[+-]?", axis):
+        return name.replace("_", " ")
+    return f"{stem}_{axis}" if len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}"
 
 
 def channel_in_print(channel: str) -> str:

@@ -10,7 +10,7 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.axes import LETTERS, axis_in_print, id_in_print, ids_in_print
+from trihedron.report.axes import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
@@ -217,11 +217,10 @@ def _parameters(effect: AcceptedEffect) -> str:
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
         scale, shared = parameter_unit(unit, max(abs(p.value) for p in members))
-        words = []
-        for p in members[:MOST_PARAMETERS]:
-            # A symbol with its axis (K2_x) stays as it is, words (accelerometer_delay) get spaces.
-            name = axis_in_print(p.name) if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
-            words.append(f"{name} {value_in_words(scale * p.value, scale * p.std)}")
+        words = [
+            f"{parameter_in_print(p.name)} {value_in_words(scale * p.value, scale * p.std)}"
+            for p in members[:MOST_PARAMETERS]
+        ]
         words += [f"{len(members) - MOST_PARAMETERS} more"] if len(members) > MOST_PARAMETERS else []
         groups.append(", ".join(words) + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)

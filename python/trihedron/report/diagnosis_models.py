@@ -82,7 +82,7 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     for candidate in diagnosis.candidates:
         if not candidate.applicable:
             missing.setdefault(candidate.reason, []).append(id_in_print(candidate.id))
-    rows = tuple((listed(names), f"not applicable: {reason}") for reason, names in missing.items())
+    rows = tuple((f"not applicable, {reason}", listed(names)) for reason, names in missing.items())
     return (candidates_table(diagnosis), *((Facts(rows),) if rows else ()))
 
 

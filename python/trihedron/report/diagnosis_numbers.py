@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.report.axes import BIAS, id_in_print, term_in_print
+from trihedron.report.axes import BIAS, label_of, term_in_print
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
 from trihedron.report.numbers import (
@@ -174,14 +174,14 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             f"{_sensor(n)} {n.axis.upper()}".strip(),
             f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else term_in_print(n.term),
-            *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
             _ratio(n),
-            unit_in_print(n.unit),
             "differs" if n.significant else "agrees",
+            *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
+            unit_in_print(n.unit),
         )
         for n in diagnosis.noise_compared
     )
-    head = ("sensor", "term", "model", "recording", "ratio (interval)", "unit", "judged")
+    head = ("sensor", "term", "ratio (interval)", "judged", "model", "recording", "unit")
     blocks: list[Block] = [Table(head, rows, "Noise and sampling of the model and of the recording")]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:
@@ -220,7 +220,7 @@ def _stage(stage: Stage, domain: str) -> str:
 
 def named(p: ParameterDifference) -> str:
     """The parameter in words."""
-    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else id_in_print(p.id, p.name)
+    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else label_of(p.id, p.name)
 
 
 def in_print(p: ParameterDifference) -> tuple[float, str]:

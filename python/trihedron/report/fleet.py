@@ -12,7 +12,7 @@ import numpy as np
 from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
-from trihedron.report.axes import TRIAD, axis_in_print, id_in_print
+from trihedron.report.axes import TRIAD, axis_in_print, id_in_print, label_of
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
@@ -186,7 +186,7 @@ def _mixed(summary: FleetSummary) -> list[Block]:
 def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
     """A parameter, and a difference of it."""
     factor, unit = shown(parameter.unit)
-    return id_in_print(parameter.id, parameter.name), f"{plain_number(difference * factor, 2)} {unit}"
+    return label_of(parameter.id, parameter.name), f"{plain_number(difference * factor, 2)} {unit}"
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -301,6 +301,6 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
             if part.any():
                 tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
-        y = Scale(f"{id_in_print(parameter.id, parameter.name)}  [{unit}]", unit)
+        y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.report.axes import axis_in_print
 from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -221,7 +222,7 @@ def _effect(ident: str, one: Estimate) -> Table:
         unit = units[min(k // per, len(units) - 1)]
         cells = each_with_sigma(one.value[k : k + per], one.std[k : k + per], scale)
         printed = f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip()
-        rows.append((", ".join(one.names[k : k + per]), *cells, printed))
+        rows.append((", ".join(map(axis_in_print, one.names[k : k + per])), *cells, printed))
     title = _EFFECTS.get(ident, ident).capitalize()
     if one.score is not None:
         title += f": score {plain_number(one.score, 3)}, accepted from {NAMED_FROM:g}{_shown_from(ident, one)}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS, TRIAD, axis_in_print, id_in_print, ids_in_print
+from trihedron.report.axes import BIAS, TRIAD, axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
@@ -156,7 +156,7 @@ def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[st
     common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
         common = f"± {plain_number(one.std * factor, 2)}"
-    cells = [f"{id_in_print(one.parameter.id, one.parameter.name)} [{unit}]", common]
+    cells = [f"{label_of(one.parameter.id, one.parameter.name)} [{unit}]", common]
     for spread in spreads:
         if spread is None:
             cells += ["–", "–"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.axes import id_in_print, ids_in_print
+from trihedron.report.axes import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -79,7 +79,7 @@ def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
         )
     if any(found.of_single_recordings):
         return "What single recordings name belongs to their sessions: diagnose each by itself."
-    return "Nothing is to be added: calibrate the recordings together."
+    return "Nothing is to be added: calibrate the recordings together (`trihedron calibrate LOG OTHER_LOG`)."
 
 
 def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
@@ -108,8 +108,8 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
         scale, unit = parameter_unit(common.unit, largest)
         found = [one[i] for one in (effect.parameters, *effect.each)]
         cells = [value_in_words(scale * one.value, scale * one.std) for one in found]
-        rows.append((common.name, *cells, unit))
-    return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
+        rows.append((f"{parameter_in_print(common.name)} [{unit}]", *cells))
+    return Table(("parameter", "together", *names), tuple(rows), "Parameters together and alone")
 
 
 def _each(found: SharedDiagnosis, names: list[str]) -> Table:
@@ -147,8 +147,9 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
             Points(value[1:], place[1:], tips[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
             Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
-        x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
-        panels.append(Panel(x, Scale("", names=beside), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
+        name = parameter_in_print(common.name)
+        x = Scale(f"{name} [{unit}]", unit, includes=(0.0,))
+        panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records import FindingCode, Recording, Segments, Verification
-from trihedron.report.axes import TRIAD, id_in_print
+from trihedron.report.axes import TRIAD, label_of
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
@@ -135,7 +135,7 @@ def parameters_table(v: Verification) -> Table:
         differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
         times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
         judged = times if one.is_judged else "not judged by this log"
-        rows.append((id_in_print(one.id, one.name), unit, differs, sigma, stated, judged))
+        rows.append((label_of(one.id, one.name), unit, differs, sigma, stated, judged))
     head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
     return Table(
         head, tuple(rows), f"Parameters that do not depend on the frame, against this log's own calibration; {TRIAD}"
