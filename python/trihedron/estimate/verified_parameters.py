@@ -75,7 +75,7 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
 
 
 def _label(one: JudgedParameter) -> str:
-    return f"{one.id} {one.name}"
+    return f"{one.id}-{one.name}"
 
 
 def uncalibrated(known: Calibration, own: Calibration | None, recording: Recording) -> Calibration:

@@ -33,7 +33,7 @@ def axis_in_print(name: str) -> str:
 
 def id_in_print(name: str) -> str:
     """An effect or a group of parameters in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
-    ``gyro g-sensitivity``; with an axis after it: ``accelerometer bias X``."""
+    ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
     return axis_in_print(re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name)))
 
 
