@@ -48,10 +48,12 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
     if sum(d.chi2_per_dof > 0.0 for d in diagnosis.domains) < FEWEST_DOMAINS:
         return None
     caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
-    caption += "noise alone; inside the shade the domain agrees (a healthy recording leaves one of them in "
-    caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
-    caption += "pose, line or time."
-    return Picture("strengths", caption, partial(_strengths_chart, diagnosis))
+    caption += "noise alone"
+    if any(d.limit for d in diagnosis.domains):
+        caption += "; inside the shade the domain agrees (a healthy recording leaves one of them in "
+        caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
+        caption += "pose, line or time"
+    return Picture("strengths", f"{caption}.", partial(_strengths_chart, diagnosis))
 
 
 def _strengths_chart(diagnosis: Diagnosis) -> Chart:
