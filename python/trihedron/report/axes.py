@@ -34,12 +34,16 @@ def axis_in_print(name: str) -> str:
 def id_in_print(name: str) -> str:
     """An effect or a group of parameters in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
     ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
-    return axis_in_print(re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name)))
+    return axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
 
 
-def label_of(group: str, axis: str) -> str:
+def label_of(group: str, name: str) -> str:
     """A parameter as the label of a row or an axis: ``accel bias X``."""
-    return axis_in_print(f"{group.replace('-', ' ')} {axis}")
+    return f"{_spaced(group)} {parameter_in_print(name)}"
+
+
+def _spaced(name: str) -> str:
+    return re.sub(r"(?<!-g)-(?!gyro)", " ", name)
 
 
 def ids_in_print(names: Iterable[str]) -> str:
@@ -52,7 +56,7 @@ def parameter_in_print(name: str) -> str:
     stem, _, axis = name.replace("sigma_", "σ_").rpartition("_")
     if not re.fullmatch(r"[xyz]+[+-]?", axis):
         return name.replace("_", " ")
-    return f"{stem}_{axis}" if len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}"
+    return f"{stem}_{axis}" if 0 < len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}".lstrip()
 
 
 def channel_in_print(channel: str) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.axes import axis_in_print, term_in_print
+from trihedron.report.axes import axis_in_print, id_in_print, label_of, term_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
-from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
+from trihedron.report.diagnosis_numbers import in_print
 from trihedron.report.diagnosis_words import MEANING
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
@@ -107,7 +107,7 @@ def _forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
     for p in parameters:
         groups.setdefault(p.id, []).append(p)
     # Separate axes, since groups differ in size.
-    panels = [_forest(GROUPS.get(name, name), members) for name, members in groups.items()]
+    panels = [_forest(id_in_print(name), members) for name, members in groups.items()]
     return Chart(tuple(panels), columns=min(3, len(panels)))
 
 
@@ -117,7 +117,7 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     sigma = scale * np.array([p.std for p in members])
     place = -np.arange(1.0, len(members) + 1.0)
     tips = [
-        f"{named(p)}: recording − model {with_sigma(v, s)} {unit}".strip()
+        f"{label_of(p.id, p.name)}: recording − model {with_sigma(v, s)} {unit}".strip()
         for p, v, s in zip(members, value, sigma, strict=True)
     ]
     colour: Colour = "accent" if members[0].significant else "c1"

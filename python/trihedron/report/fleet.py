@@ -132,7 +132,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
         beside = f"median of usable logs, cross-validated; worst {plain_number(max(held) * factor, 3)} {unit}"
         typical = plain_number(statistics.median(held) * factor, 3)
         out.append(Headline("gravity error in static poses", typical, unit, beside))
-    for name, words in (("accel-bias", "accelerometer bias"), ("gyro-bias", "gyroscope bias")):
+    for name in ("accel-bias", "gyro-bias"):
         axes = [one for one in summary.repeated if one.parameter.id == name]
         spreads = [one.between for one in axes if one.between is not None]
         if spreads:
@@ -140,7 +140,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
             own = [one.within for one in axes if one.within is not None]
             repeat = f"; session to session {found_or_limit(_largest(own), factor)} {unit}" if own else ""
             beside = f"device to device, worst axis{repeat}"
-            out.append(Headline(words, found_or_limit(_largest(spreads), factor), unit, beside))
+            out.append(Headline(id_in_print(name), found_or_limit(_largest(spreads), factor), unit, beside))
     return tuple(out)
 
 

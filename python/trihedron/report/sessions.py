@@ -18,12 +18,7 @@ from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
 
-DRIFTING = {
-    "accel-bias": "accelerometer bias",
-    "accel-scale": "accelerometer scale",
-    "gyro-bias": "gyroscope bias",
-    "gyro-scale": "gyroscope scale",
-}
+DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
@@ -75,17 +70,20 @@ def sessions_report(model: SessionsModel) -> Document:
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
     """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
     out = []
-    for name, words in DRIFTING.items():
+    for name in DRIFTING:
         axes = [one for one in model.repeated if one.parameter.id == name]
         if not axes:
             continue
         factor, unit = shown(axes[0].parameter.unit)
         ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
-        beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
+        what, beside = (
+            id_in_print(name),
+            f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}",
+        )
         within = axes[k].within
         beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
-        out.append(Headline(f"{words} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
+        out.append(Headline(f"{what} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
 
 
@@ -96,7 +94,7 @@ def found_or_limit(spread: Spread, factor: float) -> str:
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
-    chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
+    chart = partial(sessions_chart, model, DRIFTING, 2)
     has_band = model.thermal is None and any(one.within is not None and one.within.sd for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {ONE_SIGMA}"
     caption += "; band: session to session (1 σ)." if has_band else "."
