@@ -77,11 +77,8 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
         factor, unit = shown(axes[0].parameter.unit)
         ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
-        what, beside = (
-            id_in_print(name),
-            f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}",
-        )
-        within = axes[k].within
+        what, within = id_in_print(name), axes[k].within
+        beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
         beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
         out.append(Headline(f"{what} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
