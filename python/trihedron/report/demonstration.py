@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +151,12 @@ def _next_steps() -> Facts:
             ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
         )
     )
+
+
+def with_files(page: Document, **files: object) -> Document:
+    """The page with the demonstration's own files for LOG, OTHER_LOG and FILE of its next step."""
+    words = {name: shlex.quote(str(path)) for name, path in files.items()}
+    return replace(page, next_step=re.sub(r"\b[A-Z_]+\b", lambda word: words.get(word[0], word[0]), page.next_step))
 
 
 def disagreement_report(
