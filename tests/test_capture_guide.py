@@ -269,6 +269,9 @@ def test_a_real_browser_shows_the_guide(led, tmp_path):
             screen.wait_for_function(f"document.getElementById('big').textContent.startsWith('{view.n_poses}')")
             screen.wait_for_timeout(500)
             screen.screenshot(path=shot)
+            screen.set_viewport_size({"width": 390, "height": 844})
+            table, foot = (screen.query_selector(part).bounding_box() for part in ("table", "footer"))
+            assert foot["y"] >= table["y"] + table["height"] - 1.0, "on a phone nothing covers the table"
             browser.close()
     finally:
         page.close()
