@@ -96,11 +96,8 @@ def _filled(command: str) -> str:
     verb = command.strip("`").split(" ")[1]
     more = (_beside.get(), _place.get()) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_log.get(), *more)))
-    words = {
-        "LOG": log,
-        "FILE": _file.get() or UNSTORED,
-        "...": again([word for word in typed.get() if word not in _excluded.get()]),
-    }
+    same = again([word for word in typed.get() if word not in _excluded.get()])
+    words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
 
 
