@@ -9,7 +9,6 @@ import pytest
 from trihedron.records import Finding, FindingCode, Recording, Severity, Verification
 from trihedron.records.diagnosis import Candidate
 from trihedron.records.domains import DomainTest
-from trihedron.report.axes import id_in_print, parameter_in_print
 from trihedron.report.calibration_charts import residual_chart
 from trihedron.report.chart import Bars, Note, Panel, Scale
 from trihedron.report.diagnosis_models import candidates_table
@@ -21,6 +20,7 @@ from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
 from trihedron.report.layout import Places, _box, _covered, apart, ticks
+from trihedron.report.names import id_in_print, parameter_in_print
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.verification import verification_report
 

@@ -5,8 +5,6 @@ All three are the same in every frame: they belong to the sensor, not to the cho
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -14,54 +12,12 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, SensorCalibration
-from trihedron.report.numbers import listed
 from trihedron.sensor_model import other_form, other_form_jacobian
 
-LETTERS = 2
-"""Most letters of a name that consists of axes alone, as ``xy``."""
 BIAS = "the reading without input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
 TRIAD = "triad alignment is the rotation of the gyro's axes against the accelerometer's"
 """Definition of the parameter ``triad-alignment`` in every report."""
-
-
-def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``."""
-    sensor, gap, axis = name.rpartition(" ")
-    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
-
-
-def id_in_print(name: str) -> str:
-    """An effect or a group of parameters in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
-    ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
-    return axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
-
-
-def label_of(group: str, name: str) -> str:
-    """A parameter as the label of a row or an axis: ``accel bias X``."""
-    return f"{_spaced(group)} {parameter_in_print(name)}"
-
-
-def _spaced(name: str) -> str:
-    return re.sub(r"(?<!-g)-(?!gyro)", " ", name)
-
-
-def ids_in_print(names: Iterable[str]) -> str:
-    """Several of them as ``a, b and c``."""
-    return listed([id_in_print(name) for name in names])
-
-
-def parameter_in_print(name: str) -> str:
-    """A parameter of an effect: symbols as they are, with ``σ`` for ``sigma``; ``range_x`` as ``range X``."""
-    stem, _, axis = name.replace("sigma_", "σ_").rpartition("_")
-    if not re.fullmatch(r"[xyz]+[+-]?", axis):
-        return name.replace("_", " ")
-    return f"{stem}_{axis}" if 0 < len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}".lstrip()
-
-
-def channel_in_print(channel: str) -> str:
-    """``gx`` and ``vx`` as ``X``; names other than axes (``norm``, ``angle``) unchanged."""
-    return channel[-1].upper() if len(channel) <= LETTERS else channel
 
 
 def calibrated_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
@@ -117,8 +73,3 @@ def axes_of(sensor: SensorCalibration) -> Axes:
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
     sigma_at_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
     return Axes(sensitivity, sigma[:3], at_zero, sigma_at_zero, at_zero / sensitivity, sigma[6:], skew, sigma[3:6])
-
-
-def term_in_print(term: str) -> str:
-    """A term of compared noise and sampling: figures of the poses are distinct from those of the whole log."""
-    return {"bandwidth": "-3 dB bandwidth in the poses", "jitter": "timestamp scatter"}.get(term, term)

@@ -13,13 +13,13 @@ import numpy as np
 
 from trihedron.records import Calibration, Comparison, Finding, Recording, Segments, Severity, Verification
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.report.axes import id_in_print
 from trihedron.report.calibration import parameter_table
 from trihedron.report.diagnosis import effects_blocks
 from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
-from trihedron.report.diagnosis_words import MEANING, verdict_in_words
+from trihedron.report.diagnosis_words import verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block
+from trihedron.report.names import MEANING, id_in_print
 from trihedron.report.numbers import (
     duration,
     engineering_exponent,

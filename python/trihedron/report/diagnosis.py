@@ -10,7 +10,6 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.axes import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
@@ -24,7 +23,6 @@ from trihedron.report.diagnosis_numbers import (
 )
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
-    MEANING,
     differing_headline,
     headlines_of,
     level_of,
@@ -43,6 +41,7 @@ from trihedron.report.document import Block, Document, Facts, Paragraph, Picture
 from trihedron.report.effect_charts import alike, effect_chart, rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
+from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
 from trihedron.report.reference import beside_reference
 from trihedron.report.segments import pose_lines

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis, Relation
-from trihedron.report.axes import id_in_print, ids_in_print
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
+from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import (
     MINUS,
     engineering_exponent,

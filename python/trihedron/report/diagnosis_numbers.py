@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.report.axes import BIAS, TRIAD, id_in_print, label_of, term_in_print
+from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
+from trihedron.report.names import id_in_print, label_of, term_in_print
 from trihedron.report.numbers import (
     MINUS,
     capital,

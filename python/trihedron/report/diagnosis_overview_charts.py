@@ -11,12 +11,11 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.axes import axis_in_print, id_in_print, label_of, term_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import in_print
-from trihedron.report.diagnosis_words import MEANING
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
+from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units

@@ -8,9 +8,9 @@ from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
-from trihedron.report.axes import channel_in_print, id_in_print, ids_in_print
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
+from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print
 from trihedron.report.numbers import (
     capital,
     engineering_exponent,
@@ -33,17 +33,6 @@ LEVELS: dict[str, Level] = {
 }
 """Colour of each verdict: good only if consistent, bad if the disagreement has no explanation."""
 
-MEANING = {
-    "static-accel": "gravity error in static poses",
-    "static-gyro": "gyro rate in static poses",
-    "moves": "tilt error after a rotation",
-    "dynamics": "velocity error over a rotation",
-    "rate": "angular rate beside the reference",
-    "within-static": "noise within static poses",
-    "timing": "time error of samples, seen in motion",
-    "parameters": "parameters of the model",
-    "noise": "noise and sampling",
-}
 _CHANNELS = {"a": "accelerometer ", "g": "gyro "}
 _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""

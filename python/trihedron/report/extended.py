@@ -12,12 +12,11 @@ from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.results import CalibrationResult
-from trihedron.report.axes import ids_in_print
 from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
-from trihedron.report.diagnosis_words import MEANING
 from trihedron.report.document import Document, Headline, Picture, Section
+from trihedron.report.names import MEANING, ids_in_print
 from trihedron.report.numbers import listed, plain_number, shown
 from trihedron.report.reference import beside_reference
 

@@ -12,10 +12,11 @@ import numpy as np
 from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
-from trihedron.report.axes import TRIAD, axis_in_print, id_in_print, label_of
+from trihedron.report.axes import TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
+from trihedron.report.names import axis_in_print, id_in_print, label_of
 from trihedron.report.numbers import capital, how_many, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 

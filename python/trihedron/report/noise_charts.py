@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.records import AllanCurve, NoiseAxis, TermName
-from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Line, Mark, Note, Panel, Points, Scale, Span
+from trihedron.report.names import axis_in_print
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma_and_power
 

@@ -10,11 +10,11 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
-from trihedron.report.axes import axis_in_print, id_in_print
 from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope
+from trihedron.report.names import axis_in_print, id_in_print
 from trihedron.report.numbers import (
     capital,
     each_with_sigma,

@@ -11,11 +11,12 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS, TRIAD, axis_in_print, id_in_print, ids_in_print, label_of
+from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")

@@ -10,10 +10,10 @@ import numpy as np
 
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.axes import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, plain_number, with_sigma
 
 TWO_SIGMA = 2.0

@@ -9,12 +9,13 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records import FindingCode, Recording, Segments, Verification
-from trihedron.report.axes import TRIAD, label_of
+from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
 from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2

@@ -147,7 +147,7 @@ _TAKES_OFF = (
 )
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
-        "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain} from "
+        "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
         "{rms_before:.3g} to {rms_after:.3g} {unit:unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
@@ -158,7 +158,7 @@ _DIAGNOSE = {
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "none-but-disagree", WARNING): Words(
-        "The diagnosis accepted no effect: the linear model is unchanged, and {left:&, } still disagree with it.",
+        "The diagnosis accepted no effect, and these residuals are unexplained: {left:ids}. The linear model is unchanged.",
         "Something in this recording that no effect of the catalogue describes.",
         "`trihedron diagnose` shows where it occurs.",
         numbers=("n_effects", "n_domains_left"),
@@ -170,7 +170,7 @@ _DIAGNOSE = {
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:ids}; {left:&, } still disagree.",
+        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
         _MODELLED,
         _TAKES_OFF,
         numbers=("n_effects", "n_domains_left"),

@@ -32,7 +32,7 @@ from string import Formatter
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.report.axes import id_in_print
+from trihedron.report.names import id_in_print
 from trihedron.report.numbers import MINUS, listed, unit_in_print
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
