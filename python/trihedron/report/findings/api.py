@@ -158,7 +158,7 @@ _DIAGNOSE = {
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "none-but-disagree", WARNING): Words(
-        "The diagnosis accepted no effect, and these residuals are unexplained: {left:ids}. The linear model is unchanged.",
+        "The diagnosis accepted no effect, and {left:ids} stay unexplained. The linear model is unchanged.",
         "Something in this recording that no effect of the catalogue describes.",
         "`trihedron diagnose` shows where it occurs.",
         numbers=("n_effects", "n_domains_left"),
