@@ -30,7 +30,7 @@ def real_data() -> Path:
 # Names that stand in the recording or in its file, quoted as they are.
 NAMES_OF_THE_RECORDING = {
     "roles", "rest", "column", "line", "example", "name", "path", "where", "file", "taken", "others", "members",
-    "kinds", "chosen", "what",
+    "kinds", "chosen", "device",
 }  # fmt: skip
 
 

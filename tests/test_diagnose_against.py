@@ -103,7 +103,7 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
     # One fixed pair: 4 sigma of its own uncertainty, which must be below 0.02 °/s to be of use.
     assert abs(z.difference - np.radians(0.31)) < 4.0 * z.std
     assert z.std < np.radians(0.02)
-    assert "gyro Z bias" in str(found)
+    assert "gyro bias Z" in str(found)
     assert found.updated is not None
 
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
+from trihedron.api.filter_noising import noticed
 from trihedron.estimate.filter_noise.angle import bias_steps
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
@@ -23,7 +24,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
 from trihedron.estimate.filter_noise.strengths import Fitted, Prior, _of_axes, _without_noise, fit, unlike_axes_beside
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
-from trihedron.records import Recording
+from trihedron.records import FindingCode, Recording
 from trihedron.records.filter_noise import Bounded, StaticNoise
 from trihedron.records.reference import ReferenceMotion
 
@@ -178,6 +179,12 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
     for h in (1.0, 10.0):
         middle = sum(s.share.value for s in gyro.shares if s.horizon_s == h)
         assert middle == pytest.approx(1.0, abs=0.25)
+
+
+def test_an_n_with_a_wide_interval_is_a_warning(found):
+    assert FindingCode.FILTER_NOISE_UNCERTAIN not in {one.code for one in found.findings}
+    wide = replace(found.sensors[0], N=Bounded(N, N / 2.0, 2.0 * N))
+    assert FindingCode.FILTER_NOISE_UNCERTAIN in {one.code for one in noticed([wide])}
 
 
 def both(found):

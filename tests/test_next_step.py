@@ -9,6 +9,7 @@ from small_session import made_once
 from trihedron.cli.next_step import (
     again,
     begin_next_step,
+    note_excluded,
     note_file,
     note_log,
     note_place,
@@ -101,3 +102,10 @@ def test_an_error_in_sample_stands_below_what_is_uncertain():
     bare = replace(calibrated, accelerometer=replace(accelerometer, quality=unseen))
     assert order(bare)[-1] == "gravity error in static poses"
     assert "in sample only" in calibration_report(bare).headlines[-1].beside
+
+
+def test_a_log_that_was_excluded_is_not_in_the_next_command():
+    begin(("calibrate", "bad.csv", "good.csv", "fine.csv", "--latitude", "59.9"))
+    note_excluded(["bad.csv"])
+    said = filled("Store it: `... -o calibration.json`.")
+    assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said

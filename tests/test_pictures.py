@@ -6,19 +6,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Recording, Severity, Verification
 from trihedron.records.diagnosis import Candidate
+from trihedron.records.domains import DomainTest
 from trihedron.report.calibration_charts import residual_chart
-from trihedron.report.chart import Note, Panel, Scale
+from trihedron.report.chart import Bars, Note, Panel, Scale
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
-from trihedron.report.diagnosis_overview_charts import traces_chart
+from trihedron.report.diagnosis_overview_charts import strengths_picture, traces_chart
 from trihedron.report.drawn import _path
 from trihedron.report.effect_charts import rest_panels
+from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
 from trihedron.report.layout import Places, _box, _covered, apart, ticks
+from trihedron.report.names import id_in_print, parameter_in_print
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
+from trihedron.report.verification import verification_report
 
 
 def places_of(x, y):
@@ -55,7 +59,7 @@ def test_a_candidate_that_another_effect_made_needless_says_which():
         Candidate("accel-cubic", 0.6, True),
     )
     table = candidates_table(SimpleNamespace(effects=(), candidates=tried))
-    assert [row[-1] for row in table.rows] == ["redundant with gyro-g-sensitivity", "not needed"]
+    assert [row[-1] for row in table.rows] == ["redundant with gyro g-sensitivity", "not needed"]
 
 
 def traces(scale, shift=0.0, models=None, units=("m/s^2", "rad/s")):
@@ -146,3 +150,42 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
     y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
+
+
+def test_every_domain_is_a_bar_from_the_left_to_its_misfit_beside_the_limit_of_agreement():
+    tests = (
+        DomainTest("static-accel", 0.8, 20.0, 0.6, False, limit=2.0),
+        DomainTest("static-gyro", 40.0, 20.0, 1e-9, True, limit=1.9),
+        DomainTest("timing", 1.1, 20.0, 0.4, False),
+    )
+    found = SimpleNamespace(domains=tests, remaining=(), effects=(), alpha=0.01)
+    (panel,) = strengths_picture(found).chart().panels
+    bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
+    assert set(bars) == {"agrees up to here", "disagrees", "agrees"}
+    np.testing.assert_array_equal(bars["agrees up to here"].x, [2.0, 1.9, np.nan])
+    np.testing.assert_array_equal(bars["disagrees"].x, [np.nan, 40.0, np.nan])
+    np.testing.assert_array_equal(bars["agrees"].x, [0.8, np.nan, 1.1])
+    assert {float(value) for mark in bars.values() for value in mark.base} == {panel.x.limits[0]}
+
+
+def test_the_error_that_fails_is_the_first_figure_of_a_verification():
+    fine, high = np.full(12, 1e-3), np.full(11, 0.5)
+    plain = Verification(
+        "log", "", "", 9.8, "given", fine, fine, fine, 0.1 * high, 0.1 * high, 0.1 * high, np.zeros((12, 3)),
+        np.arange(11), (),
+    )  # fmt: skip
+    tilted = Finding.of(FindingCode.HELD_OUT_WORSE, "verify-moves", severity=Severity.WARNING, angle_rms_deg=0.5,
+                        worst_move=3, worst_deg=0.6, chi2_per_dof=100.0)  # fmt: skip
+    limit = Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=0.05, limit_deg=0.01)
+    failing = (replace(plain, angle_deg=high, findings=(tilted,)), replace(plain, findings=(limit,)))
+    gravity, tilt = (one.what for one in verification_report(plain).headlines)
+    assert [[one.what for one in verification_report(v).headlines] for v in failing] == [[tilt, gravity]] * 2
+
+
+def test_effects_and_parameters_are_named_in_words():
+    hyphened = {"gyro g-sensitivity", "accelerometer-gyro time offset"}
+    assert {name for name in map(id_in_print, EFFECTS) if "-" in name} == hyphened
+    assert id_in_print("accel-misalignment-xy") == "accelerometer misalignment XY"
+    names = ["K2_x", "sigma_x", "range_y", "limit_x+", "accelerometer_delay", "pose_at", "x"]
+    said = ["K2_x", "σ_x", "range Y", "limit X+", "accelerometer delay", "pose at", "X"]
+    assert [parameter_in_print(name) for name in names] == said

@@ -104,7 +104,7 @@ def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions)
     zero_x = next(one for one in result.model.repeated if one.parameter.id == "gyro-bias")
     # 0.01 in one of four is a standard deviation of 0.005.
     assert zero_x.within.low < 0.005 < zero_x.within.high
-    assert "gyro-bias" in str(result)
+    assert "gyro bias" in str(result)
     assert "session-3.csv" in str(result)
     labels = ["mon", "mon", "tue", "tue"]
     dated = trihedron.calibrate_sessions(four_sessions, by="date", labels=labels, gravity_m_s2=G)

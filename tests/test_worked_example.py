@@ -37,8 +37,8 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
         said.append(out.getvalue())
     assert len(said) == 6  # one that represents the recording, and five
     promised = shown("text")[0].text
-    assert "MISSING PHYSICS: gyro-g-sensitivity is missing" in said[2]
-    assert "gyro X bias −7.86" in said[2]
+    assert "MISSING PHYSICS: gyro g-sensitivity is missing" in said[2]
+    assert "gyro bias X −7.86" in said[2]
     assert promised in said[3]
     assert Path("extended.json").is_file()
 

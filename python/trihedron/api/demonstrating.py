@@ -22,6 +22,7 @@ from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
 from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.report import calibration_report, demonstration_report, verification_report
+from trihedron.report.demonstration import with_files
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
 from trihedron.sensor_model import reframing
@@ -115,11 +116,13 @@ def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], N
     notify("writing reports")
     write_calibration(result.calibration, folder / "calibration.json", overwrite=overwrite)
     write_whole(folder / "truth.json", _truth_text(truth), overwrite=overwrite)
+    log, stored, other = (folder / name for name in ("session.csv", "calibration.json", "second-session.csv"))
     pages = (
         ("report.html", calibration_report(result.calibration, result.segments, first)),
         ("verification.html", verification_report(judged.verification, segments, second)),
     )
     for name, page in pages:
+        page = with_files(page, LOG=log, FILE=stored, OTHER_LOG=other)
         write_whole(folder / name, to_html(page), overwrite=overwrite)
     return Demonstration(result, judged, comparison, before, files, document)
 

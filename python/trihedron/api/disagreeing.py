@@ -20,6 +20,7 @@ from trihedron.files.scenario import write_scenario
 from trihedron.gravity import normal_gravity
 from trihedron.records.results import DiagnosisResult
 from trihedron.report import diagnosis_report, disagreement_report
+from trihedron.report.demonstration import with_files
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
 from trihedron.simulate import (
@@ -106,7 +107,8 @@ def disagree(
     write_scenario(improve(given, found).text, better, overwrite=overwrite)
     notify("comparing the improved simulation with the log")
     improved = diagnose(taken, gravity_m_s2=gravity, against=better)
-    write_whole(folder / "disagreement.html", to_html(diagnosis_report(found, str(given))), overwrite=overwrite)
+    page = with_files(diagnosis_report(found, str(given), str(better)), LOG=log)
+    write_whole(folder / "disagreement.html", to_html(page), overwrite=overwrite)
     notify("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
     sizes = dict(diagnosed_sizes([e.to_dict() for e in found.own_effects])[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 
@@ -43,6 +44,8 @@ FILE_PART = 1.1
 """Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
 CONSISTENT = (1.0, 9.0)
 """Acceptable NEES (3 expected, within a factor of three): outside, the covariance misleads a filter."""
+UNCERTAIN = math.sqrt(CONSISTENT[1] / CONSISTENT[0])
+"""Upper over lower end of N's interval whose every N leaves the NEES, which goes with N⁻², within those limits."""
 
 Static = dict[str, StaticNoise]
 
@@ -110,7 +113,7 @@ def filter_noise(
         motion = motion_of(reference, reference_columns)
         asked = Request(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
         sensors = beside_reference(recording, motion, asked)
-        source, findings = motion.source, (*findings, *motion.findings, *_noticed(sensors))
+        source, findings = motion.source, (*findings, *motion.findings, *noticed(sensors))
     else:
         if own is None:
             why = (
@@ -232,11 +235,15 @@ def _between_intervals(
     return tilt_over_moves(*stated), between_intervals(*stated)
 
 
-def _noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
+def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
+    """Findings about N, K and their consistency, sensor by sensor."""
     out = []
     for one in sensors:
         if not one.is_settled:
             out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
+        if not one.N.is_limit and one.N.upper > one.N.lower * UNCERTAIN:
+            lower, upper = one.N.lower, one.N.upper
+            out.append(Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, sensor=one.sensor, lower=lower, upper=upper))
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
         if one.reference is not None and one.reference.follows:

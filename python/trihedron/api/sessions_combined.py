@@ -176,12 +176,14 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
 
 
 def _changed(change: Change, model: SessionsModel) -> Finding:
-    parameter = change.id.rsplit("-", 1)[-1]
-    case = f"{parameter if parameter in _KINDS else 'other'}-{change.kind}"
+    kind = change.id.rsplit("-", 1)[-1]
+    case = f"{kind if kind in _KINDS else 'other'}-{change.kind}"
     return Finding.of(
         FindingCode.PARAMETERS_CHANGED,
         case,
-        what=[change.id, change.group] if model.by == "device" else [change.id],
+        parameter=change.id,
+        device=change.group,
+        is_of_device=model.by == "device",
         amount=_amount(change),
         where=Path(change.where).name,
         p_adjusted=change.p_adjusted,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from trihedron.cli.next_step import note_excluded
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
 from trihedron.cli.output import FullResults
 
@@ -84,6 +85,7 @@ def calibrate_many(
             progress=notify,
             **place.said,
         )
+    note_excluded(name for name, _ in result.model.left_out)
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
     machine = partial(sessions_record, result.model)

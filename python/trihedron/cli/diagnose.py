@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from trihedron.cli.next_step import name_log
 from trihedron.cli.options import GravitySource, LogsSource, progress, with_options
 from trihedron.cli.output import FullResults, leave, say
 
@@ -111,9 +112,12 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
     from trihedron.api import diagnosing_sessions
     from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
-    recordings = [source.read() for source in sources.each()]
+    given = sources.each()
+    recordings = [source.read() for source in given]
     with progress("diagnosing") as notify:
         found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=notify)
+    if found.effects:
+        name_log(given[found.effects[0].surest])
     results.emit(shared_diagnosis_report(found), lambda: shared_diagnosis_record(found))
 
 

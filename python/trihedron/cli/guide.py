@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -73,7 +74,8 @@ def _line(view: GuideView) -> str:
         return ""
     far = f"{known.shortfall:.2g} x goal" if math.isfinite(known.shortfall) else "unknown"
     left = "goal reached" if known.is_good_enough else far
-    return f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  worst uncertainty {left:13s} {view.instruction}"
+    head = f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  worst uncertainty {left:13s} "
+    return textwrap.fill(view.instruction, _size()[0], initial_indent=head, subsequent_indent=" " * len(head))
 
 
 def finish(

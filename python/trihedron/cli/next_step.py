@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import fields, replace
 from pathlib import Path
@@ -25,6 +25,7 @@ _log: ContextVar[str] = ContextVar("log", default="LOG")
 _place: ContextVar[str] = ContextVar("place", default="")
 _beside: ContextVar[str] = ContextVar("beside", default="")
 _file: ContextVar[str] = ContextVar("file", default="")
+_excluded: ContextVar[tuple[str, ...]] = ContextVar("excluded", default=())
 
 
 def begin_next_step() -> None:
@@ -33,12 +34,18 @@ def begin_next_step() -> None:
     _place.set("")
     _beside.set("")
     _file.set("")
+    _excluded.set(())
 
 
 def note_log(source: Any) -> None:
     """Store the first log that was read, with the options that say how to read it."""
     if _log.get() == "LOG":
-        _log.set(shlex.join(_words(source)))
+        name_log(source)
+
+
+def name_log(source: Any) -> None:
+    """Store a log instead of the first."""
+    _log.set(shlex.join(_words(source)))
 
 
 def note_place(source: Any) -> None:
@@ -55,6 +62,11 @@ def note_reference(given: Any) -> None:
 def note_file(path: Path | None) -> None:
     """Store the calibration file that the next step uses."""
     _file.set("" if path is None else shlex.quote(str(path)))
+
+
+def note_excluded(logs: Iterable[str]) -> None:
+    """Store the logs, as typed, that were not used: the next step is without them."""
+    _excluded.set(tuple(logs))
 
 
 def _words(source: Any) -> list[str]:
@@ -84,7 +96,8 @@ def _filled(command: str) -> str:
     verb = command.strip("`").split(" ")[1]
     more = (_beside.get(), _place.get()) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_log.get(), *more)))
-    words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": again(typed.get())}
+    same = again([word for word in typed.get() if word not in _excluded.get()])
+    words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
 
 

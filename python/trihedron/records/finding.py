@@ -115,6 +115,7 @@ class FindingCode(str, Enum):
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"
     FILTER_NOISE_INCONSISTENT = "filter-noise-inconsistent"
+    FILTER_NOISE_UNCERTAIN = "filter-noise-uncertain"
     FILTER_NOISE_UNSETTLED = "filter-noise-unsettled"
     FILTER_NOISE_UNCALIBRATED = "filter-noise-uncalibrated"
     ACCELEROMETER_NOMINAL = "accelerometer-nominal"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from trihedron.records.diagnosis import Diagnosis, EffectParameter
@@ -26,6 +27,11 @@ class SharedEffect(Frozen, Plain):
     p_agree: float
     is_of_instrument: bool
     """Whether the recordings' values agree; otherwise the effect differs from recording to recording."""
+
+    @property
+    def surest(self) -> int:
+        """Index of the recording that alone determines the parameters best, by the product of their uncertainties."""
+        return min(range(len(self.each)), key=lambda k: math.prod(one.std for one in self.each[k]))
 
 
 @dataclass(frozen=True)

@@ -14,23 +14,10 @@ from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
-LETTERS = 2
-"""Most letters of a name that consists of axes alone, as ``xy``."""
 BIAS = "the reading without input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
-TRIAD = "triad-alignment is the rotation of the gyro's axes against the accelerometer's"
+TRIAD = "triad alignment is the rotation of the gyro's axes against the accelerometer's"
 """Definition of the parameter ``triad-alignment`` in every report."""
-
-
-def axis_in_print(name: str) -> str:
-    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``; ``sigma_x`` as ``σ_x``."""
-    sensor, gap, axis = name.rpartition(" ")
-    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name.replace("sigma_", "σ_")
-
-
-def channel_in_print(channel: str) -> str:
-    """``gx`` and ``vx`` as ``X``; names other than axes (``norm``, ``angle``) unchanged."""
-    return channel[-1].upper() if len(channel) <= LETTERS else channel
 
 
 def calibrated_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
@@ -86,8 +73,3 @@ def axes_of(sensor: SensorCalibration) -> Axes:
     sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
     sigma_at_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
     return Axes(sensitivity, sigma[:3], at_zero, sigma_at_zero, at_zero / sensitivity, sigma[6:], skew, sigma[3:6])
-
-
-def term_in_print(term: str) -> str:
-    """A term of compared noise and sampling: figures of the poses are distinct from those of the whole log."""
-    return {"bandwidth": "-3 dB bandwidth in the poses", "jitter": "timestamp scatter"}.get(term, term)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +16,10 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.report.calibration import parameter_table
 from trihedron.report.diagnosis import effects_blocks
 from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
-from trihedron.report.diagnosis_words import MEANING, verdict_in_words
+from trihedron.report.diagnosis_words import verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block
+from trihedron.report.names import MEANING, id_in_print
 from trihedron.report.numbers import (
     duration,
     engineering_exponent,
@@ -149,6 +153,12 @@ def _next_steps() -> Facts:
     )
 
 
+def with_files(page: Document, **files: object) -> Document:
+    """The page with the demonstration's own files for LOG, OTHER_LOG and FILE of its next step."""
+    words = {name: shlex.quote(str(path)) for name, path in files.items()}
+    return replace(page, next_step=re.sub(r"\b[A-Z_]+\b", lambda word: words.get(word[0], word[0]), page.next_step))
+
+
 def disagreement_report(
     found: Diagnosis,
     improved: Diagnosis,
@@ -185,7 +195,7 @@ def disagreement_report(
 
 def _opened(sealed: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Any]]) -> tuple[Block, ...]:
     said = sizes.get(str(sealed["effect"]), {})
-    rows = [("drawn", str(sealed["effect"]))]
+    rows = [("drawn", id_in_print(str(sealed["effect"])))]
     for key, true in sealed["size"].items():
         rows.append((key, f"drawn {_numbers(true)}; found {_numbers(said[key]) if key in said else '–'}"))
     return (Facts(tuple(rows)),)

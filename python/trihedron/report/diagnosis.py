@@ -10,7 +10,6 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.axes import LETTERS, axis_in_print
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
@@ -24,7 +23,6 @@ from trihedron.report.diagnosis_numbers import (
 )
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
-    MEANING,
     differing_headline,
     headlines_of,
     level_of,
@@ -43,7 +41,8 @@ from trihedron.report.document import Block, Document, Facts, Paragraph, Picture
 from trihedron.report.effect_charts import alike, effect_chart, rest_panels
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
-from trihedron.report.numbers import capital, how_many, listed, plain_number
+from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
+from trihedron.report.numbers import capital, how_many, plain_number
 from trihedron.report.reference import beside_reference
 from trihedron.report.segments import pose_lines
 
@@ -193,12 +192,12 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for k, effect in enumerate(diagnosis.effects):
         rows = [
-            (f"{k + 1}. {effect.id}", _without_strongest(effect.statement)),
+            (f"{k + 1}. {id_in_print(effect.id)}", _without_strongest(effect.statement)),
             ("", _parameters(effect)),
             ("", _evidence(effect)),
         ]
         if effect.confounded_with:
-            rivals = listed(list(effect.confounded_with))
+            rivals = ids_in_print(effect.confounded_with)
             separating = effect.separating_experiment or "record other poses and moves"
             rows.append(("", f"Confounded with {rivals} in this recording. To separate them: {separating}."))
         blocks.append(Facts(tuple(row for row in rows if row[1])))
@@ -217,11 +216,10 @@ def _parameters(effect: AcceptedEffect) -> str:
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
         scale, shared = parameter_unit(unit, max(abs(p.value) for p in members))
-        words = []
-        for p in members[:MOST_PARAMETERS]:
-            # A symbol with its axis (K2_x) stays as it is, words (accelerometer_delay) get spaces.
-            name = axis_in_print(p.name) if len(p.name.rpartition("_")[2]) <= LETTERS else p.name.replace("_", " ")
-            words.append(f"{name} {value_in_words(scale * p.value, scale * p.std)}")
+        words = [
+            f"{parameter_in_print(p.name)} {value_in_words(scale * p.value, scale * p.std)}"
+            for p in members[:MOST_PARAMETERS]
+        ]
         words += [f"{len(members) - MOST_PARAMETERS} more"] if len(members) > MOST_PARAMETERS else []
         groups.append(", ".join(words) + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
@@ -265,7 +263,7 @@ def _remaining(diagnosis: Diagnosis) -> str:
 def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
-            effect.id,
+            id_in_print(effect.id),
             quantity(held),
             *_before_and_after(held),
             plain_number(held.chi2_per_dof_before),
@@ -303,7 +301,7 @@ def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
     for effects in alike(diagnosis.effects, diagnosis.residuals):
         chart = effect_chart(effects[0], diagnosis.residuals, *made)  # type: ignore[arg-type]
         if chart is not None:
-            caption = f"{listed([effect.id for effect in effects])}: {_drawn_in_words(effects[0])}."
+            caption = f"{capital(ids_in_print(effect.id for effect in effects))}: {_drawn_in_words(effects[0])}."
             out.append(Picture(f"effect-{effects[0].id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
 

@@ -11,10 +11,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.domains import DomainResiduals
-from trihedron.report.axes import axis_in_print, channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
+from trihedron.report.names import axis_in_print, channel_in_print
 from trihedron.report.numbers import plain_number, shown
 
 Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]

@@ -6,6 +6,7 @@ from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis, Relation
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
+from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import (
     MINUS,
     engineering_exponent,
@@ -80,8 +81,8 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     missing: dict[str, list[str]] = {}
     for candidate in diagnosis.candidates:
         if not candidate.applicable:
-            missing.setdefault(candidate.reason, []).append(candidate.id)
-    rows = tuple((listed(names), f"not applicable: {reason}") for reason, names in missing.items())
+            missing.setdefault(candidate.reason, []).append(id_in_print(candidate.id))
+    rows = tuple((f"not applicable, {reason}", listed(names)) for reason, names in missing.items())
     return (candidates_table(diagnosis), *((Facts(rows),) if rows else ()))
 
 
@@ -90,11 +91,11 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
     outcomes = {effect.id: "accepted, as in the model" for effect in getattr(diagnosis, "own_effects", ())}
     outcomes |= {effect.id: "accepted" for effect in diagnosis.effects}
     tried = [c for c in diagnosis.candidates if c.applicable]
-    redundant = {c.id: f"redundant with {c.superseded_by}" for c in tried if c.superseded_by is not None}
+    redundant = {c.id: f"redundant with {id_in_print(c.superseded_by)}" for c in tried if c.superseded_by is not None}
     tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
     rows = [
         (
-            c.id,
+            id_in_print(c.id),
             "–" if c.score is None else f"{round(c.score, 1) + 0.0:.1f}".replace("-", MINUS),
             "–" if c.limit95 is None or c.id in outcomes else parameter_in_words(c.limit95, c.size[0].unit),
             outcomes.get(c.id) or redundant.get(c.id) or c.reason or "not needed",
@@ -115,7 +116,7 @@ def relation_facts(relation: Relation) -> Facts:
         ("", f"{relation.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
     ]
     if relation.resembles:
-        rows.append(("", f"Similar to {listed(list(relation.resembles))}; similarity is no proof."))
+        rows.append(("", f"Similar to {ids_in_print(relation.resembles)}; similarity is no proof."))
     if relation.experiment:
         rows.append(("", f"To confirm it: {relation.experiment}."))
     return Facts(tuple(rows))

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.report.axes import BIAS, axis_in_print, term_in_print
+from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
+from trihedron.report.names import id_in_print, label_of, term_in_print
 from trihedron.report.numbers import (
     MINUS,
     capital,
@@ -23,41 +24,24 @@ from trihedron.report.numbers import (
 
 NAMED_SIGMAS = 3.0
 """Components of a differing group are listed from this many σ; the largest always is."""
-_WORDS = {
-    "accel-bias": "accelerometer {} bias",
-    "accel-scale": "accelerometer {} scale",
-    "accel-misalignment": "accelerometer angle {}",
-    "gyro-bias": "gyro {} bias",
-    "gyro-scale": "gyro {} scale",
-    "gyro-misalignment": "gyro angle {}",
-    "triad-alignment": "gyro turned against the accelerometer about {}",
-    "gravity": "gravity (or all three accelerometer scales)",
-}
-GROUPS = {
-    "accel-bias": "accelerometer biases",
-    "accel-scale": "accelerometer scales",
-    "accel-misalignment": "accelerometer angles",
-    "gyro-bias": "gyro biases",
-    "gyro-scale": "gyro scales",
-    "gyro-misalignment": "gyro angles",
-    "triad-alignment": "gyro alignment",
-    "gravity": "gravity",
-}
+SCALES = ("accel-scale", "gyro-scale", "gravity")
+"""Groups whose differences and uncertainties are relative."""
 MOST_NUMBERS, MOST_NOISE = 3, 2
 """Most clauses about parameters and about noise in a headline; a table lists all."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
+_DEFINED = f"a bias is {BIAS}; {TRIAD}"
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 
 
 def differing_numbers(diagnosis: Diagnosis) -> list[str]:
-    """``gyro Z bias +0.31 ± 0.01 °/s`` for every parameter that differs."""
+    """``gyro bias Z +0.31 ± 0.01 °/s`` for every parameter that differs."""
     said = []
     for members in _groups_that_differ(diagnosis).values():
         size = [_in_sigmas(p) for p in members]
         said += [
-            f"{named(p)} {_difference(p)}"
+            f"{id_in_print(f'{p.id}-{p.name}')} {_difference(p)}"
             for p, s in zip(members, size, strict=True)
             if s > NAMED_SIGMAS or s == max(size)
         ]
@@ -82,7 +66,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return (Paragraph("None of the given parameters differs."),)
     blocks: list[Block] = []
     if rows:
-        blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; a bias is {BIAS}"))
+        blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; {_DEFINED}"))
     if sentences:
         blocks.append(Facts(tuple(("", one) for one in sentences)))
     return tuple(blocks)
@@ -125,7 +109,7 @@ def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
         )
         scale, unit = in_print(largest)
         size = with_unit(plain_number(abs(scale * largest.difference), 2), unit)
-        said.append(f"{GROUPS.get(name, name)} by up to {size}")
+        said.append(f"{id_in_print(name)} by up to {size}")
     return said
 
 
@@ -161,11 +145,12 @@ def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     agreeing = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
     if not agreeing:
         return ()
-    return (Table(_HEAD, tuple(map(_row, agreeing)), f"Parameters of the groups that agree; a bias is {BIAS}"),)
+    return (Table(_HEAD, tuple(map(_row, agreeing)), f"Parameters of the groups that agree; {_DEFINED}"),)
 
 
 def _row(p: ParameterDifference) -> tuple[str, ...]:
-    return named(p), _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2)
+    values = (_value(p, p.model), _value(p, p.recording), _difference(p))
+    return label_of(p.id, p.name), *values, plain_number(p.p_value, 2)
 
 
 def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -174,14 +159,14 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             f"{_sensor(n)} {n.axis.upper()}".strip(),
             f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else term_in_print(n.term),
-            *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
             _ratio(n),
-            unit_in_print(n.unit),
             "differs" if n.significant else "agrees",
+            *("–" if value is None else plain_number(value) for value in (n.model, n.recording)),
+            unit_in_print(n.unit),
         )
         for n in diagnosis.noise_compared
     )
-    head = ("sensor", "term", "model", "recording", "ratio (interval)", "unit", "judged")
+    head = ("sensor", "term", "ratio (interval)", "judged", "model", "recording", "unit")
     blocks: list[Block] = [Table(head, rows, "Noise and sampling of the model and of the recording")]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:
@@ -218,11 +203,6 @@ def _stage(stage: Stage, domain: str) -> str:
     return "–"
 
 
-def named(p: ParameterDifference) -> str:
-    """The parameter in words."""
-    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else f"{p.id} {axis_in_print(p.name)}"
-
-
 def in_print(p: ParameterDifference) -> tuple[float, str]:
     """Factor from SI and unit for differences of this kind."""
     return _unit(p, is_difference=True)
@@ -236,8 +216,7 @@ def _difference(p: ParameterDifference) -> str:
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
-    # The standard error of a scale is relative.
-    sigma = p.std * abs(value) if p.id in ("accel-scale", "gyro-scale") else scale * p.std
+    sigma = p.std * abs(value) if p.id in SCALES else scale * p.std
     if not 0.0 < sigma < float("inf"):
         # Exact.
         return with_unit(plain_number(scale * value, 6), unit)
@@ -248,9 +227,8 @@ def _value(p: ParameterDifference, value: float) -> str:
 
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
     """Factor from SI and customary unit for a parameter of this kind."""
-    if p.id not in _WORDS:
-        return (1.0, "") if p.unit == "1" else shown(p.unit)
-    return (1.0, "") if p.unit == "1" and not is_difference else shown(p.unit)
+    is_relative = is_difference and p.id in SCALES
+    return (1.0, "") if p.unit == "1" and not is_relative else shown(p.unit)
 
 
 def _sensor(n: NoiseDifference) -> str:

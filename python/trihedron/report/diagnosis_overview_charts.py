@@ -11,20 +11,19 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.axes import axis_in_print, term_in_print
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
-from trihedron.report.diagnosis_numbers import GROUPS, in_print, named
-from trihedron.report.diagnosis_words import MEANING
+from trihedron.report.diagnosis_numbers import in_print
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
+from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
 ROW_PX = 26
 """Height of a row in pixels."""
-BESIDE = 0.15
-"""Offset of the dots without effects above the middle of a row, and with effects below it, in rows."""
+THICK, SHADED = 0.28, 0.8
+"""Height of a bar and of the shade behind it, in rows."""
 FEWEST_DOMAINS = 2
 """Fewest domains for which the chart is drawn; for one the table is enough."""
 MARGIN = 1.6
@@ -48,37 +47,38 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
     if sum(d.chi2_per_dof > 0.0 for d in diagnosis.domains) < FEWEST_DOMAINS:
         return None
     caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
-    caption += "noise alone; inside the shade the domain agrees (a healthy recording leaves one of them in "
-    caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
-    caption += "pose, line or time."
-    return Picture("strengths", caption, partial(_strengths_chart, diagnosis))
+    caption += "noise alone"
+    if any(d.limit for d in diagnosis.domains):
+        caption += "; inside the shade the domain agrees (a healthy recording leaves one of them in "
+        caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
+        caption += "pose, line or time"
+    return Picture("strengths", f"{caption}.", partial(_strengths_chart, diagnosis))
 
 
 def _strengths_chart(diagnosis: Diagnosis) -> Chart:
-    """A row per domain: its limit, and dots without and with the effects."""
+    """A row per domain: its limit in the shade, and bars without and with the effects in front of it."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
     after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
     names = tuple(MEANING[d.domain] for d in tests)
-    rows, apart = -np.arange(1.0, len(tests) + 1.0), BESIDE if after else 0.0
+    rows, apart = -np.arange(1.0, len(tests) + 1.0), THICK / 2.0 if after else 0.0
     before, differs = np.array([d.chi2_per_dof for d in tests]), np.array([d.disagrees for d in tests])
     with_them = np.array([after.get(d.domain, math.nan) for d in tests])
     limit = np.array([d.limit or math.nan for d in tests])
     seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
     low, high = float(seen.min()) / MARGIN, float(seen.max()) * MARGIN
-    tips = [f"{what}: agrees up to χ²/dof {plain_number(v)}" for what, v in zip(names, limit, strict=True)]
     base = np.full(len(tests), low)
-    marks: list[Mark] = [Level(x=1.0, name="noise alone", is_dashed=True)]
-    if np.any(np.isfinite(limit)):
-        marks.insert(0, Bars(limit, rows, 4.0 * BESIDE, tips, "agrees up to here", "shade", base, is_across=True))
-    sides: list[tuple[str, Colour, FloatArray, FloatArray]] = [
-        ("disagrees", "accent", np.where(differs, before, math.nan), rows + apart),
-        ("agrees", "soft", np.where(differs, math.nan, before), rows + apart),
-        ("with the effects", "c1", with_them, rows - apart),
+    marks: list[Mark] = []
+    sides: list[tuple[str, str, Colour, FloatArray, FloatArray, float]] = [
+        ("agrees up to here", "agrees up to", "shade", limit, rows, SHADED),
+        ("disagrees", "disagrees:", "accent", np.where(differs, before, math.nan), rows + apart, THICK),
+        ("agrees", "agrees:", "soft", np.where(differs, math.nan, before), rows + apart, THICK),
+        ("with the effects", "with the effects:", "c1", with_them, rows - apart, THICK),
     ]
-    for name, colour, values, at in sides:
+    for name, words, colour, values, at, width in sides:
         if np.any(np.isfinite(values)):
-            tips = [f"{what}, {name}: χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-            marks.append(Points(values, at, tips, None, name, colour))
+            tips = [f"{what}, {words} χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
+            marks.append(Bars(values, at, width, tips, name, colour, base, is_across=True))
+    marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
     x = Scale("χ² per degree of freedom (logarithmic)", is_log=True, limits=(low, high))
     return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=ROW_PX * (len(tests) + 1)),))
 
@@ -106,7 +106,7 @@ def _forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
     for p in parameters:
         groups.setdefault(p.id, []).append(p)
     # Separate axes, since groups differ in size.
-    panels = [_forest(GROUPS.get(name, name), members) for name, members in groups.items()]
+    panels = [_forest(id_in_print(name), members) for name, members in groups.items()]
     return Chart(tuple(panels), columns=min(3, len(panels)))
 
 
@@ -116,7 +116,7 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     sigma = scale * np.array([p.std for p in members])
     place = -np.arange(1.0, len(members) + 1.0)
     tips = [
-        f"{named(p)}: recording − model {with_sigma(v, s)} {unit}".strip()
+        f"{label_of(p.id, p.name)}: recording − model {with_sigma(v, s)} {unit}".strip()
         for p, v, s in zip(members, value, sigma, strict=True)
     ]
     colour: Colour = "accent" if members[0].significant else "c1"

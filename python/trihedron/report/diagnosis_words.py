@@ -8,9 +8,9 @@ from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
-from trihedron.report.axes import channel_in_print
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level
+from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print
 from trihedron.report.numbers import (
     capital,
     engineering_exponent,
@@ -33,17 +33,6 @@ LEVELS: dict[str, Level] = {
 }
 """Colour of each verdict: good only if consistent, bad if the disagreement has no explanation."""
 
-MEANING = {
-    "static-accel": "gravity error in static poses",
-    "static-gyro": "gyro rate in static poses",
-    "moves": "tilt error after a rotation",
-    "dynamics": "velocity error over a rotation",
-    "rate": "angular rate beside the reference",
-    "within-static": "noise within static poses",
-    "timing": "time error of samples, seen in motion",
-    "parameters": "parameters of the model",
-    "noise": "noise and sampling",
-}
 _CHANNELS = {"a": "accelerometer ", "g": "gyro "}
 _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""
@@ -57,7 +46,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
     left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
-    missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
+    missing = _named(diagnosis, "recording")
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if _dependent(diagnosis) else ""
         return (
@@ -75,7 +64,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
-    surplus = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "model"))
+    surplus = _named(diagnosis, "model")
     tail = f"; {listed(left)} still {_disagree(left)}." if left else "; nothing else disagrees."
     said = []
     if missing:
@@ -101,6 +90,11 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
         text += f": the misfit follows {listed(names[:MOST_NAMED])}{more}"
     numbers = differing_in_short(diagnosis)
     return text + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
+
+
+def _named(diagnosis: Diagnosis, side: str = "") -> list[str]:
+    """Effects of one ``side``, or of both, in words and each once."""
+    return list(dict.fromkeys(id_in_print(one.id) for one in diagnosis.effects if side in ("", one.side)))
 
 
 def _disagree(subjects: list[str]) -> str:
@@ -129,10 +123,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         )
     rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
     if rivals is not None and rivals.separating_experiment:
-        others = listed(list(rivals.confounded_with))
-        steps.append(
-            f"{'Then separate' if steps else 'Separate'} {rivals.id} from {others}: {rivals.separating_experiment}."
-        )
+        first, others = id_in_print(rivals.id), ids_in_print(rivals.confounded_with)
+        begun = "Then separate" if steps else "Separate"
+        steps.append(f"{begun} {first} from {others}: {rivals.separating_experiment}.")
     if steps:
         return " ".join(steps)
     return "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
@@ -178,7 +171,7 @@ def _not_compared(diagnosis: Diagnosis) -> str:
 
 def _footnotes(diagnosis: Diagnosis) -> str:
     """A remark on minor effects: a disturbed pose, a weak spectral line."""
-    named = list(dict.fromkeys(effect.id for effect in diagnosis.effects))
+    named = _named(diagnosis)
     return f" (also found: {listed(named)})" if named else ""
 
 
@@ -251,19 +244,20 @@ def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
 
 def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     """Share of the misfit of every effect, and the cross-validated gain of the strongest; else the worst domain."""
+    explained = [(id_in_print(effect.id), 100.0 * (effect.share or 0.0)) for effect in diagnosis.effects]
     shares = tuple(
-        Headline(f"{effect.id} explains", plain_number(100.0 * effect.share, 2), "%", "of the misfit by itself")
-        for effect in diagnosis.effects
-        if effect.share is not None and effect.share > LEAST_SHARE
+        Headline(f"{name} explains", plain_number(share, 2), "%", "of the misfit by itself")
+        for name, share in explained
+        if share > 100.0 * LEAST_SHARE
     )
-    for effect in diagnosis.effects:
+    for k, effect in enumerate(diagnosis.effects):
         if effect.held_out:
             held = effect.held_out[0]
             after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
             before = size_in_words(held.rms_before, held.unit)
             return (
                 *shares[:MOST_NAMED],
-                Headline(quantity(held), after, unit, f"cross-validated, with {effect.id}; {before} without"),
+                Headline(quantity(held), after, unit, f"cross-validated, with {explained[k][0]}; {before} without"),
             )
     tests = [d for d in diagnosis.domains if d.dof > 0]
     if not tests:

@@ -95,7 +95,7 @@ def _legend(chart: Chart) -> str:
 
 
 def _swatch(mark: Mark) -> str:
-    shape = {Line: "ln", Points: "dot", Bars: "box", Band: "box", Span: "box", Level: "ln", Note: ""}[type(mark)]
+    shape = {Line: "ln", Points: "dot", Bars: "box", Band: "box", Span: "box back", Level: "ln", Note: ""}[type(mark)]
     if (isinstance(mark, Line | Level) and mark.is_dashed) or (isinstance(mark, Points) and mark.is_hollow):
         shape += " open"
     return f"{shape} {mark.colour}"

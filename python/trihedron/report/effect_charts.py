@@ -10,9 +10,9 @@ from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, EffectCurve
 from trihedron.records.domains import DomainResiduals
-from trihedron.report.axes import channel_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
+from trihedron.report.names import channel_in_print
 from trihedron.report.numbers import SHOWN, plain_number, shown
 from trihedron.units import degrees_from_radians
 

@@ -15,8 +15,8 @@ from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
-from trihedron.report.diagnosis_words import MEANING
 from trihedron.report.document import Document, Headline, Picture, Section
+from trihedron.report.names import MEANING, ids_in_print
 from trihedron.report.numbers import listed, plain_number, shown
 from trihedron.report.reference import beside_reference
 
@@ -63,7 +63,7 @@ def _changed_picture(diagnosis: Diagnosis) -> Picture | None:
     if not chosen:
         return None
     caption = f"{listed([MEANING[one.domain] for one in chosen]).capitalize()}, in sample: left by S and b alone, "
-    caption += f"right with {listed([effect.id for effect in diagnosis.effects])}; ± 2 σ of the predicted noise."
+    caption += f"right with {ids_in_print(effect.id for effect in diagnosis.effects)}; ± 2 σ of the predicted noise."
     return Picture("effects", caption, partial(_changed_chart, diagnosis, chosen))
 
 

@@ -12,10 +12,11 @@ import numpy as np
 from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
-from trihedron.report.axes import TRIAD, axis_in_print
+from trihedron.report.axes import TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
+from trihedron.report.names import axis_in_print, id_in_print, label_of
 from trihedron.report.numbers import capital, how_many, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
@@ -132,7 +133,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
         beside = f"median of usable logs, cross-validated; worst {plain_number(max(held) * factor, 3)} {unit}"
         typical = plain_number(statistics.median(held) * factor, 3)
         out.append(Headline("gravity error in static poses", typical, unit, beside))
-    for name, words in (("accel-bias", "accelerometer bias"), ("gyro-bias", "gyroscope bias")):
+    for name in ("accel-bias", "gyro-bias"):
         axes = [one for one in summary.repeated if one.parameter.id == name]
         spreads = [one.between for one in axes if one.between is not None]
         if spreads:
@@ -140,7 +141,7 @@ def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
             own = [one.within for one in axes if one.within is not None]
             repeat = f"; session to session {found_or_limit(_largest(own), factor)} {unit}" if own else ""
             beside = f"device to device, worst axis{repeat}"
-            out.append(Headline(words, found_or_limit(_largest(spreads), factor), unit, beside))
+            out.append(Headline(id_in_print(name), found_or_limit(_largest(spreads), factor), unit, beside))
     return tuple(out)
 
 
@@ -186,7 +187,7 @@ def _mixed(summary: FleetSummary) -> list[Block]:
 def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
     """A parameter, and a difference of it."""
     factor, unit = shown(parameter.unit)
-    return f"{parameter.id} {axis_in_print(parameter.name)}", f"{plain_number(difference * factor, 2)} {unit}"
+    return label_of(parameter.id, parameter.name), f"{plain_number(difference * factor, 2)} {unit}"
 
 
 def _physics(summary: FleetSummary) -> list[Block]:
@@ -196,7 +197,7 @@ def _physics(summary: FleetSummary) -> list[Block]:
     for effect in summary.effects:
         logs = f"{effect.n_logs} of {summary.n_diagnosed}"
         devices = f"{effect.n_devices} of {summary.n_devices_diagnosed}"
-        rows.append((effect.id, logs, devices, f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %"))
+        rows.append((id_in_print(effect.id), logs, devices, f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %"))
     return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows), "Effects by device")]
 
 
@@ -241,7 +242,7 @@ def _drift(summary: FleetSummary) -> list[Block]:
         how, sizes, unit = change_in_words(change)
         k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
         size = f"{sizes[k]} {unit} in {axis_in_print(change.names[k])}"
-        rows.append((change.group, change.id, how, size, plain_number(change.p_adjusted, 1)))
+        rows.append((change.group, id_in_print(change.id), how, size, plain_number(change.p_adjusted, 1)))
     head = ("device", "parameter", "how", "by", "p")
     whole = f"Tested: {tested} A folder is taken for one device unless --serial names it ({BY_FILE})."
     return [Paragraph(whole), Table(head, tuple(rows), "Changes between sessions")]
@@ -254,7 +255,7 @@ def _logs(summary: FleetSummary) -> Table:
             log.serial,
             log.status if log.is_trustworthy or log.status != "done" else "done, not to be trusted",
             log.verdict or "–",
-            ", ".join(log.effects) or "–",
+            ", ".join(map(id_in_print, log.effects)) or "–",
             "–" if log.n_poses is None else str(log.n_poses),
             "–" if log.held_out_rms_m_s2 is None else plain_number(log.held_out_rms_m_s2 * shown("m/s^2")[0], 2),
         )
@@ -301,6 +302,6 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
             if part.any():
                 tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
-        y = Scale(f"{parameter.id} {axis_in_print(parameter.name)}  [{unit}]", unit)
+        y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3 if most is None else 2)

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 
 from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
-from trihedron.report.axes import axis_in_print
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.names import axis_in_print
 from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.records import AllanCurve, NoiseAxis, TermName
-from trihedron.report.axes import axis_in_print
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Line, Mark, Note, Panel, Points, Scale, Span
+from trihedron.report.names import axis_in_print
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma_and_power
 
@@ -190,8 +190,11 @@ def _terms(axis: NoiseAxis, tau: FloatArray) -> list[Mark]:
     for part in parts_of(axis, tau):
         marks.append(Line(tau, part.deviation, "parts of the sum", "soft", is_thin=True))
         marks.append(Points(np.array([part.x]), np.array([part.y]), [part.tip], None, "", "ink"))
-        # The label extends towards the middle of the panel.
-        marks.append(Note(part.x, part.y, part.name, side="right" if part.x < middle else "left"))
+        # The label extends towards the middle of the panel, or is below a line that would cross it.
+        is_left = part.x < middle
+        end = part.x * 10.0 ** (0.5 * NAME_DECADES[0] if is_left else -0.5 * NAME_DECADES[0])
+        is_flat = abs(np.log10(np.interp(end, tau, part.deviation) / part.y)) < 0.5 * NAME_DECADES[1]
+        marks.append(Note(part.x, part.y, part.name, side="below" if is_flat else "right" if is_left else "left"))
     total = np.sqrt(axis.allan_variance(tau))
     marks.append(Line(tau, total, "their sum", "ink", is_dashed=True, is_thin=True))
     best = axis.optimal_averaging()

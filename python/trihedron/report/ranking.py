@@ -92,17 +92,17 @@ def _factor(factor: float) -> str:
 
 def _order(ranking: Ranking) -> Table:
     head = (
-        "file", "made by", "gravity error [mm/s²]", "tilt error [°]", "static rate [°/s]", "behind the best", "judged",
+        "file", "judged", "gravity error [mm/s²]", "tilt error [°]", "behind the best", "static rate [°/s]", "made by",
     )  # fmt: skip
     rows = tuple(
         (
             f"{k + 1}. {one.name}",
-            one.maker,
+            "rejected" if one.is_rejected else "fits",
             _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
             _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
-            plain_number(degrees_from_radians(one.static_rate_rms), 2),
             with_sigma(one.behind, one.behind_sigma) if one.behind_sigma > 0.0 else plain_number(one.behind, 3),
-            "rejected" if one.is_rejected else "fits",
+            plain_number(degrees_from_radians(one.static_rate_rms), 2),
+            one.maker,
         )
         for k, one in enumerate(ranking.candidates)
     )

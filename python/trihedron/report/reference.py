@@ -14,14 +14,21 @@ from trihedron.report.calibration import calibration_report
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope
-from trihedron.report.numbers import each_with_sigma, engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.report.names import axis_in_print, id_in_print
+from trihedron.report.numbers import (
+    capital,
+    each_with_sigma,
+    engineering_exponent,
+    plain_number,
+    power_of_ten,
+    with_sigma,
+)
 from trihedron.sanitise import escaped
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
 DEGREES = degrees_from_radians(1.0)
 TWO_SIGMA = 2.0
-_EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
 _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1, "% of ±250 °/s")}
 """Data-sheet sizes in printed units."""
 _SIGNS = {
@@ -221,8 +228,8 @@ def _effect(ident: str, one: Estimate) -> Table:
         unit = units[min(k // per, len(units) - 1)]
         cells = each_with_sigma(one.value[k : k + per], one.std[k : k + per], scale)
         printed = f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip()
-        rows.append((", ".join(one.names[k : k + per]), *cells, printed))
-    title = _EFFECTS.get(ident, ident).capitalize()
+        rows.append((", ".join(map(axis_in_print, one.names[k : k + per])), *cells, printed))
+    title = capital(id_in_print(ident))
     if one.score is not None:
         title += f": score {plain_number(one.score, 3)}, accepted from {NAMED_FROM:g}{_shown_from(ident, one)}"
     return Table(("", "", "", "", ""), tuple(rows), title)

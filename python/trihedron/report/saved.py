@@ -69,7 +69,8 @@ def report_of(saved: Any) -> Document:
     """
     held = saved.get(KEY) if isinstance(saved, Mapping) else None
     if not isinstance(held, Mapping) or held.get("version") != VERSION:
-        raise NotAReportError("no report is saved in it: write it again with --json FILE or --report FILE.json.")
+        said = "no report is saved in it: apply and convert make none, another result is written again with --json FILE"
+        raise NotAReportError(f"{said} or --report FILE.json.")
     try:
         return _converter().structure(held.get("document"), Document)
     except (TypeError, ValueError, KeyError, RecursionError) as error:

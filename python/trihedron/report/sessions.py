@@ -11,27 +11,21 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.axes import BIAS, TRIAD, axis_in_print
+from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import each_with_sigma, how_many, listed, plain_number, shown, with_sigma
+from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
+from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
 
-DRIFTING = {
-    "accel-bias": "accelerometer bias",
-    "accel-scale": "accelerometer scale",
-    "gyro-bias": "gyroscope bias",
-    "gyro-scale": "gyroscope scale",
-}
+DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = (
-    "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`. Their uncertainty is that "
-)
-NEXT += "of the next recording."
+NEXT = "Use the common parameters: `trihedron apply FILE OTHER_LOG`, `trihedron export FILE --to c`. Their uncertainty "
+NEXT += "is that of the next recording."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -60,7 +54,7 @@ def sessions_report(model: SessionsModel) -> Document:
     names = [session.name for session in model.sessions]
     usable = agree
     if changed:
-        parameters = listed(list(dict.fromkeys(change.id for change in changed)))
+        parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
         usable = f"{how_many(n, 'recording')} of which {parameters} changed"
     return Document(
         title="Calibration from many recordings",
@@ -77,17 +71,17 @@ def sessions_report(model: SessionsModel) -> Document:
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
     """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
     out = []
-    for name, words in DRIFTING.items():
+    for name in DRIFTING:
         axes = [one for one in model.repeated if one.parameter.id == name]
         if not axes:
             continue
         factor, unit = shown(axes[0].parameter.unit)
         ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
+        what, within = id_in_print(name), axes[k].within
         beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
-        within = axes[k].within
         beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
-        out.append(Headline(f"{words} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
+        out.append(Headline(f"{what} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
     return tuple(out)
 
 
@@ -98,7 +92,7 @@ def found_or_limit(spread: Spread, factor: float) -> str:
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
-    chart = partial(sessions_chart, model, tuple(DRIFTING), 2)
+    chart = partial(sessions_chart, model, DRIFTING, 2)
     has_band = model.thermal is None and any(one.within is not None and one.within.sd for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {ONE_SIGMA}"
     caption += "; band: session to session (1 σ)." if has_band else "."
@@ -158,7 +152,7 @@ def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[st
     common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
         common = f"± {plain_number(one.std * factor, 2)}"
-    cells = [f"{one.parameter.id} {axis_in_print(one.parameter.name)} [{unit}]", common]
+    cells = [f"{label_of(one.parameter.id, one.parameter.name)} [{unit}]", common]
     for spread in spreads:
         if spread is None:
             cells += ["–", "–"]
@@ -172,7 +166,7 @@ def _changes(model: SessionsModel) -> list[Block]:
     rows = []
     with_group = model.by == "device"
     for change in model.changes:
-        cells = [change.id, *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
+        cells = [id_in_print(change.id), *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
         rows.append((*cells, _said(change) if change.significant else "no"))
     head = ("parameter", *(["device"] if with_group else []), "p", "changed")
     return [
@@ -216,12 +210,12 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
                 continue
             sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) for axis in range(3)]
             cells = each_with_sigma(term.coefficients[k], sigma, factor)
-            rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
+            rows.append((f"{id_in_print(term.id)} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
         spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
-        rows.append((f"{term.id}, order {term.order}: residual [{unit}]", *spread))
+        rows.append((f"{id_in_print(term.id)}, order {term.order}: residual [{unit}]", *spread))
         if term.hysteresis is not None:
             cells = [plain_number(float(v) * factor, 2) for v in term.hysteresis]
-            rows.append((f"{term.id}: half of heating less cooling [{unit}]", *cells))
+            rows.append((f"{id_in_print(term.id)}: half of heating less cooling [{unit}]", *cells))
     return [
         Paragraph(
             f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
@@ -288,7 +282,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
         marks: list[Mark] = [*bands, Level(y=0.0)]
         for axis, k in enumerate(picked):
             marks += _deviations(model, k, axis, places)
-        panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
+        panels.append(Panel(x, Scale(f"{id_in_print(name)}  [{unit}]", unit), tuple(marks), height_px=170))
     return Chart(tuple(panels), columns=columns, is_linked=True)
 
 

@@ -13,7 +13,8 @@ from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, S
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
 from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.numbers import listed, plain_number, with_sigma
+from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
+from trihedron.report.numbers import capital, plain_number, with_sigma
 
 TWO_SIGMA = 2.0
 ROW_PX = 26
@@ -31,15 +32,15 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     verdict = "The recordings share no missing effect."
     if own:
         verb = "is missing from the model and belongs" if len(own) == 1 else "are missing from the model and belong"
-        verdict = f"{listed(own)} {verb} to the instrument: one size fits all recordings."
+        verdict = f"{ids_in_print(own)} {verb} to the instrument: one size fits all recordings."
     elif found.effects:
-        verdict = f"{listed([one.id for one in found.effects])} differs from recording to recording."
-    tried = tuple((one.id, plain_number(one.score)) for one in found.candidates)
+        verdict = f"{ids_in_print(one.id for one in found.effects)} differs from recording to recording."
+    tried = tuple((id_in_print(one.id), plain_number(one.score)) for one in found.candidates)
     n_alone = sum(map(bool, found.of_single_recordings))
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
-        verdict=verdict,
+        verdict=capital(verdict),
         is_trustworthy=not found.effects,
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
@@ -59,8 +60,9 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
 def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
     """The strongest shared effect with its size in every recording; without one, the scores of all effects."""
     if found.effects:
-        chart = partial(shared_chart, found.effects[0], names)
-        caption = f"{found.effects[0].id}: its parameters in all recordings together and in each, with 95 % intervals."
+        strongest = found.effects[0]
+        chart = partial(shared_chart, strongest, names)
+        caption = f"Parameters of {id_in_print(strongest.id)}, in all recordings together and in each; 95 % intervals."
     elif found.candidates:
         chart = partial(candidates_chart, found.candidates)
         caption = "What each effect would gain with one size in all recordings (twice the log-evidence, corrected "
@@ -77,7 +79,7 @@ def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
         )
     if any(found.of_single_recordings):
         return "What single recordings name belongs to their sessions: diagnose each by itself."
-    return "Nothing is to be added: calibrate the recordings together."
+    return "Nothing is to be added: calibrate the recordings together (`trihedron calibrate LOG OTHER_LOG`)."
 
 
 def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
@@ -87,7 +89,7 @@ def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
     for k, effect in enumerate(found.effects):
         alone = ", ".join(plain_number(score) for score in effect.scores)
         scores = f"score {plain_number(effect.score)} together; {alone} in each"
-        facts = Facts(((f"{k + 1}. {effect.id}", scores), ("", _agreement(effect))))
+        facts = Facts(((f"{k + 1}. {id_in_print(effect.id)}", scores), ("", _agreement(effect))))
         blocks += [facts, _parameters(effect, names)]
     return tuple(blocks)
 
@@ -106,13 +108,13 @@ def _parameters(effect: SharedEffect, names: list[str]) -> Table:
         scale, unit = parameter_unit(common.unit, largest)
         found = [one[i] for one in (effect.parameters, *effect.each)]
         cells = [value_in_words(scale * one.value, scale * one.std) for one in found]
-        rows.append((common.name, *cells, unit))
-    return Table(("parameter", "together", *names, "unit"), tuple(rows), "Parameters together and alone")
+        rows.append((f"{parameter_in_print(common.name)} [{unit}]", *cells))
+    return Table(("parameter", "together", *names), tuple(rows), "Parameters together and alone")
 
 
 def _each(found: SharedDiagnosis, names: list[str]) -> Table:
     rows = tuple(
-        (name, verdict_in_words(one).split(":")[0].lower(), listed(list(alone)) if alone else "–")
+        (name, verdict_in_words(one).split(":")[0].lower(), ids_in_print(alone) if alone else "–")
         for name, one, alone in zip(names, found.diagnoses, found.of_single_recordings, strict=True)
     )
     return Table(("recording", "verdict", "named here alone"), rows, "Recordings by themselves")
@@ -145,8 +147,9 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
             Points(value[1:], place[1:], tips[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
             Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
-        x = Scale(f"{common.name} [{unit}]", unit, includes=(0.0,))
-        panels.append(Panel(x, Scale("", names=beside), marks, title=common.name, height_px=ROW_PX * (len(rows) + 1)))
+        name = parameter_in_print(common.name)
+        x = Scale(f"{name} [{unit}]", unit, includes=(0.0,))
+        panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
 
 
@@ -154,10 +157,10 @@ def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
     """A bar per effect: its score in all recordings together."""
     place = -np.arange(1.0, len(candidates) + 1.0)
     score = np.array([one.score for one in candidates])
-    tips = [f"{one.id}: score {plain_number(one.score)}" for one in candidates]
+    tips = [f"{id_in_print(one.id)}: score {plain_number(one.score)}" for one in candidates]
     bars = Bars(score, place, BAR, tips, "tried in all recordings together", "soft", is_across=True)
     # The axis extends beyond 0, so that positive scores have space even if there are none.
     x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
-    names = tuple(one.id for one in candidates)
+    names = tuple(id_in_print(one.id) for one in candidates)
     marks = (bars, Level(x=0.0, name="gains from here on"))
     return Chart((Panel(x, Scale("", names=names), marks, height_px=ROW_PX * (len(names) + 1)),))

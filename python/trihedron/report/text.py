@@ -19,7 +19,7 @@ WIDTH = 100
 NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
-_COMMAND = re.compile(r"`[^`]+`[.,;:)]?")
+_COMMAND = re.compile(r"\(?`[^`]+`[.,;:)]*")
 _TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
 """Fewest columns for names of rows, and for heads."""

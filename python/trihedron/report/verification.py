@@ -9,12 +9,13 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records import FindingCode, Recording, Segments, Verification
-from trihedron.report.axes import TRIAD, axis_in_print
+from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
 from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -58,7 +59,7 @@ def verification_report(
         verdict=verdict_of(v.findings, good, usable, "NOT VERIFIED"),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
-        headlines=headlines_of(verification),
+        headlines=_failed_first(v, bool(above)),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         # Advice about the errors; else to use the calibration, unless it is rejected.
         next_step=above[0].action if above else USE if v.is_passed else "",
@@ -68,6 +69,13 @@ def verification_report(
 def _expected(size: str, chi2_per_dof: float) -> str:
     """The expected size by noise and the calibration's uncertainty, and χ²/dof, which decides."""
     return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
+
+
+def _failed_first(v: Verification, is_above: bool) -> tuple[Headline, ...]:
+    """The headlines, the error that fails first: by its limit, else the farther above noise and uncertainty."""
+    limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
+    is_tilt = "limit_deg" in limits[0] if limits else is_above and v.angle_chi2_per_dof > v.norm_chi2_per_dof
+    return headlines_of(v)[:: -1 if is_tilt else 1]
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
@@ -128,7 +136,7 @@ def parameters_table(v: Verification) -> Table:
         differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
         times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
         judged = times if one.is_judged else "not judged by this log"
-        rows.append((f"{one.id} {axis_in_print(one.name)}", unit, differs, sigma, stated, judged))
+        rows.append((label_of(one.id, one.name), unit, differs, sigma, stated, judged))
     head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
     return Table(
         head, tuple(rows), f"Parameters that do not depend on the frame, against this log's own calibration; {TRIAD}"

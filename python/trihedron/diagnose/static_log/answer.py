@@ -118,7 +118,7 @@ class _Side:
     @property
     def case(self) -> str:
         """Case of the sentence: sizes in customary units, or in counts where the scale is unknown."""
-        return "static-counts" if self.unit == "raw" else "static"
+        return "static-counts" if self.unit == "counts" else "static"
 
 
 def _matrix(model: LinearModel, sensor: int) -> FloatArray:
@@ -132,9 +132,9 @@ def _sizes(model: LinearModel, sensor: int) -> FloatArray:
 
 
 def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:
-    """SI, or ``raw`` where neither the log nor a given calibration states the unit of a gyro's count."""
+    """SI, or ``counts`` where neither the log nor a given calibration states the unit of a gyro's count."""
     is_counts = sensor == GYRO and rate_to_si(recording.gyroscope_unit) is None
-    return "raw" if is_counts and _matrix(model, GYRO)[0, 0] == 1.0 else SENSORS[sensor].unit
+    return "counts" if is_counts and _matrix(model, GYRO)[0, 0] == 1.0 else SENSORS[sensor].unit
 
 
 def _noise(recording: Recording, pieces: StaticPieces | None, model: LinearModel) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from trihedron.report.findings.page import shown
 
 _HEAD = """# Effects
 
-What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning. What it says of one is
+What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning; reports write it
+in words (`accel-bias-drift` as *accelerometer bias drift*). What it says of one is
 its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; the
 *separating experiment* is printed where a recording cannot separate two effects.
 [A new effect](../adding-an-effect.md) is one file.

@@ -50,7 +50,7 @@ _CALIBRATE = {
 _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "", WARNING): Words(
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
-        "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:first 8}.",
+        "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:ids first 8}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
         "each.",
@@ -102,11 +102,11 @@ _USE = {
         "Calibrate again as its findings say, or apply another calibration.",
     ),
     (Code.EFFECT_NOT_APPLIED, "of-session", NOTE): Words(
-        "{effect} of the extended calibration was not compensated: {why}.",
+        "The {effect:ids} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
     ),
     (Code.EFFECT_NOT_APPLIED, "", WARNING): Words(
-        "{effect} of the extended calibration was not compensated: {why}.",
+        "The {effect:ids} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
         "Log that channel, or update the program that applies the calibration.",
     ),
@@ -147,7 +147,7 @@ _TAKES_OFF = (
 )
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
-        "The calibration stays linear: with {effects:&, } the cross-validated error grows ({domain} from "
+        "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
         "{rms_before:.3g} to {rms_after:.3g} {unit:unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
@@ -158,19 +158,19 @@ _DIAGNOSE = {
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "none-but-disagree", WARNING): Words(
-        "The diagnosis accepted no effect: the linear model is unchanged, and {left:&, } still disagree with it.",
+        "The diagnosis accepted no effect, and {left:ids} stay unexplained. The linear model is unchanged.",
         "Something in this recording that no effect of the catalogue describes.",
         "`trihedron diagnose` shows where it occurs.",
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
-        "S and b were fitted together with {effects:&, }.",
+        "S and b were fitted together with {effects:ids}.",
         _MODELLED,
         _TAKES_OFF,
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:&, }; {left:&, } still disagree.",
+        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
         _MODELLED,
         _TAKES_OFF,
         numbers=("n_effects", "n_domains_left"),
@@ -216,7 +216,10 @@ _MANY_RECORDINGS = {
     ),
     **{
         (Code.PARAMETERS_CHANGED, f"{parameter}-{kind}", WARNING): Words(
-            f"{{what:& of }} {seen}.", cause, _MANY, numbers=("p_adjusted", "where")
+            f"The {{parameter:ids}}{{is_of_device:? of {{device}}|}} {seen}.",
+            cause,
+            _MANY,
+            numbers=("p_adjusted", "where"),
         )
         for parameter, cause in _CHANGED_CAUSE.items()
         for kind, seen in _CHANGED_SEEN.items()

@@ -16,6 +16,7 @@ A placeholder is a name and, after the colon, the format of its value:
 ``unit``                 ``m/s²`` for ``m/s^2``
 ``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
+``ids``                  ``gyro bias`` for ``gyro-bias``; several are listed, or as a further format says
 ``axis``                 ``X`` for 1 or ``x``
 ``axes`` · ``axes and ``  several axes, joined by comma or by the word: ``X, Y``, ``X and Z``
 ``letter``               ``x`` for 1
@@ -31,6 +32,7 @@ from string import Formatter
 from typing import Any
 
 from trihedron.arrays import XYZ
+from trihedron.report.names import id_in_print
 from trihedron.report.numbers import MINUS, listed, unit_in_print
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
@@ -100,6 +102,9 @@ def _in_words(value: Any, how: str, line: str) -> str:
         digits, _, unit = how[4:].partition(" ")
         alike = f"{digits} !{unit}" if unit else digits
         return ", ".join(_number(number, alike) for number in value) + (f" {unit}" if unit else "")
+    if how.startswith("ids"):
+        named = [id_in_print(one) for one in ([value] if isinstance(value, str) else value)]
+        return _in_words(named, how[4:] or "and", line)
     if how == "axis":
         return axis_name(value)
     if how == "letter":

@@ -1,0 +1,67 @@
+"""Names of effects, parameters, domains and axes in print."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from trihedron.report.numbers import listed
+
+LETTERS = 2
+"""Most letters of a name that consists of axes alone, as ``xy``."""
+MEANING = {
+    "static-accel": "gravity error in static poses",
+    "static-gyro": "gyro rate in static poses",
+    "moves": "tilt error after a rotation",
+    "dynamics": "velocity error over a rotation",
+    "rate": "angular rate beside the reference",
+    "within-static": "noise within static poses",
+    "timing": "time error of samples, seen in motion",
+    "parameters": "parameters of the model",
+    "noise": "noise and sampling",
+}
+"""Domains of residuals in words."""
+
+
+def axis_in_print(name: str) -> str:
+    """Axes as on the silkscreen: ``xy`` and ``gyro x`` as ``XY`` and ``gyro X``."""
+    sensor, gap, axis = name.rpartition(" ")
+    return f"{sensor}{gap}{axis.upper()}" if len(axis) <= LETTERS else name
+
+
+def id_in_print(name: str) -> str:
+    """An effect, a domain or a parameter in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
+    ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
+    return MEANING.get(name) or axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
+
+
+def label_of(group: str, name: str) -> str:
+    """A parameter as the label of a row or an axis: ``accel bias X``."""
+    return f"{_spaced(group)} {parameter_in_print(name)}"
+
+
+def _spaced(name: str) -> str:
+    return re.sub(r"(?<!-g)-(?!gyro)", " ", name)
+
+
+def ids_in_print(names: Iterable[str]) -> str:
+    """Several of them as ``a, b and c``."""
+    return listed([id_in_print(name) for name in names])
+
+
+def parameter_in_print(name: str) -> str:
+    """A parameter of an effect: symbols as they are, with ``σ`` for ``sigma``; ``range_x`` as ``range X``."""
+    stem, _, axis = name.replace("sigma_", "σ_").rpartition("_")
+    if not re.fullmatch(r"[xyz]+[+-]?", axis):
+        return name.replace("_", " ")
+    return f"{stem}_{axis}" if 0 < len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}".lstrip()
+
+
+def channel_in_print(channel: str) -> str:
+    """``gx`` and ``vx`` as ``X``; names other than axes (``norm``, ``angle``) unchanged."""
+    return channel[-1].upper() if len(channel) <= LETTERS else channel
+
+
+def term_in_print(term: str) -> str:
+    """A term of compared noise and sampling: figures of the poses are distinct from those of the whole log."""
+    return {"bandwidth": "-3 dB bandwidth in the poses", "jitter": "timestamp scatter"}.get(term, term)
