@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from diagnosed_session import simulated
 from trihedron.records import FindingCode, Recording
 from trihedron.segment import segment_recording
 from trihedron.simulate import (
@@ -248,3 +249,13 @@ def test_a_log_too_short_for_a_hold_is_a_finding_not_an_exception(n):
     rng = np.random.default_rng(n)
     short = Recording(np.arange(n) / 100.0, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), 100.0)
     assert FindingCode.NOT_STATIC in codes(segment_recording(short))
+
+
+def test_a_gyro_bias_that_jumps_costs_no_pose():
+    # Gravity stays where a rotation of that rate would tilt it by degrees; about the vertical it could be a rotation.
+    for seed in (1, 2):
+        recording, _ = simulated(seed=seed)
+        whole = segment_recording(recording).n_poses
+        gyro = recording.gyroscope.copy()
+        gyro[len(gyro) // 2 :, 1] += 0.5 * 131.0
+        assert segment_recording(replace(recording, gyroscope=gyro)).n_poses == whole

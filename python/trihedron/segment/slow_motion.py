@@ -14,6 +14,8 @@ from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.means import left_by_rounding
 from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
+TILT_SIGMAS = 6.0
+"""Standard errors of gravity by which a rotation that the gyro reads must differ from none to be a bias."""
 TURN_SIGMAS = 6.0
 """Deviation of a quiet gyro from the common bias, in robust standard deviations, from which it rotates."""
 
@@ -63,11 +65,14 @@ def turning_blocks(
         if not len(flagged):
             continue
         is_slow = bool((np.abs(second[flagged] - bias).max(axis=0) < CREEP_PART * top).all())
+        first, last = int(flagged[0]), int(flagged[-1]) + 1
         if radians_per_reading is not None:
             # To a factor of two, the uncertainty of the scale.
             turned = (reading[flagged] - bias).sum(axis=0) * channels.step_s * radians_per_reading
+            if is_slow and gravity is not None and _would_tilt(channels, first, last, turned):
+                out[a:b] = False
             is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
-        if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
+        if gravity is not None and is_slow and _tilts_a_little(channels, first, last, gravity):
             out[a:b] = False
         for first, last in ranges_of(out[a:b]):
             # Any rotation fills a whole second of windows; at the ends of the range it may continue outside.
@@ -95,6 +100,26 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     # The halves' means differ by half of the whole drift.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
     return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
+
+
+def _would_tilt(channels: Channels, first: int, last: int, turned: FloatArray) -> bool:
+    """Whether gravity contradicts a rotation by ``turned`` (rad), and agrees with none: the gyro reads a bias."""
+    attitude = channels.mean[first:last, ~channels.is_gyroscope]
+    half = len(attitude) // 2
+    if half < 1 or attitude.shape[1] != len(turned):
+        return False
+    # The halves' means differ by half of the whole change.
+    change = 2.0 * (attitude[-half:].mean(axis=0) - attitude[:half].mean(axis=0))
+    # Noise that does not dither an LSB hides a change inside it.
+    rounding = 2.0 * channels.quantisation_variance[~channels.is_gyroscope]
+    variance = 4.0 * ((np.diff(attitude, axis=0) ** 2).mean(axis=0) / half + rounding)
+    live = variance > 0.0
+    expected = np.cross(attitude.mean(axis=0), turned)
+    # Of either sign, for gyros whose signs are not yet known.
+    against = min(
+        float((((change - sign * expected) ** 2 - change**2)[live] / variance[live]).sum()) for sign in (1, -1)
+    )
+    return against > TILT_SIGMAS**2
 
 
 def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
