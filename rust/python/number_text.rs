@@ -4,51 +4,15 @@ use std::alloc::{self, Layout};
 
 use numpy::PyUntypedArrayMethods;
 use numpy::ndarray::Array2;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray2};
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::number_text::{self, Block};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(plain_table, module)?)?;
     module.add_function(wrap_pyfunction!(new_array, module)?)?;
     module.add_function(wrap_pyfunction!(plain_table_into, module)?)
-}
-
-/// The columns of a plain table of numbers, or `None` where the text is anything else.
-#[pyfunction]
-fn plain_table<'py>(
-    py: Python<'py>,
-    text: &[u8],
-    separator: u8,
-    n_columns: usize,
-) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-    if n_columns == 0 {
-        return Ok(None);
-    }
-    let rows = text.split(|&b| b == b'\n').count();
-    let found = super::run(py, || {
-        let mut columns = vec![vec![0.0; rows]; n_columns];
-        let places: Vec<(usize, usize)> = (0..n_columns).map(|i| (i, 0)).collect();
-        let blocks = columns
-            .iter_mut()
-            .map(|rows| Block { rows, width: 1 })
-            .collect();
-        let done = number_text::plain_table(text, separator, &places, blocks);
-        Ok(done.is_read.then(|| {
-            columns
-                .into_iter()
-                .flat_map(|column| column.into_iter().take(done.rows))
-                .collect::<Vec<f64>>()
-        }))
-    })?;
-    found
-        .map(|flat| {
-            let rows = flat.len() / n_columns;
-            PyArray1::from_vec(py, flat).reshape([n_columns, rows])
-        })
-        .transpose()
 }
 
 /// Zeros `(rows, width)` whose memory is committed in small pages, when it is written to.

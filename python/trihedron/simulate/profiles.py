@@ -33,7 +33,6 @@ class Profile:
     """
 
     name: str
-    about: str
     accelerometer: Accelerometer
     gyroscope: Gyroscope
     clock: Clock
@@ -77,7 +76,6 @@ _b_w = -np.asarray(_MANUAL_S_W) @ np.asarray(_MANUAL_OFFSET_COUNTS)
 
 ANALOG_6DOF = Profile(
     name="analog-6dof",
-    about="analog 6-DOF board with a 10-bit ADC, 50 Hz: the laboratory manual's unit",
     accelerometer=Accelerometer(
         S=_MANUAL_S_F,
         b=_MANUAL_B_F,
@@ -103,7 +101,6 @@ ANALOG_6DOF = Profile(
 # 131 LSB/(°/s) ±3 %, cross-axis ±2 %, ±20 °/s, 0.005 °/s/√Hz. Bias instability and random walk: measured on such parts.
 MPU = Profile(
     name="mpu",
-    about="consumer 16-bit part (MPU-6050/9150), 100 Hz",
     accelerometer=Accelerometer(
         S=_diagonal(STANDARD_GRAVITY_M_S2 / 16384.0),
         unit=AccelerationUnit.COUNTS,
@@ -127,7 +124,6 @@ MPU = Profile(
 # 0.2 m/s/√h, 0.2 mg in-run; both 330 Hz; misalignment 0.2° axis to axis; scale ±1 %.
 ADIS = Profile(
     name="adis",
-    about="industrial 14-bit part (ADIS16405), 100 Hz",
     accelerometer=Accelerometer(
         S=_diagonal(3.33 * _MG),
         unit=AccelerationUnit.COUNTS,
@@ -151,7 +147,6 @@ ADIS = Profile(
 # 0.06 m/s/√h, 0.05 mg, scale 300 ppm, ±0.75 mg, 1 mrad; 24-bit words (0.22 °/h, 1.9 µg).
 TACTICAL = Profile(
     name="tactical",
-    about="tactical-grade MEMS unit (STIM300), 250 Hz, SI output",
     accelerometer=Accelerometer(
         noise=NoiseTerms(N=triple(0.06 * _PER_ROOT_HOUR), B=triple(0.05 * _MG), K=triple(5e-7)),
         adc=Adc(0.0019 * _MG, -10.0 * STANDARD_GRAVITY_M_S2, 10.0 * STANDARD_GRAVITY_M_S2),
