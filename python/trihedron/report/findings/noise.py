@@ -33,6 +33,12 @@ _LOG = {
         "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
+    (Code.LOG_MOTION, "turns", SERIOUS): Words(
+        "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: this log is not static.",
+        "the sensor was carried, turned or flown.",
+        "N, B and K here are those of the motion; record a static log, or compare the motion with a reference: "
+        "`trihedron noise LOG --reference FILE`.",
+    ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
         "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
