@@ -208,8 +208,8 @@ def _certainty(calibration: Calibration) -> list[Block]:
         if seen.weakest:
             rows.append(("least certain", seen.weakest))
         # Without a problem one pose is enough; findings name all that are missing.
-        if seen.advice:
-            rows.append((f"most useful next {'pose' if name == 'accelerometer' else 'move'}", seen.advice[0]))
+        if seen.advice and name == "accelerometer":
+            rows.append(("most useful next pose", seen.advice[0]))
         if sensor.quality is not None and sensor.quality.dof > 0:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))

@@ -74,9 +74,7 @@ def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]
 
 
 def _advice(calibration: Calibration) -> list[Block]:
-    rows = tuple(
-        (f"most useful next {'pose' if name == 'accelerometer' else 'move'}, {name}", sensor.observability.advice[0])
-        for name, sensor in calibrated_sensors(calibration)
-        if sensor.observability is not None and sensor.observability.advice
-    )
-    return [Facts(rows)] if rows else []
+    """The next pose where poses suffice; moves have an advice only where a finding gives it."""
+    sensor = calibration.accelerometer
+    seen = None if sensor is None else sensor.observability
+    return [Facts((("most useful next pose", seen.advice[0]),))] if seen is not None and seen.advice else []

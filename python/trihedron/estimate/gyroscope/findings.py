@@ -198,26 +198,21 @@ def _worst(covariance: FloatArray, S: FloatArray) -> float:
 
 
 def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
-    lines = []
+    """Turns to add, axes of one protocol together; an axis's own element S_ij shows while axis i is level, so that its
+    turn starts with the third axis up."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
+    turns: dict[tuple[bool, bool, int], list[int]] = {}
     for axis in range(3):
         weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]
         if not weak:
             continue
-        # The element S_ij is observable while axis i is horizontal: start with the third axis vertical.
         across = next((rate for rate in weak if rate != axis), axis)
-        lines.append(
-            words(
-                "turn-about",
-                axis=axis + 1,
-                start=len(weak) < 3 and across != axis,
-                upright=3 - axis - across + 1,
-                is_twice=len(weak) == 3,
-            )
-        )
-    if not lines and rank < 9:
-        lines.append(words("moves-about-all"))
-    return lines
+        start = len(weak) < 3 and across != axis
+        upright = 3 - axis - across + 1 if start else 0
+        turns.setdefault((start, len(weak) == 3, upright), []).append(axis + 1)
+    if turns:
+        return [words("turns-about", turns=[(axes, *how) for how, axes in turns.items()])]
+    return [words("moves-about-all")] if rank < 9 else []
 
 
 def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> Iterator[Finding]:
