@@ -32,12 +32,13 @@ def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
     """The finding that states the role of each column, and the columns without a role."""
     roles = []
-    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply", "counter"):
         value = getattr(columns, role)
         if value is not None:
             which = value if isinstance(value, tuple) else (value,)
             roles.append((role, " ".join(table.label(c) for c in which)))
-    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    used = {*columns.used(), columns.counter}
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in used and len(table.columns[c])]
     return Finding.of(
         FindingCode.COLUMNS_RECOGNISED,
         has_file=bool(file_name),
