@@ -42,7 +42,8 @@ class Command(typer.core.TyperCommand):
             record = parameter.get_help_record(ctx)
             if record is None:
                 continue
-            rows[_group_of(parameter)].append(record)
+            # Without the type in Python: "LOG", not "LOG <list[Path]>".
+            rows[_group_of(parameter)].append((record[0].split(" <")[0], record[1]))
         for title, members in rows.items():
             if members:
                 with formatter.section(title):
