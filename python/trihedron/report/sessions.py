@@ -16,7 +16,7 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark,
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import each_with_sigma, how_many, listed, plain_number, shown, with_sigma
+from trihedron.report.numbers import capital, each_with_sigma, how_many, listed, plain_number, shown, with_sigma
 
 DRIFTING = {
     "accel-bias": "accelerometer bias",
@@ -28,10 +28,7 @@ DRIFTING = {
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = (
-    "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`. Their uncertainty is that "
-)
-NEXT += "of the next recording."
+NEXT = "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -61,7 +58,7 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = agree
     if changed:
         parameters = listed(list(dict.fromkeys(change.id for change in changed)))
-        usable = f"{how_many(n, 'recording')} of which {parameters} changed"
+        usable = f"{capital(parameters)} changed between {how_many(n, 'recording')}"
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
@@ -145,7 +142,7 @@ def _repeatability(model: SessionsModel) -> list[Block]:
             tuple(head),
             tuple(rows),
             "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
-            f"{BIAS}; scales are raw counts per unit, relative to the common value; misalignments are departures "
+            f"{BIAS}; scales are raw readings per unit, relative to the common value; misalignments are departures "
             f"from 90°; {TRIAD}.",
         )
     ]
