@@ -119,7 +119,8 @@ _COLUMNS = {
     (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log contains raw and corrected readings, or several devices.",
-        "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
+        "A calibration wants the uncorrected ones; if this is wrong, give --columns, which names all to read: "
+        "{mapping}.",
     ),
     (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
         "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",
