@@ -95,9 +95,10 @@ def test_a_unit_in_the_name_of_one_axis_is_that_of_all_three(tmp_path):
 
 
 def test_of_two_accelerometers_one_is_taken_and_the_columns_of_the_other_are_given(tmp_path):
-    path = log_of(tmp_path, "t,adxl_ax,adxl_ay,adxl_az,bmi_ax,bmi_ay,bmi_az,gx,gy,gz", lambda row: [*row[:4], *row[1:]])
-    (found,) = [f for f in trihedron.read(path).findings if "More than one triad" in f.seen]
-    assert "'bmi_ax' 'bmi_ay' 'bmi_az' not used" in found.seen
+    header = "t,accel_a_x,accel_a_y,accel_a_z,accel_b_x,accel_b_y,accel_b_z,gx,gy,gz"
+    read = trihedron.read(log_of(tmp_path, header, lambda row: [*row[:4], *row[1:]]))
+    (found,) = [f for f in read.findings if "More than one triad" in f.seen]
+    assert "'accel_b_x' 'accel_b_y' 'accel_b_z' not used" in found.seen
     assert "time=1,ax=5,ay=6,az=7,gx=8,gy=9,gz=10" in found.action
 
 
