@@ -22,7 +22,7 @@ from trihedron.estimate.filter_noise.static_intervals import (
 )
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise
-from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
+from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
     BiasModel,
     Bounded,
@@ -101,10 +101,14 @@ def filter_noise(
     _check(recording, horizons, band_hz)
     gravity, _, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     band = BAND_PART * recording.rate_hz if band_hz is None else float(band_hz)
+    if isinstance(static, str | os.PathLike) and not os.fspath(static).lower().endswith(".json"):
+        static = allan(read(static))
+    doubts = static.findings if isinstance(static, Noise) else ()
     segments = None if static is not None and reference is not None else _segments(recording)
     own = None if segments is None else _of_rest(recording, segments)
     known = _static(static) if static is not None else _sensors(own)
-    findings = (*recording.findings, *(said if reference is not None else ()))
+    serious = tuple(finding for finding in doubts if finding.severity is Severity.SERIOUS)
+    findings = (*recording.findings, *serious, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
@@ -187,11 +191,9 @@ def _sensors(found: Noise | None) -> Static:
 
 def _static(given: Noise | str | os.PathLike[str]) -> Static:
     """Static noise by sensor, from what was given."""
-    if isinstance(given, str | os.PathLike) and os.fspath(given).lower().endswith(".json"):
+    if isinstance(given, str | os.PathLike):
         figures, _ = read_noise(given)
         return {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
-    if isinstance(given, str | os.PathLike):
-        given = allan(read(given))
     if not isinstance(given, Noise):
         raise WrongTypeError(
             f"static is what trihedron.allan found, or the name of a file, not {type(given).__name__}."

@@ -34,9 +34,9 @@ _LOG = {
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
     (Code.LOG_MOTION, "turns", SERIOUS): Words(
-        "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: this log is not static.",
+        "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: the log given as static moves.",
         "the sensor was carried, turned or flown.",
-        "N, B and K here are those of the motion; record a static log, or compare the motion with a reference: "
+        "Its N, B and K are those of the motion; record a static log, or compare the motion with a reference: "
         "`trihedron noise LOG --reference FILE`.",
     ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
