@@ -21,7 +21,7 @@ from trihedron.estimate.filter_noise.static_intervals import (
     unlike_axes,
 )
 from trihedron.files.formats.contract import NoiseFigure
-from trihedron.files.noise import read_noise
+from trihedron.files.noise import read_noise, read_noise_findings
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
     BiasModel,
@@ -103,12 +103,10 @@ def filter_noise(
     band = BAND_PART * recording.rate_hz if band_hz is None else float(band_hz)
     if isinstance(static, str | os.PathLike) and not os.fspath(static).lower().endswith(".json"):
         static = allan(read(static))
-    doubts = static.findings if isinstance(static, Noise) else ()
     segments = None if static is not None and reference is not None else _segments(recording)
     own = None if segments is None else _of_rest(recording, segments)
     known = _static(static) if static is not None else _sensors(own)
-    serious = tuple(finding for finding in doubts if finding.severity is Severity.SERIOUS)
-    findings = (*recording.findings, *serious, *(said if reference is not None else ()))
+    findings = (*recording.findings, *_doubts(static), *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
@@ -205,6 +203,14 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
             "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )
     return known
+
+
+def _doubts(static: Noise | str | os.PathLike[str] | None) -> tuple[Finding, ...]:
+    """Serious findings on the static log."""
+    if static is None:
+        return ()
+    said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
+    return tuple(finding for finding in said if finding.severity is Severity.SERIOUS)
 
 
 def _bounded(figure: NoiseFigure) -> Bounded:
