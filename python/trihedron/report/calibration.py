@@ -197,6 +197,13 @@ def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     return Table(tuple(head), tuple(zip(*columns, strict=True)), caption)
 
 
+def next_pose(calibration: Calibration) -> str:
+    """The pose that would lower uncertainties most; empty where a finding names the poses to add."""
+    sensor = calibration.accelerometer
+    advice = () if sensor is None or sensor.observability is None else sensor.observability.advice[:1]
+    return next((pose for pose in advice if not any(pose in one.action for one in calibration.findings)), "")
+
+
 def _certainty(calibration: Calibration) -> list[Block]:
     blocks: list[Block] = []
     for name, sensor in calibrated_sensors(calibration):
@@ -207,9 +214,8 @@ def _certainty(calibration: Calibration) -> list[Block]:
         rows = [(name, f"{determined}, condition {plain_number(seen.condition)}")]
         if seen.weakest:
             rows.append(("least certain", seen.weakest))
-        # Without a problem one pose is enough; findings name all that are missing.
-        if seen.advice and name == "accelerometer":
-            rows.append(("most useful next pose", seen.advice[0]))
+        if name == "accelerometer" and (pose := next_pose(calibration)):
+            rows.append(("most useful next pose", pose))
         if sensor.quality is not None and sensor.quality.dof > 0:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))

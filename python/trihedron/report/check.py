@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of, calibrated_sensors
+from trihedron.report.calibration import next_pose
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -74,7 +75,6 @@ def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]
 
 
 def _advice(calibration: Calibration) -> list[Block]:
-    """The next pose where poses suffice; moves have an advice only where a finding gives it."""
-    sensor = calibration.accelerometer
-    seen = None if sensor is None else sensor.observability
-    return [Facts((("most useful next pose", seen.advice[0]),))] if seen is not None and seen.advice else []
+    """The next pose where poses suffice; else a finding names those to add, as it does moves."""
+    pose = next_pose(calibration)
+    return [Facts((("most useful next pose", pose),))] if pose else []
