@@ -64,7 +64,7 @@ _SPECTRUM = {
         "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
-        lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"},
+        lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2:unit})"},
     ),
     (Code.SPECTRUM_LOW_PASS, "throughout", SERIOUS): Words(
         "No part of the upper spectrum is a sum of noise terms.",
