@@ -114,7 +114,7 @@ def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     assert "trihedron allan --json" in capsys.readouterr().err
     # Noise of a log that moves is written, and not to be trusted.
     moving = json.loads((tmp_path / "allan.json").read_text())
-    words = {"seen": "It moves.", "cause": "", "action": ""}
+    words = {"seen": "It moves.", "cause": "", "action": "", "numbers": {}}
     moving["findings"].append({"code": "log-motion", "severity": "serious", **words})
     (tmp_path / "moving.json").write_text(json.dumps(moving))
     assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "moving.json")]) == 2

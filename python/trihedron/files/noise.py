@@ -13,6 +13,7 @@ from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
 from trihedron.records.finding import Finding
 from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.plain import from_plain
 
 MEANT = "name a file written by `trihedron allan --json`"
 _OF_A_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate", "fitted")
@@ -67,7 +68,7 @@ def read_noise_findings(path: str | os.PathLike[str]) -> tuple[Finding, ...]:
     document = read_json(path, "file of noise terms", MEANT, NoiseFileError)
     try:
         said = [one for part in (document, *document["axes"]) for one in part.get("findings", ())]
-        return tuple(Finding(one["code"], one["severity"], one["seen"], one["cause"], one["action"]) for one in said)
+        return tuple(from_plain(one, Finding) for one in said)
     except (AttributeError, KeyError, TypeError, ValueError):
         raise NoiseFileError(f"{Path(path)}: its findings are not those of a static log; {MEANT}.") from None
 
