@@ -32,12 +32,12 @@ from trihedron.report.numbers import (
     power_of_ten,
     unit_in_print,
 )
+from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = "Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: `trihedron apply FILE LOG`, "
-NEXT += "`trihedron export FILE --to c`."
+NEXT = f"Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}

@@ -17,6 +17,7 @@ from trihedron.report.document import Block, Document, Facts, Headline, Paragrap
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import capital, each_with_sigma, how_many, listed, plain_number, shown, with_sigma
+from trihedron.report.verification import USES
 
 DRIFTING = {
     "accel-bias": "accelerometer bias",
@@ -28,7 +29,7 @@ DRIFTING = {
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = "Use the common parameters: `trihedron apply FILE LOG`, `trihedron export FILE --to c`."
+NEXT = f"Use the common parameters: {USES}."
 
 
 def sessions_report(model: SessionsModel) -> Document:
