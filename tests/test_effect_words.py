@@ -81,7 +81,7 @@ def test_an_effect_of_a_users_own_file_brings_its_own_words():
     own = Own()
     own.id = "moon"
     strongest = (EffectParameter("m_x", 1.0, 0.5, "1"), EffectParameter("m_y", 2.0, 0.1, "m/s^2"))
-    assert own.statement(strongest) == "the readings follow the moon (strongest term m_y: 2 ± 0.1 m/s^2)."
+    assert own.statement(strongest) == "the readings follow the moon (strongest term m_y: 2 ± 0.1 m/s²)."
     assert own.separating_experiment() == "wait a fortnight"
     with pytest.raises(KeyError):
         own.reported("no such case")

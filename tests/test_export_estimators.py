@@ -1,5 +1,6 @@
 """What estimators make of the noise in their files, by their own sources, is N² a second of angle and K² of bias."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -111,3 +112,10 @@ def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     assert document["update_rate"] == pytest.approx(100.0, rel=1e-3)
     assert main(["export", str(file), "--to", "kalibr", "--noise", str(file)]) == 1
     assert "trihedron allan --json" in capsys.readouterr().err
+    # Noise of a log that moves is written, and not to be trusted.
+    moving = json.loads((tmp_path / "allan.json").read_text())
+    words = {"seen": "It moves.", "cause": "", "action": "", "numbers": {}}
+    moving["findings"].append({"code": "log-motion", "severity": "serious", **words})
+    (tmp_path / "moving.json").write_text(json.dumps(moving))
+    assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "moving.json")]) == 2
+    assert "It moves." in capsys.readouterr().err

@@ -58,7 +58,7 @@ def test_pose_numbers_pick_poses_and_a_mismatch_is_said(head, table):
     recording, segments = head
     few = PoseTable(table.specific_force[::9], pose=np.arange(0, 324, 9))
     assert len(pose_readings(recording, segments, few).mean) == 36
-    with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 poses"):
+    with pytest.raises(ValueError, match=r"has 36 rows, but .* has 324 poses"):
         pose_readings(recording, segments, PoseTable(table.specific_force[::9]))
     with pytest.raises(ValueError, match="pose 500 is requested"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:1], pose=np.array([499])))

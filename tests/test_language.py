@@ -183,6 +183,10 @@ def pages() -> Said:
         text = re.sub(r"^ +(trihedron|from|import) .*$", "", text, flags=re.MULTILINE)
         text = re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
         yield name, re.sub(ALLOWED[name], "", text) if name in ALLOWED else text
+    for page in (ROOT / "docs").rglob("*.ipynb"):
+        cells = json.loads(page.read_text(encoding="utf-8"))["cells"]
+        said = "\n".join("".join(cell["source"]) for cell in cells)
+        yield str(page.relative_to(ROOT)), re.sub(r"`[^`\n]*`", "", said)
     # What stands on an index and above a site.
     for name in ("pyproject.toml", "Cargo.toml", "mkdocs.yml", "CITATION.cff"):
         text = (ROOT / name).read_text(encoding="utf-8")

@@ -96,6 +96,18 @@ def test_knocks_and_shaking_are_left_out_and_named(quiet):
         assert any(start <= first <= stop for start, stop in noise.excluded_s)
 
 
+@pytest.mark.parametrize(("white", "tilt", "is_moving"), [(0.004, 0.0, False), (0.05, 0.0, False), (0.004, 0.3, True)])
+def test_a_log_that_moves_is_not_to_be_trusted(white, tilt, is_moving):
+    """Noise of 0.4 and 5 mg/√Hz beside a bias that warms by 0.1 g; a hand that tilts all the time makes no event."""
+    rng, n = np.random.default_rng(5), 12_000
+    t = np.arange(n) / RATE
+    angle = tilt * np.sin(2 * np.pi * 0.21 * t) * np.sin(2 * np.pi * 0.034 * t)
+    force = 9.81 * np.column_stack([np.sin(angle), 0.1 * t / t[-1], np.cos(angle)])
+    force += white * np.sqrt(RATE) * rng.normal(size=(n, 3))
+    found = identify_noise(force, RATE, names=("accel x", "accel y", "accel z"))
+    assert any(f.code is FindingCode.LOG_MOTION and f.severity is Severity.SERIOUS for f in found.findings) is is_moving
+
+
 def test_a_periodic_line_is_found_with_its_amplitude(quiet):
     t = np.arange(len(quiet)) / RATE
     noise = identify_noise(quiet + 1e-3 * np.sin(2 * np.pi * 7.3 * t), RATE)

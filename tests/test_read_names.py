@@ -94,6 +94,14 @@ def test_a_unit_in_the_name_of_one_axis_is_that_of_all_three(tmp_path):
     assert (read.accelerometer_unit.value, read.gyroscope_unit.value) == ("m/s^2", "deg/s")
 
 
+def test_of_two_accelerometers_one_is_taken_and_the_columns_of_the_other_are_given(tmp_path):
+    header = "t,accel_a_x,accel_a_y,accel_a_z,accel_b_x,accel_b_y,accel_b_z,gx,gy,gz"
+    read = trihedron.read(log_of(tmp_path, header, lambda row: [*row[:4], *row[1:]]))
+    (found,) = [f for f in read.findings if "More than one triad" in f.seen]
+    assert "'accel_b_x' 'accel_b_y' 'accel_b_z' not used" in found.seen
+    assert "time=1,ax=5,ay=6,az=7,gx=8,gy=9,gz=10" in found.action
+
+
 def test_an_axis_without_numbers_is_named(tmp_path):
     named = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     read = trihedron.read(log_of(tmp_path, named, lambda row: [*row[:2], "north", *row[3:]]))

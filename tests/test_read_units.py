@@ -76,6 +76,17 @@ def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_grav
     assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
 
 
+@pytest.mark.parametrize("names", ["t,gx,gy,gz,ax,ay,az", "t [s],gx [rad/s],gy [rad/s],gz [rad/s],ax [m/s^2],ay,az"])
+def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(tmp_path, names):
+    time_s, force, rate = session()
+    path = saved(tmp_path / "log.csv", time_s, force, rate, f"{names}\n")
+    (found,) = [f for f in read_recording(path).findings if f.code is FindingCode.SENSORS_EXCHANGED]
+    assert found.severity is Severity.SERIOUS
+    recording = read_recording(path, columns=found.action.split("--columns ")[1].rstrip("."))
+    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
+    assert FindingCode.SENSORS_EXCHANGED not in {f.code for f in recording.findings}
+
+
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
     time_s, force, rate = session(n_poses=1, turn_s=0.0)
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))

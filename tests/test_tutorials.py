@@ -8,6 +8,7 @@ import re
 import shlex
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 
 from documented import DOCS, blocks
@@ -88,6 +89,24 @@ def test_the_notebook_runs_and_was_run(tmp_path, monkeypatch):
 def words_of(text):
     """A text without its figures, whose last digits are another machine's, and without the layout of a page."""
     return re.findall(r"[^\W\d_]{3,}", re.sub(r"<(style|script|svg)\b.*?</\1>|<[^>]*>", " ", text, flags=re.DOTALL))
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "docs/noise.md"])
+def test_the_python_of_a_page_runs_on_logs_of_its_names(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # In SI, as most logs are: the estimators' formats have no counts.
+    assert main(["simulate", "--template", "si.toml"]) == 0
+    for seed, name in ((3, "log.csv"), (4, "second-session.csv")):
+        assert main(["simulate", "si.toml", "--seed", str(seed), "-o", name]) == 0
+    force = np.random.default_rng(1).normal([0.0, 0.0, 9.81], 0.02, (6000, 3))
+    rate = np.random.default_rng(2).normal(0.0, 0.001, (6000, 3))
+    static = np.column_stack([np.arange(6000) / 100.0, force, rate])
+    header = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    np.savetxt("static.csv", static, delimiter=",", header=header, comments="")
+    shown = [block.text for block in blocks(DOCS.parent / page) if block.language == "python"]
+    assert shown
+    for text in shown:
+        exec(compile(text, page, "exec"), {})
 
 
 def test_every_kind_of_reader_has_a_tutorial():

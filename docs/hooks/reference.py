@@ -13,6 +13,7 @@ import typer
 
 import trihedron
 from trihedron.cli import build_app
+from trihedron.cli.help import described
 from trihedron.report.effects.page import page as effects
 from trihedron.report.findings.page import page as findings
 
@@ -26,7 +27,7 @@ def commands() -> str:
         out += ["", f"## {name}", "", (command.help or "").split("\f")[0].strip(), ""]
         context = command.context_class(command, info_name=f"trihedron {name}")
         out += ["```text", " ".join([f"trihedron {name}", *command.collect_usage_pieces(context)]), "```", ""]
-        rows = [record for parameter in command.get_params(context) if (record := parameter.get_help_record(context))]
+        rows = [cells for _, *cells in described(command, context)]
         out += ["| argument or option | |", "|---|---|"] if rows else []
         out += [f"| `{_cell(left)}` | {_cell(right)} |" for left, right in rows]
     return "\n".join(out) + "\n"

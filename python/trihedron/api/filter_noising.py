@@ -22,8 +22,8 @@ from trihedron.estimate.filter_noise.static_intervals import (
     unlike_axes,
 )
 from trihedron.files.formats.contract import NoiseFigure
-from trihedron.files.noise import read_noise
-from trihedron.records import Finding, FindingCode, Noise, Recording, Segments
+from trihedron.files.noise import read_noise, read_noise_findings
+from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
     BiasModel,
     Bounded,
@@ -104,10 +104,12 @@ def filter_noise(
     _check(recording, horizons, band_hz)
     gravity, _, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     band = BAND_PART * recording.rate_hz if band_hz is None else float(band_hz)
+    if isinstance(static, str | os.PathLike) and not os.fspath(static).lower().endswith(".json"):
+        static = allan(read(static))
     segments = None if static is not None and reference is not None else _segments(recording)
     own = None if segments is None else _of_rest(recording, segments)
     known = _static(static) if static is not None else _sensors(own)
-    findings = (*recording.findings, *(said if reference is not None else ()))
+    findings = (*recording.findings, *_doubts(static), *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
@@ -190,11 +192,9 @@ def _sensors(found: Noise | None) -> Static:
 
 def _static(given: Noise | str | os.PathLike[str]) -> Static:
     """Static noise by sensor, from what was given."""
-    if isinstance(given, str | os.PathLike) and os.fspath(given).lower().endswith(".json"):
+    if isinstance(given, str | os.PathLike):
         figures, _ = read_noise(given)
         return {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
-    if isinstance(given, str | os.PathLike):
-        given = allan(read(given))
     if not isinstance(given, Noise):
         raise WrongTypeError(
             f"static is what trihedron.allan found, or the name of a file, not {type(given).__name__}."
@@ -206,6 +206,14 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
             "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )
     return known
+
+
+def _doubts(static: Noise | str | os.PathLike[str] | None) -> tuple[Finding, ...]:
+    """Serious findings on the static log."""
+    if static is None:
+        return ()
+    said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
+    return tuple(finding for finding in said if finding.severity is Severity.SERIOUS)
 
 
 def _bounded(figure: NoiseFigure) -> Bounded:

@@ -23,8 +23,11 @@ from trihedron.cli.streamed import calibrate_stream, needs_stream
 
 FIRST_SCREEN = 2
 OPTIONS = {
-    "method": "joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces.",
-    "frame": "Body frame: lower (lower-triangular, X along accelerometer X), symmetric, or case (with --method faces).",
+    "method": ("NAME", "joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."),
+    "frame": (
+        "NAME",
+        "Body frame: lower (lower-triangular, X along accelerometer X), symmetric, or case (with --method faces).",
+    ),
     "faces": (
         "LIST",
         "With --method faces: axis up in each pose, 1 for +X to -3 for -Z, '1,-1,2,-2,3,-3'; 0 excludes one.",

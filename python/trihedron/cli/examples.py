@@ -83,7 +83,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Is the vendor's right? Which is best?", "trihedron verify today.csv cal.json camera.json imu-result.yaml"),
     ),
     "diagnose": (
-        ("What the linear model leaves out:", "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html"),
+        (
+            "Which effects are missing from the linear model?",
+            "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html",
+        ),
         ("Which effects are the unit's own?", "trihedron diagnose mon.csv tue.csv wed.csv --latitude 50.1"),
         ("Is this still the sensor of last year?", "trihedron diagnose log.csv --calibration cal.json"),
         ("Why does my simulation not fit?", "trihedron diagnose log.csv --against sim.toml --improved better.toml"),

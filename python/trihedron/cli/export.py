@@ -60,6 +60,7 @@ def export(
     check_outputs(*(() if folder else (output,)), force=force, inputs=(*calibration, noise))
     from trihedron.api.exporting import export as made_of
     from trihedron.files.formats import any_calibration
+    from trihedron.files.noise import read_noise_findings
 
     known = [any_calibration(path) for path in calibration]
     options: dict[str, Any] = {"noise": noise, "rate_hz": rate, "topic": topic, "accelerometer_lsb": accel_lsb}
@@ -76,7 +77,8 @@ def export(
         # Comments of the file about lost information are repeated on stderr.
         if any(word in line for word in LOSSES):
             say(line.strip(' #/*%",'))
-    leave(tuple(finding for one in known for finding in one.findings))
+    doubts = () if noise is None else read_noise_findings(noise)
+    leave((*doubts, *(finding for one in known for finding in one.findings)))
 
 
 def _names(paths: list[Path]) -> list[str]:

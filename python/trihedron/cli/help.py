@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import typer.core
@@ -38,11 +39,8 @@ class Command(typer.core.TyperCommand):
         """Arguments, then options by group."""
         rows: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
         rows |= {title: [] for title, _ in OPTION_GROUPS}
-        for parameter in self.get_params(ctx):
-            record = parameter.get_help_record(ctx)
-            if record is None:
-                continue
-            rows[_group_of(parameter)].append(record)
+        for parameter, left, right in described(self, ctx):
+            rows[_group_of(parameter)].append((left, right))
         for title, members in rows.items():
             if members:
                 with formatter.section(title):
@@ -88,6 +86,14 @@ class Group(typer.core.TyperGroup):
         del ctx
         with formatter.section("Begin with"):
             formatter.write_dl([(line, words) for words, line in EXAMPLES[""]])
+
+
+def described(command: Any, ctx: Any) -> Iterator[tuple[Any, str, str]]:
+    """Every argument and option of a command with its two cells of help, without types of Python (``LOG <path>``)."""
+    for parameter in command.get_params(ctx):
+        record = parameter.get_help_record(ctx)
+        if record is not None:
+            yield parameter, record[0].split(" <")[0], record[1]
 
 
 def _group_of(parameter: Any) -> str:

@@ -21,7 +21,10 @@ OPTIONS = {
         "FILE",
         "A static log, the JSON that trihedron allan writes of one, or a JSON of Allan coefficients.",
     ),
-    "frame": "Body frame without a pose table: lower (lower-triangular, X along accelerometer X) or symmetric.",
+    "frame": (
+        "NAME",
+        "Body frame without a pose table: lower (lower-triangular, X along accelerometer X) or symmetric.",
+    ),
     "full": "Print the whole report.",
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typing
 
 from trihedron.cli.examples import EXAMPLES
+from trihedron.cli.help import described
 
 if typing.TYPE_CHECKING:
     from typing import Any
@@ -30,8 +31,7 @@ def manual(group: Any) -> str:
         lines += [f".SS {_set(' '.join([name, *command.collect_usage_pieces(context)]))}"]
         paragraphs = (command.help or "").split("\f")[0].strip().split("\n\n")
         lines += [line for paragraph in paragraphs for line in (_set(paragraph), ".PP")][:-1]
-        records = (parameter.get_help_record(context) for parameter in command.get_params(context))
-        for left, right in filter(None, records):
+        for _, left, right in described(command, context):
             lines += [".TP", f".B {_set(left)}", _set(right)]
         for words, example in EXAMPLES.get(name, ()):
             lines += [".PP", _set(words), ".RS", ".EX", _set(example), ".EE", ".RE"]

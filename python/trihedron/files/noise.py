@@ -11,7 +11,9 @@ from typing import Any
 from trihedron.documents import read_json
 from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
+from trihedron.records.finding import Finding
 from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.plain import from_plain
 
 MEANT = "name a file written by `trihedron allan --json`"
 _OF_A_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate", "fitted")
@@ -56,6 +58,19 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
             "--gyro-lsb, or with --calibration FILE."
         )
     return out, rate
+
+
+def read_noise_findings(path: str | os.PathLike[str]) -> tuple[Finding, ...]:
+    """Findings on the static log behind a file that ``trihedron allan --json`` writes, those of its axes included.
+
+    Raises ``InputError`` when the file is missing or no JSON, or its findings lack their words.
+    """
+    document = read_json(path, "file of noise terms", MEANT, NoiseFileError)
+    try:
+        said = [one for part in (document, *document["axes"]) for one in part.get("findings", ())]
+        return tuple(from_plain(one, Finding) for one in said)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise NoiseFileError(f"{Path(path)}: its findings are not those of a static log; {MEANT}.") from None
 
 
 def read_noise_axes(path: str | os.PathLike[str]) -> tuple[NoiseAxis, ...]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from trihedron.read.columns import SENSORS, Columns, Triad
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
+
+MOST_RIVALS = 4
+"""Most triads that are listed beside the one taken."""
 
 
 def columns_of_words(table: Table, columns: Columns) -> Iterator[Finding]:
@@ -23,21 +27,41 @@ def columns_of_words(table: Table, columns: Columns) -> Iterator[Finding]:
 
 def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
     """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
-    triads = (*(columns.accelerometer or ()), *(columns.gyroscope or gyroscope or ()))
+    triads = {"a": columns.accelerometer, "g": columns.gyroscope or gyroscope}
     time = [] if columns.time is None else [f"time={columns.time + 1}"]
-    roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), triads, strict=True)
-    return ",".join([*time, *(f"{role}={column + 1}" for role, column in roles)])
+    readings = [
+        f"{s}{axis}={c + 1}" for s, triad in triads.items() for axis, c in zip("xyz", triad or (), strict=bool(triad))
+    ]
+    return ",".join([*time, *readings])
+
+
+def rivals_of(table: Table, columns: Columns) -> Iterator[Finding]:
+    """A finding for each sensor that more than one triad could be, with the ``--columns`` of another."""
+    for sensor, rivals in columns.rivals.items():
+        taken = " ".join(table.label(c) for c in getattr(columns, sensor))
+        others = [" ".join(table.label(c) for c in triad) for triad in rivals[:MOST_RIVALS]]
+        is_first = sensor == "accelerometer"
+        other = replace(columns, accelerometer=rivals[0]) if is_first else replace(columns, gyroscope=rivals[0])
+        yield Finding.of(
+            FindingCode.COLUMNS_ASSUMED,
+            "one-of-several",
+            sensor=sensor,
+            taken=taken,
+            others=others,
+            mapping=mapping_of(other),
+        )
 
 
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
     """The finding that states the role of each column, and the columns without a role."""
     roles = []
-    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply", "counter"):
         value = getattr(columns, role)
         if value is not None:
             which = value if isinstance(value, tuple) else (value,)
             roles.append((role, " ".join(table.label(c) for c in which)))
-    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    used = {*columns.used(), columns.counter}
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in used and len(table.columns[c])]
     return Finding.of(
         FindingCode.COLUMNS_RECOGNISED,
         has_file=bool(file_name),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -36,7 +37,10 @@ _BY_PLACE = (3, 4, 6, 7)
 
 @dataclass(frozen=True)
 class Columns:
-    """Column numbers (from 0) by role, units that names state, and findings about the choice."""
+    """Column numbers (from 0) by role, units that names state, and findings about the choice.
+
+    ``rivals``: for each sensor, other triads that it could be.
+    """
 
     time: int | None = None
     accelerometer: Triad | None = None
@@ -51,6 +55,7 @@ class Columns:
     time_unit: str = ""
     positional: bool = False
     findings: tuple[Finding, ...] = field(default=())
+    rivals: Mapping[Sensor, list[Triad]] = field(default_factory=dict)
 
     @property
     def readings(self) -> tuple[int, ...]:
@@ -220,9 +225,10 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     notes: list[Finding] = []
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
+    rivals: dict[Sensor, list[Triad]] = {}
     for role in SENSORS:
         groups = _triads(parsed, role)
-        triads[role], units[role] = _choose(table, parsed, groups, role, notes)
+        triads[role], units[role], rivals[role] = _choose(parsed, groups)
     if triads["accelerometer"] is None and triads["gyroscope"] is not None:
         tilt = _triads(parsed, "translation")  # tx ty tz beside wx wy wz
         if tilt:
@@ -260,6 +266,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         time_unit=parsed[time].time_unit if time is not None else "",
         positional=unnamed in (6, 7) and not any(p.role in SENSORS for p in parsed),
         findings=tuple(notes),
+        rivals={role: others for role, others in rivals.items() if others},
     )
 
 
@@ -317,15 +324,10 @@ def _triads(parsed: list[ColumnName], role: str) -> list[Triad]:
     return triads
 
 
-def _choose(
-    table: Table, parsed: list[ColumnName], groups: list[Triad], role: str, notes: list[Finding]
-) -> tuple[Triad | None, str]:
+def _choose(parsed: list[ColumnName], groups: list[Triad]) -> tuple[Triad | None, str, list[Triad]]:
+    """The triad of a sensor, its unit, and the triads that were not taken."""
     if not groups:
-        return None, ""
+        return None, "", []
     best = max(groups, key=lambda triad: (parsed[triad[0]].rank, -groups.index(triad)))
-    others = [triad for triad in groups if triad != best]
-    if others:
-        taken = " ".join(table.label(c) for c in best)
-        listed = [" ".join(table.label(c) for c in triad) for triad in others[:4]]
-        notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "one-of-several", sensor=role, taken=taken, others=listed))
-    return best, next((parsed[column].unit for column in best if parsed[column].unit), "")
+    unit = next((parsed[column].unit for column in best if parsed[column].unit), "")
+    return best, unit, [triad for triad in groups if triad != best]

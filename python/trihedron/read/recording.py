@@ -217,13 +217,13 @@ def _judged_gyro(
     clear = turning if turning is not None and turning.is_clear else None
     judged = judge_gyroscope(sensors.gyroscope, clear, windows, sensors.gyroscope_unit, given, extremes)
     if turning is None:
-        return judged
+        return Judged(judged.unit, (*judged.findings, *_exchanged(sensors, rate_hz)))
     is_stated = given is not None or sensors.gyroscope_unit not in {"", "raw", WHOLE}
     fits = (
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )
     own, shared = turning.odd_correlation
-    changed: list[Finding] = []
+    changed = _exchanged(sensors, rate_hz) if clear is None else []
     if turning.odd_part:
         changed.append(
             Finding.of(
@@ -233,6 +233,18 @@ def _judged_gyro(
     elif clear is not None and acc is not None:
         changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
     return Judged(judged.unit, (*judged.findings, *changed), fits)
+
+
+def _exchanged(sensors: Sensors, rate_hz: float) -> list[Finding]:
+    """A finding where the readings named gyro turn, as gravity does, by those named accelerometer."""
+    if sensors.accelerometer is None or sensors.gyroscope is None:
+        return []
+    if not _turns_with(sensors.gyroscope, sensors.accelerometer, rate_hz):
+        return []
+    columns = sensors.columns
+    swapped = replace(columns, accelerometer=columns.gyroscope, gyroscope=columns.accelerometer)
+    mapping = "" if columns.gyroscope is None else mapping_of(swapped)
+    return [Finding.of(FindingCode.SENSORS_EXCHANGED, is_one_file=bool(mapping), mapping=mapping)]
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:
@@ -289,13 +301,18 @@ def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     found = []
     for triad in _triads_of(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
         rates = np.stack([sensors.column(column) for column in triad], axis=1)
-        turning = turning_of(accelerometer, rates, rate_hz)
-        if turning is None or turning.correlation <= CLEAR_CORRELATION or turning.n < FEWEST_PAIRS:
+        if not _turns_with(accelerometer, rates, rate_hz):
             continue
         mapping = mapping_of(columns, triad)
         listed = " ".join(table.label(column) for column in triad)
         found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)
+
+
+def _turns_with(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> bool:
+    """Whether a triad (n, 3) turns as gravity does by the rates (n, 3) of another."""
+    turning = turning_of(gravity, rates, rate_hz)
+    return turning is not None and turning.correlation > CLEAR_CORRELATION and turning.n >= FEWEST_PAIRS
 
 
 def _triads_of(names: tuple[str, ...], taken: set[int]) -> list[Triad]:

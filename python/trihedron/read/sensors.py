@@ -14,7 +14,7 @@ from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
-from trihedron.read.column_roles import columns_of_words, mapping_of, statement
+from trihedron.read.column_roles import columns_of_words, mapping_of, rivals_of, statement
 from trihedron.read.columns import Columns, Sensor, find_columns
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -128,7 +128,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         )
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [*table.findings, *chosen.findings, *columns_of_words(table, chosen)]
+    findings = [*table.findings, *chosen.findings, *rivals_of(table, chosen), *columns_of_words(table, chosen)]
     if chosen.time is None:
         reject_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)

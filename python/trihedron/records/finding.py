@@ -54,6 +54,7 @@ class FindingCode(str, Enum):
     ROWS_UNACCOUNTED = "rows-unaccounted"
     DEVICE_CHOSEN = "device-chosen"
     DEVICES_INTERLEAVED = "devices-interleaved"
+    SENSORS_EXCHANGED = "sensors-exchanged"
     AXES_CHANGED = "axes-changed"
     CLOCK_JUMPED = "clock-jumped"
     RAW_LSB = "raw-lsb"

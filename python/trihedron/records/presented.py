@@ -49,10 +49,19 @@ class Presented(Frozen):
         ax : matplotlib Axes, or one for each panel
             Where to draw; a new figure when not given.
 
+        Returns
+        -------
+        Figure
+            ``.savefig("f.png")`` writes it; a notebook shows it.
+
         Raises
         ------
         ValueError
             When there is no figure of that name, it has another number of panels, or matplotlib is not installed.
+
+        Examples
+        --------
+        >>> result.plot("residuals").savefig("residuals.png")
         """
         figure: Figure = ask("plot", self, name, ax=ax)
         return figure

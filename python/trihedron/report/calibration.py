@@ -32,12 +32,12 @@ from trihedron.report.numbers import (
     power_of_ten,
     unit_in_print,
 )
+from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = "Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: `trihedron apply FILE LOG`, "
-NEXT += "`trihedron export FILE --to c`."
+NEXT = f"Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -197,6 +197,13 @@ def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     return Table(tuple(head), tuple(zip(*columns, strict=True)), caption)
 
 
+def next_pose(calibration: Calibration) -> str:
+    """The pose that would lower uncertainties most; empty where a finding names the poses to add."""
+    sensor = calibration.accelerometer
+    advice = () if sensor is None or sensor.observability is None else sensor.observability.advice[:1]
+    return next((pose for pose in advice if not any(pose in one.action for one in calibration.findings)), "")
+
+
 def _certainty(calibration: Calibration) -> list[Block]:
     blocks: list[Block] = []
     for name, sensor in calibrated_sensors(calibration):
@@ -207,9 +214,8 @@ def _certainty(calibration: Calibration) -> list[Block]:
         rows = [(name, f"{determined}, condition {plain_number(seen.condition)}")]
         if seen.weakest:
             rows.append(("least certain", seen.weakest))
-        # Without a problem one pose is enough; findings name all that are missing.
-        if seen.advice:
-            rows.append((f"most useful next {'pose' if name == 'accelerometer' else 'move'}", seen.advice[0]))
+        if name == "accelerometer" and (pose := next_pose(calibration)):
+            rows.append(("most useful next pose", pose))
         if sensor.quality is not None and sensor.quality.dof > 0:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))

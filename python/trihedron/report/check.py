@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of, calibrated_sensors
+from trihedron.report.calibration import next_pose
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -74,9 +75,6 @@ def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]
 
 
 def _advice(calibration: Calibration) -> list[Block]:
-    rows = tuple(
-        (f"most useful next {'pose' if name == 'accelerometer' else 'move'}, {name}", sensor.observability.advice[0])
-        for name, sensor in calibrated_sensors(calibration)
-        if sensor.observability is not None and sensor.observability.advice
-    )
-    return [Facts(rows)] if rows else []
+    """The next pose where poses suffice; else a finding names those to add, as it does moves."""
+    pose = next_pose(calibration)
+    return [Facts((("most useful next pose", pose),))] if pose else []

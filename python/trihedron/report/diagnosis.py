@@ -233,7 +233,7 @@ def _evidence(effect: AcceptedEffect) -> str:
 
 
 def _improvement(held: HeldOut) -> str:
-    chi2 = f"χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
+    chi2 = f"predictive χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
     before, after = _before_and_after(held)
     return f"{quantity(held)} {chi2}" if before == "–" else f"{quantity(held)} from {before} to {after} rms ({chi2})"
 
@@ -274,7 +274,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     )
     if not rows:
         return ()
-    head = ("effect", "residual", "rms before", "rms after", "χ²/dof before", "χ²/dof after")
+    head = ("effect", "residual", "rms before", "rms after", "predictive χ²/dof before", "after")
     caption = "Poses and moves, cross-validated: predicted by fits that did not see them; χ²/dof by the noise that the "
     caption += "model with the effect needs, 1 by that alone"
     return (Table(head, rows, caption),)

@@ -188,7 +188,7 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
     same = [stage.stage for stage in diagnosis.stages if stage.stage not in kept]
-    caption = "Cross-validated rms after each stage, with χ²/dof (1 by noise and uncertainty alone) in brackets"
+    caption = "Cross-validated rms after each stage, predictive χ²/dof (1 by noise and uncertainty alone) in brackets"
     caption += f"; stages without change: {', '.join(same)}" if same else ""
     unchanged = [size.get(d, d) for d in units if d not in changed]
     caption += f"; the same in every stage: {', '.join(unchanged)}" if unchanged else ""

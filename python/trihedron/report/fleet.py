@@ -218,7 +218,7 @@ def _spread(summary: FleetSummary) -> list[Block]:
 
 def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
-        return [Paragraph("No device lies outside what the others make likely (1 % over all devices and parameters).")]
+        return [Paragraph("No outliers (1 % over all devices and parameters).")]
     rows = [
         (
             one.serial, *_by(one.parameter, one.deviation),

@@ -12,7 +12,7 @@ from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import headlines_of, parameters_table
+from trihedron.report.verification import USES, headlines_of, parameters_table
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 AGAIN = "Calibrate again: none of these fits this log."
@@ -55,9 +55,7 @@ def ranking_report(ranking: Ranking) -> Document:
         sections=tuple(sections),
         headlines=headlines_of(best.verification),
         lead=Picture("order", caption, partial(_ranking_chart, ranking)),
-        next_step=AGAIN
-        if best.is_rejected
-        else f"Use {best.name}: `trihedron apply FILE LOG`, `trihedron export FILE --to c`.",
+        next_step=AGAIN if best.is_rejected else f"Use {best.name}: {USES}.",
     )
 
 

@@ -17,15 +17,15 @@ from trihedron.report.document import Block, Document, Facts, Headline, Paragrap
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
-from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
+from trihedron.report.numbers import capital, each_with_sigma, how_many, plain_number, shown, with_sigma
+from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
 REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = "Use the common parameters: `trihedron apply FILE OTHER_LOG`, `trihedron export FILE --to c`. Their uncertainty "
-NEXT += "is that of the next recording."
+NEXT = f"Use the common parameters: {USES}."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -55,7 +55,7 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = agree
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        usable = f"{how_many(n, 'recording')} of which {parameters} changed"
+        usable = f"{capital(parameters)} changed between {how_many(n, 'recording')}"
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
@@ -139,7 +139,7 @@ def _repeatability(model: SessionsModel) -> list[Block]:
             tuple(head),
             tuple(rows),
             "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
-            f"{BIAS}; scales are raw counts per unit, relative to the common value; misalignments are departures "
+            f"{BIAS}; scales are raw readings per unit, relative to the common value; misalignments are departures "
             f"from 90°; {TRIAD}.",
         )
     ]

@@ -20,6 +20,7 @@ NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
 _COMMAND = re.compile(r"\(?`[^`]+`[.,;:)]*")
+_COMMON_POWER = re.compile(r"^\((.+) ± (.+)\)(e\S+)$")
 _TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
 """Fewest columns for names of rows, and for heads."""
@@ -199,7 +200,8 @@ def _in_lines(text: str, most: int) -> list[str]:
 
 
 def _below(cell: str) -> list[str]:
-    value, sign, rest = cell.partition(" ± ")
+    # A common power of ten belongs to both lines: (2.89 ± 0.56)e−5.
+    value, sign, rest = _COMMON_POWER.sub(r"\1\3 ± \2\3", cell).partition(" ± ")
     return [value, f"± {rest}"] if sign and value.strip() else [cell]
 
 

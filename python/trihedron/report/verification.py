@@ -24,7 +24,9 @@ _ABOVE_NOISE = {
     FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
     FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
 }
-USE = "Use the calibration: `trihedron apply FILE LOG`, `trihedron export FILE --to c`."
+USES = "`trihedron apply FILE LOG -o corrected.csv`, `trihedron export FILE --to c -o calibration.h`"
+"""What a calibration is for, in the next steps of reports."""
+USE = f"Use the calibration: {USES}."
 ALLOWED = "3 σ of noise and calibration uncertainty"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""

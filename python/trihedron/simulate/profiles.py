@@ -161,8 +161,8 @@ TACTICAL = Profile(
     bias=(0.75 * _MG, 250.0 * _DEG_PER_HOUR),
 )
 
-# A perfect IMU, to which effects can be added one at a time.
-IDEAL = Profile("ideal", "no noise, no quantisation, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
+# A perfect IMU, to which effects can be added one at a time: no noise, no quantisation, SI.
+IDEAL = Profile("ideal", Accelerometer(), Gyroscope(), Clock(100.0))
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACTICAL, IDEAL)}
 

@@ -106,6 +106,16 @@ class _Side:
     size: FloatArray
     unit: str
 
+    @property
+    def own(self) -> FloatArray:
+        """(3,) standard error of a mean."""
+        count = float(np.median(self.pieces.count))
+        return np.asarray(self.size * self.pieces.sigma[self.sensor] / np.sqrt(count))
+
+    def chi2(self, x: FloatArray) -> float:
+        """χ² per degree of freedom of biases (n, 3) by noise alone."""
+        return float(np.mean((x / self.own) ** 2))
+
     def id(self, effect: str) -> str:
         """The sensor's effect of this kind."""
         return f"{SENSORS[self.sensor].prefix}-{effect}"
@@ -152,7 +162,6 @@ def _biases(side: _Side, alpha: float) -> tuple[DomainTest, DomainTest, Accepted
     """One sensor's biases: tests before and after removing the thermal curve or smooth drift found, and that effect."""
     pieces, sigma = side.pieces, side.pieces.sigma[side.sensor]
     n_effects = len(catalogue())
-    own = side.size * sigma / np.sqrt(float(np.median(pieces.count)))
     curve = thermal_curve(pieces, side.sensor)
     effect: AcceptedEffect | None = None
     candidates = [Candidate(side.id("thermal-bias"), 1.0 if curve is None else curve.p_value, True)]
@@ -168,23 +177,23 @@ def _biases(side: _Side, alpha: float) -> tuple[DomainTest, DomainTest, Accepted
         span = float(pieces.time_s[-1] - pieces.time_s[0])
         walk = np.sqrt(3.0) * side.size * sigma * np.sqrt(float(np.median(pieces.length_s / pieces.count)))
         walk = walk / NOISE_CORNER_S * np.sqrt(span / 6.0)
-        least = BEYOND_NOISE * (own if is_smooth else np.hypot(walk, own))
+        least = BEYOND_NOISE * (side.own if is_smooth else np.hypot(walk, side.own))
         if drift is not None and p * n_effects < alpha and (drift.rms * side.size > least).any():
             effect = _drifting(side, drift, p, n_effects)
             at = np.stack([np.interp(pieces.time_s, drift.time_s, v) for v in drift.values], axis=1) * side.size
             left = raw - pieces.about_poses(at)
-    before, after = (_domain(side, x, own, is_named=effect is not None, alpha=alpha) for x in (raw, left))
+    before, after = (_domain(side, x, is_named=effect is not None, alpha=alpha) for x in (raw, left))
     return before, after, effect, candidates
 
 
-def _domain(side: _Side, x: FloatArray, own: FloatArray, *, is_named: bool, alpha: float) -> DomainTest:
+def _domain(side: _Side, x: FloatArray, *, is_named: bool, alpha: float) -> DomainTest:
     """Biases about the mean of their orientation; the domain disagrees where an effect was named.
 
     A bias that walks is no disagreement by itself: without an effect nothing contradicts the model.
     """
-    chi2 = float(np.mean((x / own) ** 2))
+    chi2 = side.chi2(x)
     p = 1.0 if not is_named else float(min(1.0, np.exp(-0.5 * max(chi2 - 1.0, 0.0) * 3.0)))
-    worst = AXES[int(np.argmax((x / own).std(axis=0)))]
+    worst = AXES[int(np.argmax((x / side.own).std(axis=0)))]
     where = Where(("ag"[side.sensor] + worst,)) if is_named else Where()
     return DomainTest(
         DOMAINS[side.sensor], chi2, float(x.size), p, p < alpha / N_DOMAINS_TESTED, where,
@@ -219,11 +228,9 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
         swing=curve.swing * size, left=rest.std(axis=0), raw=raw.std(axis=0), has_gap=gap is not None,
         gap=() if gap is None else gap[0], is_one_pose=is_accelerometer and side.pieces.n_poses == 1,
     )  # fmt: skip
-    mean_size = float(np.sqrt(np.mean(size**2)))
-    before, after = curve.held_out
-    held = HeldOut(
-        DOMAINS[side.sensor], 1.0, (after / before) ** 2, before * mean_size, after * mean_size, unit
-    )  # fmt: skip
+    missed = curve.held_out * size
+    before, after = (float(np.sqrt(np.mean(x**2))) for x in (raw, missed))
+    held = HeldOut(DOMAINS[side.sensor], side.chi2(raw), side.chi2(missed), before, after, unit)
     series = {"time_s": side.pieces.time_s.tolist(), "value": side.biases.T.tolist(),
               "pose": side.pieces.pose.tolist(), "unit": unit, "temperature_degc": heat.tolist()}  # fmt: skip
     return AcceptedEffect(

@@ -104,8 +104,8 @@ class Curve:
     """One sensor's bias as a function of temperature, raw units per power of kelvin.
 
     ``names`` (k,) of the terms, ``value``, ``std`` (3, k); ``swing`` (3,) range of the curve, ``rest`` (n, 3)
-    residuals, held-out rms without and with the curve; ``score`` twice the log-likelihood gained beside scatter, walk
-    and drift, less the penalty of its terms.
+    residuals, ``held_out`` (n, 3) those of blocks that the fit had not seen; ``score`` twice the log-likelihood gained
+    beside scatter, walk and drift, less the penalty of its terms.
     """
 
     names: tuple[str, ...]
@@ -113,7 +113,7 @@ class Curve:
     std: FloatArray
     swing: FloatArray
     rest: FloatArray
-    held_out: tuple[float, float]
+    held_out: FloatArray
     score: float
     p_value: float
 
@@ -153,13 +153,13 @@ def thermal_curve(pieces: StaticPieces, sensor: int) -> Curve | None:
     std = np.array([np.sqrt(np.diag(covariance)[k:]) for _, covariance in fits])
     X, unit = np.stack([terms[name][0] for name in chosen], axis=1), np.array([terms[name][1] for name in chosen])
     raw = pieces.about_poses(pieces.means[sensor])
-    before, after = _held_out(raw, pieces.about_poses(X))
-    if not after < VISIBLE * before:
+    held_out = _held_out(raw, pieces.about_poses(X))
+    if not np.mean(held_out**2) < VISIBLE**2 * np.mean(raw**2):
         return None
     grid, order = np.linspace(-1.0, 1.0, 101), sum(name in POWERS for name in chosen)
     swing = np.ptp(np.stack([grid ** (1 + j) for j in range(order)], axis=1) @ theta[:, :order].T, axis=0)
     return Curve(
-        chosen, theta / unit, std / unit, swing, raw - pieces.about_poses(X @ theta.T), (before, after),
+        chosen, theta / unit, std / unit, swing, raw - pieces.about_poses(X @ theta.T), held_out,
         gained - cost * len(chosen), float(chdtrc(3.0 * len(chosen), max(gained, 0.0))),
     )  # fmt: skip
 
@@ -171,14 +171,14 @@ def _choices(every: Sequence[str]) -> list[tuple[str, ...]]:
     return [(*POWERS[:order], *one) for order in range(1, len(POWERS) + 1) for one in more]
 
 
-def _held_out(values: FloatArray, X: FloatArray) -> tuple[float, float]:
-    """Rms of values (n, 3) about their orientations, and held-out rms of blocks of neighbours by a plain fit of X."""
+def _held_out(values: FloatArray, X: FloatArray) -> FloatArray:
+    """Values (n, 3) about their orientations less those predicted by a plain fit of X to the other blocks."""
     fold = np.arange(len(values)) * FOLDS // len(values)
     missed = values.copy()
     for f in range(FOLDS):
         out = fold == f
         missed[out] -= X[out] @ np.linalg.lstsq(X[~out], values[~out], rcond=None)[0]
-    return float(np.sqrt(np.mean(values**2))), float(np.sqrt(np.mean(missed**2)))
+    return missed
 
 
 def branch_gap(pieces: StaticPieces, rest: FloatArray) -> tuple[FloatArray, FloatArray] | None:

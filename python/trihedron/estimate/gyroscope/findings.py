@@ -187,7 +187,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
     is_weak = rank < 9 or _worst(covariance, S) > WEAK
-    advice = tuple(_advice(covariance, size, rank)) if is_weak else ()
+    advice = (_advice(covariance, size),) if is_weak else ()
     return Observability(rank, 9, condition, singular, weakest, advice, pairs)
 
 
@@ -197,27 +197,22 @@ def _worst(covariance: FloatArray, S: FloatArray) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
 
 
-def _advice(covariance: FloatArray, size: float, rank: int) -> list[Words]:
-    lines = []
+def _advice(covariance: FloatArray, size: float) -> Words:
+    """Turns to add, axes of one protocol together; an axis's own element S_ij shows while axis i is level, so that its
+    turn starts with the third axis up."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
+    turns: dict[tuple[bool, bool, int], list[int]] = {}
     for axis in range(3):
         weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]
         if not weak:
             continue
-        # The element S_ij is observable while axis i is horizontal: start with the third axis vertical.
         across = next((rate for rate in weak if rate != axis), axis)
-        lines.append(
-            words(
-                "turn-about",
-                axis=axis + 1,
-                start=len(weak) < 3 and across != axis,
-                upright=3 - axis - across + 1,
-                is_twice=len(weak) == 3,
-            )
-        )
-    if not lines and rank < 9:
-        lines.append(words("moves-about-all"))
-    return lines
+        start = len(weak) < 3 and across != axis
+        upright = 3 - axis - across + 1 if start else 0
+        turns.setdefault((start, len(weak) == 3, upright), []).append(axis + 1)
+    if not turns:
+        return words("moves-about-all")
+    return words("turns-about", turns=[(axes, *how) for how, axes in turns.items()])
 
 
 def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> Iterator[Finding]:

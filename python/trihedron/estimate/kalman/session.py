@@ -69,7 +69,7 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
             raise InputError(f"{table.source}: give the poses in the order in which they were recorded, each once")
     elif table is not None and len(table) != segments.n_poses:
         raise InputError(
-            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_poses} poses: add "
+            f"{table.source} has {len(table)} rows, but {recording.source} has {segments.n_poses} poses: add "
             "a column 'pose' with the number of the pose (`trihedron segment` lists them), or 'start' and 'stop'"
         )
     return PoseReadings(mean[chosen], start[chosen], length[chosen], sigma[chosen])

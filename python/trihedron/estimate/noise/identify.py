@@ -17,7 +17,15 @@ from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.gaps import bridged
-from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_impacts, tail_error
+from trihedron.estimate.noise.screening import (
+    Event,
+    readout,
+    repeated_rows,
+    shaken,
+    steps_and_impacts,
+    tail_error,
+    turn_of_gravity,
+)
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
@@ -87,6 +95,8 @@ def _fitted(white: FloatArray) -> tuple[float, float]:
     return float(-0.5 * k * np.log(max(left, 1e-300) / k)), float(weight[-1])
 
 
+ACCELEROMETER = ("accel x", "accel y", "accel z")
+"""Names of the channels that show gravity."""
 MOST_DISTURBED = 0.25
 """Largest share of an axis that is excluded automatically."""
 SHORTEST = 512
@@ -166,6 +176,7 @@ def identify_noise(
         cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
         if cuts:
             findings.append(remarks.stretches_excluded(cuts, n, rate_hz))
+        findings += _motion(seen, rate_hz)
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))
     return Noise(
@@ -226,6 +237,15 @@ def _screen(
     mean = float(np.sum(column, where=present)) / max(n, 1)
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
     return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), cuts, steps)
+
+
+def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
+    """Finding for a log that is not static, by the accelerometer's readings outside excluded intervals."""
+    triad = [one.column for one in seen if one.blank.name in ACCELEROMETER]
+    if len(triad) < len(ACCELEROMETER):
+        return []
+    turn = turn_of_gravity(np.column_stack(triad), rate_hz)
+    return [] if turn is None else [Finding.of(FindingCode.LOG_MOTION, "turns", turn_rad=turn[0], every_s=turn[1])]
 
 
 def _identified(seen: _Screened, rate_hz: float, curve: AllanCurve, channel: int) -> NoiseAxis:

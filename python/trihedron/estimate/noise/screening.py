@@ -28,6 +28,11 @@ STEP_REACHES = (4, 16, 64)
 FEW, CLOSELY = 2, 0.7
 """Most events that are accepted without the test for tails, and the fraction of the limit that is close to it."""
 _MAD_TO_SIGMA = 1.4826
+TURN_RAD = 0.002
+"""Turn of gravity from one mean to the next that motion makes: noise of 1 mg/√Hz, more than any part has, averaged
+over a second turns it by as much, a bias that drifts by 0.1 g in a log by a third of it."""
+MEANS_S, MEANS, FEWEST_MEANS = 1.0, 160, 16
+"""Least length [s], most and least number of the means between which gravity turns."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,27 @@ def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
         else:
             out.append(Event(int(max(0, i - 1) * size), int((i + 1) * size), size_here, score))
     return out
+
+
+def turn_of_gravity(x: FloatArray, rate_hz: float) -> tuple[float, float] | None:
+    """Turn [rad] of gravity between neighbouring means of an accelerometer ``x`` (n, 3), the median, and their length
+    [s], where it is motion; ``None`` where noise explains it.
+
+    Scatter at one level throughout is no event, but a sensor that is carried turns. White noise would halve the turn
+    between means four times as long, motion would not.
+    """
+    size = max(math.ceil(rate_hz * MEANS_S), len(x) // MEANS)
+    if len(x) // size < FEWEST_MEANS:
+        return None
+    turn, shorter = _turn(x, size), _turn(x, max(size // 4, 1))
+    return (turn, size / rate_hz) if turn > max(TURN_RAD, math.sqrt(0.5) * shorter) else None
+
+
+def _turn(x: FloatArray, size: int) -> float:
+    """Median angle between the directions of neighbouring means of ``size`` rows."""
+    mean, _, count = _core.block_statistics(x, size)
+    up = mean[count > 0] / np.linalg.norm(mean[count > 0], axis=1, keepdims=True)
+    return float(np.median(np.linalg.norm(np.diff(up, axis=0), axis=1)))
 
 
 def _mean(values: FloatArray) -> float:

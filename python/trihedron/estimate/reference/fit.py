@@ -49,8 +49,8 @@ TURNED_ROUND = 0.2
 """Residual share of the motion above which the inverse attitude is tried: shared motion leaves some 0.01."""
 UNITS = {"gyro-g-sensitivity": "(rad/s)/(m/s^2)", "gyro-scale-nonlinearity": "1/(rad/s), 1/(rad/s)^2"}
 LABELS = {
-    "gyro-g-sensitivity": tuple(f"{a}{b}" for a in AXES for b in AXES),
-    "gyro-scale-nonlinearity": tuple(f"{bend} {a}" for bend in ("quadratic", "cubic") for a in AXES),
+    "gyro-g-sensitivity": tuple(f"G_{a}{b}" for a in AXES for b in AXES),
+    "gyro-scale-nonlinearity": tuple(f"{bend}_{a}" for bend in ("quadratic", "cubic") for a in AXES),
 }
 
 

@@ -12,7 +12,7 @@ from trihedron.report.findings.wording import filled
 CATALOGUE: Mapping[str, EffectWords] = MappingProxyType(ACCELEROMETER | GYROSCOPE | SESSION)
 OF_ANY: Mapping[str, str] = MappingProxyType(
     {
-        "strongest": "{mechanism} (strongest term {name}: {value:.3g} ± {std:.1g} {unit}).",
+        "strongest": "{mechanism} (strongest term {name}: {value:.3g} ± {std:.1g} {unit:unit}).",
         "only-model": "Only the model has it: {statement}{has_reason:? Of the recording {reason}, and nothing in it "
         "drifts by as much.|}",
     }

@@ -70,7 +70,7 @@ _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed.",
-        "A bias with the wrong sign or unit, of another unit, or of another temperature.",
+        "A bias with the wrong sign or unit, of another device, or of another temperature.",
         "Do not subtract this bias; measure it in a static pose before use.",
     ),
 }

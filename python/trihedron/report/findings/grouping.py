@@ -14,6 +14,7 @@ from trihedron.report.numbers import MINUS, capital, how_many, listed
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 _CONSEQUENCE = (
     FindingCode.SAME_RECORDING,
+    FindingCode.SENSORS_EXCHANGED,
     FindingCode.GRAVITY_MISSING,
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.NOT_FIT,

@@ -33,6 +33,12 @@ _LOG = {
         "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
+    (Code.LOG_MOTION, "turns", SERIOUS): Words(
+        "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: the log given as static moves.",
+        "the sensor was carried, turned or flown.",
+        "Its N, B and K are those of the motion; record a static log, or compare the motion with a reference: "
+        "`trihedron noise LOG --reference FILE`.",
+    ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
         "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
@@ -58,7 +64,7 @@ _SPECTRUM = {
         "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
-        lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"},
+        lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2:unit})"},
     ),
     (Code.SPECTRUM_LOW_PASS, "throughout", SERIOUS): Words(
         "No part of the upper spectrum is a sum of noise terms.",

@@ -14,6 +14,8 @@ LINES: Mapping[str, str] = MappingProxyType(
         "devices": "{v0} ({v1} rows)",
         "words": "{v0} ({v1})",
         "streams": "{v0} ({v1} messages)",
+        "turns": "{v0:axes} {v1:?starting with {v3:axis} up|{v2:?twice, each of the other axes up once at the "
+        "start|and back}}",
     }
 )
 """Sentence parts that are repeated for each of several groups of values."""
@@ -36,9 +38,8 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "gyro-share": "gyro cross-axis {axis:axis} into {rate:axis} (S_{rate:letter}{axis:letter})",
         "gyro-answer": "response of gyro {axis:axis} to turns about {about:axis} of the case, uncertainty "
         "{share:.2g %} (1 σ)",
-        "turn-about": "lay the body's {axis:axis} axis level and turn the sensor about it by 90 to 120°, "
-        "{start:?starting with {upright:axis} up|{is_twice:?twice, starting with each of the two other axes "
-        "up once|and back}}, with a pose before and after",
+        "turns-about": "lay one body axis level and turn the sensor about it by 90 to 120°, with a pose before and "
+        "after: {turns:each; }",
         "moves-about-all": "add moves about all three body axes in level position, each with a pose before and after",
         # known attitudes
         "sensitivity-to": "sensitivity to {axis:axis}",
@@ -85,8 +86,8 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "streams": "{streams:each}{has_more:? and others|}",
         "this-container": "This {kind}",
         "unit-with-rate": "{unit:unit} ({rate_hz:.4g} Hz)",
-        "amount-of-scatter": "{value:.3g} {unit:unit} in {name}",
-        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit:unit} in {name}",
+        "amount-of-scatter": "{value:.3g} {unit:unit} in {name:axis}",
+        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit:unit} in {name:axis}",
         # the text of an exception, a finding or an effect as a clause of another sentence
         "because": "{sentence:clause}",
         "quoted": "{sentence}",

@@ -46,6 +46,13 @@ _UNITS = {
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
+    (Code.SENSORS_EXCHANGED, "", SERIOUS): Words(
+        "Accelerometer and gyro are exchanged: gravity is in the columns named gyro, and turns by the rates in those "
+        "named accelerometer.",
+        "A header in another order than the data.",
+        "{is_one_file:?Read it with --columns {mapping}.|Give the file of --gyro as --accel and that of --accel as "
+        "--gyro.}",
+    ),
     (Code.GRAVITY_MISSING, "", SERIOUS): Words(
         "The accelerometer reads only {static_norm:.3g} while static: gravity is missing from it.",
         "'Linear' or 'user' acceleration of a phone, from which gravity was subtracted, or wrong columns.",
@@ -112,7 +119,8 @@ _COLUMNS = {
     (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log contains raw and corrected readings, or several devices.",
-        "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
+        "A calibration wants the uncorrected ones; if this is wrong, give --columns, which names all to read: "
+        "{mapping}.",
     ),
     (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
         "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",

@@ -32,7 +32,7 @@ from string import Formatter
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.report.names import id_in_print
+from trihedron.report.names import axis_in_print, id_in_print
 from trihedron.report.numbers import MINUS, listed, unit_in_print
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
@@ -138,7 +138,7 @@ def _in_words(value: Any, how: str, line: str) -> str:
 
 def axis_name(axis: int | str) -> str:
     """``X``, as printed on the board, for 1 or ``x``."""
-    return axis.upper() if isinstance(axis, str) else XYZ[int(axis) - 1]
+    return axis_in_print(axis) if isinstance(axis, str) else XYZ[int(axis) - 1]
 
 
 def _number(value: float, how: str) -> str:
