@@ -32,7 +32,7 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             ("play or slip in a mounting", "memory of the readout"),
         ),
         "telegraph": FamilyWords(
-            "record an hour at rest: a histogram of means over a second has two peaks",
+            "record a static log of an hour: a histogram of means over a second has two peaks",
             ("burst noise (popcorn noise) of the readout",),
         ),
         "temperature": FamilyWords(
