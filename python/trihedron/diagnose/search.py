@@ -165,16 +165,19 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
         return judged, best
     alone = best.score - sum(one.score for one in best.relations)
     for k, fewer in enumerate(judged.without):
+        beside = _gain_beside(k, best)
+        if beside > limit and not best.has_own_likelihood:
+            continue
         other = related(fewer, limit)
-        if other.relations and other.score > alone + NEAR and _beside(k, best, other) <= limit:
+        if other.names == best.names:
+            beside = best.score - other.score
+        if other.relations and other.score > alone + NEAR and beside <= limit:
             return _beside_relations(_pruned(fewer, limit), limit)
     return judged, best
 
 
-def _beside(k: int, best: Related, other: Related) -> float:
-    """Score of term ``k`` beside the relations; ``other`` are those found without it."""
-    if other.names == best.names:
-        return best.score - other.score
+def _gain_beside(k: int, best: Related) -> float:
+    """Score of term ``k`` by the evidence beside the relations."""
     terms = best.model.terms
     without = again(best.model, [*terms[:k], *terms[k + 1 :]])
     return 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost

@@ -14,7 +14,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import HISTORY, NOT_TURNED, WORLD_VECTOR, Signal, signals, world_vector
-from trihedron.diagnose.relations.telegraph import telegraphs
+from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
 from trihedron.records.domains import Domain
 
 ALL_AXES = (0, 1, 2)
@@ -75,6 +75,11 @@ class Related:
 
     score: float
     """Twice the log-evidence of the whole, less the penalties of its terms."""
+
+    @property
+    def has_own_likelihood(self) -> bool:
+        """Whether a score is not that of the evidence."""
+        return any(one.signal.family == TELEGRAPH for one in self.relations)
 
     @property
     def names(self) -> set[Name]:

@@ -21,6 +21,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.relations.signals import Sensor, Signal
 from trihedron.diagnose.session.observations import Observations
 
+TELEGRAPH = "telegraph"
+"""Family of the variable."""
 N_BLOCKS, N_FINE = 16, 4
 """Block means per pose; parts of a block in which its noise is computed."""
 LEAST_SAMPLES = 3 * N_BLOCKS
@@ -70,7 +72,7 @@ def telegraphs(context: Context) -> list[Telegraph]:
             levels = _levels(context, number, axis, inside[number][axis])
             if levels is not None:
                 state = context.between_poses(levels.state - levels.state.mean())
-                signal = Signal(sensor, "telegraph", ("random telegraph signal",), state[:, None], ("1",))
+                signal = Signal(sensor, TELEGRAPH, ("random telegraph signal",), state[:, None], ("1",))
                 out.append(Telegraph(signal, axis, 2.0 * (levels.gain - float(np.log(3 * len(sensors))))))
     return out
 
