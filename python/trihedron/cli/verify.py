@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.next_step import note_file
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
-from trihedron.cli.output import FullResults, is_stdout, leave
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, is_stdout, leave
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -63,6 +63,8 @@ def verify(
         results.show(document, FIRST_SCREEN)
         results.write(document, lambda: ranking_record(ranking))
         leave(ranking.best.verification.findings, is_shown=not is_stdout(results.json))
+        if ranking.best.is_rejected:
+            raise typer.Exit(NOT_TO_BE_TRUSTED)
         return
     from trihedron.report import verification_report
 

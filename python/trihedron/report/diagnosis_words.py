@@ -142,10 +142,11 @@ def _taken_by(model: str) -> str:
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
-    """The colour of the verdict; consistency alone is not good where the reference was computed from these readings, or
-    the log's own calibration is not to be trusted."""
-    is_doubted = _dependent(diagnosis) or own_serious(diagnosis) is not None
-    return "usable" if diagnosis.verdict == "consistent" and is_doubted else LEVELS[diagnosis.verdict]
+    """The colour of the verdict: bad where the log's own calibration is not to be trusted; consistency is not good
+    where the reference was computed from these readings."""
+    if own_serious(diagnosis) is not None:
+        return "bad"
+    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
 
 
 def _dependent(diagnosis: Diagnosis) -> str:

@@ -97,9 +97,9 @@ class Headline:
 class Document:
     """A whole report. The first section is the one that fits one screen.
 
-    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` overrides
-    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` is how the report was made;
-    ``next_step`` is the advice for the use of the result.
+    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
+    without a serious finding, in place of that from ``is_trustworthy`` and the warnings; ``provenance`` is how the
+    report was made; ``next_step`` is the advice for the use of the result.
     """
 
     title: str
@@ -115,7 +115,9 @@ class Document:
 
     @property
     def level(self) -> Level:
-        """The verdict's colour."""
+        """The verdict's colour: that of the gravest finding at least."""
+        if any(finding.severity is Severity.SERIOUS for finding in self.findings):
+            return "bad"
         if self.stated_level is not None:
             return self.stated_level
         if not self.is_trustworthy:

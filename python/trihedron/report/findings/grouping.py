@@ -39,14 +39,19 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
-    ordered = sorted(combined(findings), key=_weight)
+    ordered = by_weight(findings)
     sentences = tuple(replace(one, seen=capital(one.seen), cause=capital(one.cause)) for one in ordered)
     return FindingList(sentences) if sentences else Paragraph("None.")
 
 
+def by_weight(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings, equal ones merged, gravest first."""
+    return tuple(sorted(combined(findings), key=_weight))
+
+
 def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The serious findings, the one of the verdict first."""
-    return tuple(one for one in sorted(combined(findings), key=_weight) if one.severity is Severity.SERIOUS)
+    return tuple(one for one in by_weight(findings) if one.severity is Severity.SERIOUS)
 
 
 def _weight(finding: Finding) -> tuple[int, int]:
