@@ -106,8 +106,10 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 
 def verdict(calibration: Calibration) -> str:
-    """The verdict in one sentence: usable or not."""
-    return verdict_of(calibration.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED")
+    """The verdict in one sentence: usable or not, and how far beyond noise."""
+    times = [f.numbers["times_noise"] for f in calibration.findings if "times_noise" in f.numbers]
+    above = f": gravity error in static poses {plain_number(times[0], 2)} times the noise" if times else ""
+    return verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

@@ -12,16 +12,12 @@ _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
-        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom); all standard uncertainties of the accelerometer "
-        "are multiplied by {widening:.3g}.",
-        _UNQUIET,
-        _LOOK,
-    ),
-    (Code.RESIDUAL_ABOVE_NOISE, "poses-joint", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
-        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom). The fit includes a bias repeatability of "
-        "{bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, and so do the standard uncertainties.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
+        "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
+        "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
+        "{is_joint:?The fit includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between "
+        "poses, and so do the standard uncertainties|All standard uncertainties of the accelerometer are multiplied by "
+        "{widening:.3g}}.",
         _UNQUIET,
         _LOOK,
     ),
