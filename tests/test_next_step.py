@@ -18,6 +18,7 @@ from trihedron.cli.next_step import (
 )
 from trihedron.cli.options import GravitySource, LogSource
 from trihedron.cli.provenance import begin
+from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.files.calibration import read_calibration
 from trihedron.report import Document, to_text
 from trihedron.report.calibration import calibration_report
@@ -102,6 +103,19 @@ def test_an_error_in_sample_stands_below_what_is_uncertain():
     bare = replace(calibrated, accelerometer=replace(accelerometer, quality=unseen))
     assert order(bare)[-1] == "gravity error in static poses"
     assert "in sample only" in calibration_report(bare).headlines[-1].beside
+
+
+def test_an_error_beyond_noise_is_in_the_verdict_with_the_value_of_its_headline():
+    calibrated = read_calibration(made_once() / "c.json")
+    quality = calibrated.accelerometer.quality
+    worse = replace(quality, held_out_rms=8.7 * quality.floor)
+    (finding,) = residual_findings(100.0 * quality.dof, worse)
+    bad = replace(calibrated, accelerometer=replace(calibrated.accelerometer, quality=worse), findings=(finding,))
+    document = calibration_report(bad)
+    for said in (document.verdict, finding.seen):
+        assert "8.7 times the noise" in said
+    assert f"{document.headlines[0].value} mm/s² rms cross-validated" in finding.seen
+    assert "times the noise" not in calibration_report(calibrated).verdict
 
 
 def test_a_log_that_was_excluded_is_not_in_the_next_command():
