@@ -25,6 +25,8 @@ from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_pi
 from trihedron.report.diagnosis_words import (
     differing_headline,
     headlines_of,
+    is_explained,
+    judged_in_words,
     level_of,
     next_step_in_words,
     own_serious,
@@ -147,7 +149,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head: tuple[str, ...] = ("residual", "linear model", "rms", "χ²/dof", "p")
     rows: list[tuple[str, ...]] = [
         (
-            MEANING[d.domain], "disagrees" if d.disagrees else "agrees",
+            MEANING[d.domain], judged_in_words(diagnosis, d),
             rms_in_words(d), plain_number(d.chi2_per_dof), p_in_words(d.p_value),
         )
         for d in diagnosis.domains
@@ -178,10 +180,7 @@ def _after(before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
     """Judgement, rms and χ²/dof of a domain with the effects."""
     if test is None:
         return "–", "–", "–"
-    judged = "disagrees" if test.disagrees else "agrees"
-    if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
-        # An effect that leaves the residual unchanged explains it: disturbed poses, a spectral line.
-        judged = "explained"
+    judged = "explained" if is_explained(before, test) else "disagrees" if test.disagrees else "agrees"
     return judged, rms_in_words(test), plain_number(test.chi2_per_dof)
 
 

@@ -100,8 +100,8 @@ ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
         "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, "
         "{is_offset:?with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average ({share:.2g %} of "
-        "gravity)|most in pose {worst_pose} ({worst_m_s2:.3g mm/s²})}; χ²/dof {chi2_per_dof:.2g}, each pose weighted by "
-        "its uncertainty.",
+        "gravity)|most in pose {worst_pose} ({worst_m_s2:.3g mm/s²})}; χ²/dof {chi2_per_dof:.2g}, each pose weighted "
+        "by its uncertainty.",
         "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|The sensor "
         "has changed since (temperature, shock, supply), gravity is another here, or poses were not static}.",
         "{is_offset:?Check gravity (--gravity, --latitude) and unit; if both are right|Look at pose {worst_pose} "
