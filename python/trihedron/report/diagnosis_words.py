@@ -106,9 +106,11 @@ def _disagree(subjects: list[str]) -> str:
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
-        store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
+        use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
+        if diagnosis.parameters:
+            use = f"Keep using {model or 'the model'}: it agrees with this log."
         serious = own_serious(diagnosis)
-        return _dependent(diagnosis) or (store if serious is None else capital(serious.action))
+        return _dependent(diagnosis) or (use if serious is None else capital(serious.action))
     if diagnosis.verdict == "not-testable":
         record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
         return f"{record}; the noise of this log: `trihedron allan LOG`."
