@@ -19,6 +19,7 @@ CONSEQUENCE = (
     FindingCode.SAME_RECORDING,
     FindingCode.GRAVITY_MISSING,
     FindingCode.UNIT_CONTRADICTED,
+    FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
     FindingCode.RATE_ASSUMED,
     FindingCode.CALIBRATION_DOUBTED,

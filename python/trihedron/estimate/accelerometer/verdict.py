@@ -94,7 +94,7 @@ def observability_findings(
         yield Finding.of(
             FindingCode.WEAKLY_OBSERVABLE,
             "poses",
-            times_worse=worst / relative_sigma,
+            measured_g=relative_sigma,
             weakest=design.weakest(),
             advice=advice,
             rank=design.rank,

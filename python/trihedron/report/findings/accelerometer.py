@@ -35,11 +35,11 @@ ENTRIES = {
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
     (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
-        "In some orientations the predicted gravity is {times_worse:.2g} times as uncertain as a measurement in one "
-        "pose; least certain: {weakest}.",
+        "In some orientations gravity is predicted to {worst_prediction_g:.2g %} only (1 σ; measured in one pose to "
+        "{measured_g:.2g %}); least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
-        numbers=("rank", "n_parameters", "worst_prediction_g"),
+        numbers=("rank", "n_parameters"),
     ),
     (Code.OUTLIER_POSE, "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
