@@ -30,7 +30,7 @@ FEWEST_DOMAINS = 2
 MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
-JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", "not judged": "grey"}
+JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", "not judged": "shade"}
 EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
@@ -80,7 +80,7 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
             for word, colour in JUDGED.items()
         ),
         ("with the effects", "with the effects:", "c1", np.where(explained, math.nan, with_them), rows - apart, THICK),
-        (EXPLAINED, f"{EXPLAINED}:", "grey", np.where(explained, with_them, math.nan), rows - apart, THICK),
+        (EXPLAINED, f"{EXPLAINED}:", "c3", np.where(explained, with_them, math.nan), rows - apart, THICK),
     ]
     for name, words, colour, values, at, width in sides:
         if np.any(np.isfinite(values)):

@@ -20,7 +20,7 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_f
 AGAIN = "Calibrate again: none of these fits this log."
 ROW_PX = 34
 INTERVAL = "95 % interval"
-JUDGED: dict[str, Colour] = {"verified": "c1", "doubtful": "warn", "rejected": "accent"}
+JUDGED: dict[str, Colour] = {"verified": "c1", "doubtful": "soft", "rejected": "accent"}
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
