@@ -43,7 +43,7 @@ def verify(
 
     Calibrations may be files of other programs (Kalibr, PX4, ArduPilot, ...); several are ranked. Exit status 2 when a
     limit is exceeded, or, without one, when an error is more than ten times the expected one; of several, when the
-    best is.
+    best is rejected.
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying

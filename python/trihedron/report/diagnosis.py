@@ -23,6 +23,7 @@ from trihedron.report.diagnosis_numbers import (
 )
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
+    NOT_JUDGED,
     differing_headline,
     headlines_of,
     is_explained,
@@ -149,10 +150,11 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head: tuple[str, ...] = ("residual", "linear model", "rms", "χ²/dof", "p")
     rows: list[tuple[str, ...]] = [
         (
-            MEANING[d.domain], judged_in_words(diagnosis, d),
-            rms_in_words(d), plain_number(d.chi2_per_dof), p_in_words(d.p_value),
+            MEANING[d.domain], judged, rms_in_words(d), plain_number(d.chi2_per_dof),
+            "–" if judged == NOT_JUDGED else p_in_words(d.p_value),
         )
         for d in diagnosis.domains
+        for judged in (judged_in_words(diagnosis, d),)
     ]  # fmt: skip
     if diagnosis.effects:
         head = (*head[:2], "with the effects", *head[2:], "rms with them", "χ²/dof with them")

@@ -13,7 +13,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import in_print
-from trihedron.report.diagnosis_words import is_explained, judged_in_words
+from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
 from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
@@ -30,7 +30,7 @@ FEWEST_DOMAINS = 2
 MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
-JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", "not judged": "shade"}
+JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", NOT_JUDGED: "shade"}
 EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""

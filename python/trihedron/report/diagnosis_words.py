@@ -39,6 +39,7 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
+NOT_JUDGED = "not judged"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
 
@@ -190,7 +191,7 @@ def quantity(held: HeldOut) -> str:
 def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
     """Whether a domain agrees; in a log of too few poses χ² of poses is searched for effects, not judged."""
     is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
-    return "disagrees" if test.disagrees else "not judged" if is_open else "agrees"
+    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else "agrees"
 
 
 def is_explained(before: DomainTest, after: DomainTest) -> bool:
@@ -280,8 +281,8 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     if not tests:
         return ()
     worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    is_open = judged_in_words(diagnosis, worst) == "not judged"
-    judged = "1 by noise alone; " + ("not judged" if is_open else f"p {p_in_words(worst.p_value)}")
+    is_open = judged_in_words(diagnosis, worst) == NOT_JUDGED
+    judged = "1 by noise alone; " + (NOT_JUDGED if is_open else f"p {p_in_words(worst.p_value)}")
     chi2 = plain_number(worst.chi2_per_dof)
     if not worst.unit:
         return (Headline(f"{MEANING[worst.domain]}, χ²/dof", chi2, "", judged),)
