@@ -230,10 +230,11 @@ def test_an_extended_calibration_shows_what_its_effects_change():
     recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
     document = calibration_result_report(trihedron.extend(trihedron.calibrate(recording, gravity_m_s2=9.80665)))
     linear, extended = document.lead.chart().panels[:2]
-    assert linear.title.startswith("linear model: ")
+    assert linear.title.startswith("linear model, in sample: ")
     before, after = (float(panel.title.split()[-3]) for panel in (linear, extended))
     # What S and b leave of the quadratic is several times the noise.
     assert after < 0.5 * before
     assert document.headlines[0].beside == "rms, cross-validated, with the effects"
+    assert "accelerometer quadratic" in document.verdict
     drawn = [b.name for section in document.sections for b in section.blocks if isinstance(b, Picture)]
     assert "effect-accel-quadratic" in drawn

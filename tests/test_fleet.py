@@ -124,7 +124,10 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
     for _ in range(15):
         numbers = rng.normal(size=(6, 21)) * sizes
         rows = [row(f"u{k}", str(k), one) for k, one in enumerate(numbers)]
-        alarms += bool(summarise(rows, tmp_path).summary.outliers)
+        sound = summarise(rows, tmp_path).summary
+        alarms += bool(sound.outliers)
+        assert sound.farthest.p_adjusted >= 0.01
+        assert sound.outliers or sound.farthest.serial in fleet_report(sound).verdict
         k, j = rng.integers(6), rng.integers(21)
         numbers[k, j] += 8.0 * sizes[j]
         strays = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers)], tmp_path).summary.outliers
@@ -133,6 +136,8 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
     # in fifteen.
     assert alarms <= 2
     assert found >= 7
+    few = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers[:3])], tmp_path).summary
+    assert (few.farthest, "No device stands out" in fleet_report(few).verdict) == (None, False)
 
 
 def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):

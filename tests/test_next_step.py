@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from small_session import made_once
+from trihedron.cli import main
 from trihedron.cli.next_step import (
     again,
     begin_next_step,
@@ -18,9 +20,13 @@ from trihedron.cli.next_step import (
 )
 from trihedron.cli.options import GravitySource, LogSource
 from trihedron.cli.provenance import begin
+from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.files.calibration import read_calibration
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report import Document, to_text
 from trihedron.report.calibration import calibration_report
+from trihedron.report.diagnosis_words import next_step_in_words
+from trihedron.report.document import FindingList, Section
 
 
 @pytest.fixture(autouse=True)
@@ -102,6 +108,56 @@ def test_an_error_in_sample_stands_below_what_is_uncertain():
     bare = replace(calibrated, accelerometer=replace(accelerometer, quality=unseen))
     assert order(bare)[-1] == "gravity error in static poses"
     assert "in sample only" in calibration_report(bare).headlines[-1].beside
+
+
+def test_an_error_beyond_noise_is_in_the_verdict_with_the_value_of_its_headline():
+    calibrated = read_calibration(made_once() / "c.json")
+    quality = calibrated.accelerometer.quality
+    worse = replace(quality, held_out_rms=8.7 * quality.floor)
+    (finding,) = residual_findings(100.0 * quality.dof, worse)
+    bad = replace(calibrated, accelerometer=replace(calibrated.accelerometer, quality=worse), findings=(finding,))
+    document = calibration_report(bad)
+    for said in (document.verdict, finding.seen):
+        assert "8.7 times the noise" in said
+    assert f"{document.headlines[0].value} mm/s² rms cross-validated" in finding.seen
+    assert "times the noise" not in calibration_report(calibrated).verdict
+
+
+@pytest.mark.parametrize(
+    ("code", "severity", "said"),
+    [
+        (FindingCode.WEAKLY_OBSERVABLE, Severity.SERIOUS, "Add poses."),
+        (FindingCode.WEAKLY_OBSERVABLE, Severity.WARNING, "Add poses. Then: store it."),
+        (FindingCode.SPECTRUM_LOW_PASS, Severity.WARNING, "Store it."),
+        (FindingCode.WEAKLY_OBSERVABLE, Severity.NOTE, "Store it."),
+    ],
+)
+def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(code, severity, said):
+    sections = (Section("Findings", (FindingList((Finding(code, severity, "Seen.", "", "add poses."),)),)),)
+    document = Document("A title", "", "Usable.", severity is not Severity.SERIOUS, sections, next_step="Store it.")
+    assert document.what_next == said
+    assert document.level == {"serious": "bad", "warning": "usable", "note": "good"}[severity.value]
+
+
+def test_several_logs_are_all_named_in_a_command_of_another_verb():
+    begin(("diagnose", "one.csv", "two.csv", "--alpha", "0.02", "--gravity", "9.8", "--json", "out.json"))
+    said = filled("Calibrate: `trihedron calibrate ... -o calibration.json`.")
+    assert said == "Calibrate: `trihedron calibrate one.csv two.csv --gravity 9.8 -o calibration.json`."
+
+
+def test_a_model_that_agrees_is_kept_and_a_log_by_itself_is_calibrated():
+    found = SimpleNamespace(verdict="consistent", parameters=(1,))
+    assert "Keep using model.json" in next_step_in_words(found, "model.json")
+    found.parameters = ()
+    assert "trihedron calibrate LOG" in next_step_in_words(found)
+
+
+def test_a_calibration_file_that_is_printed_again_is_not_stored_again(capsys):
+    path = made_once() / "c.json"
+    assert main(["report", str(path)]) in (0, 2)
+    said = capsys.readouterr().out
+    assert f"trihedron verify {path}" in " ".join(said.split())
+    assert "Store it" not in said
 
 
 def test_a_log_that_was_excluded_is_not_in_the_next_command():

@@ -13,7 +13,7 @@ from trihedron.report.calibration_charts import residual_chart
 from trihedron.report.chart import Bars, Note, Panel, Scale
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
-from trihedron.report.diagnosis_overview_charts import strengths_picture, traces_chart
+from trihedron.report.diagnosis_overview_charts import EXPLAINED, strengths_picture, traces_chart
 from trihedron.report.drawn import _path
 from trihedron.report.effect_charts import rest_panels
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
@@ -158,7 +158,7 @@ def test_every_domain_is_a_bar_from_the_left_to_its_misfit_beside_the_limit_of_a
         DomainTest("static-gyro", 40.0, 20.0, 1e-9, True, limit=1.9),
         DomainTest("timing", 1.1, 20.0, 0.4, False),
     )
-    found = SimpleNamespace(domains=tests, remaining=(), effects=(), alpha=0.01)
+    found = SimpleNamespace(verdict="unexplained", domains=tests, remaining=(), effects=(), alpha=0.01)
     (panel,) = strengths_picture(found).chart().panels
     bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
     assert set(bars) == {"agrees up to here", "disagrees", "agrees"}
@@ -166,6 +166,12 @@ def test_every_domain_is_a_bar_from_the_left_to_its_misfit_beside_the_limit_of_a
     np.testing.assert_array_equal(bars["disagrees"].x, [np.nan, 40.0, np.nan])
     np.testing.assert_array_equal(bars["agrees"].x, [0.8, np.nan, 1.1])
     assert {float(value) for mark in bars.values() for value in mark.base} == {panel.x.limits[0]}
+    # Disturbed poses explain their residual without reducing it.
+    left = (tests[0], replace(tests[1], disagrees=False), tests[2])
+    (panel,) = strengths_picture(SimpleNamespace(**vars(found) | {"remaining": left, "effects": (1,)})).chart().panels
+    bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
+    np.testing.assert_array_equal(bars[EXPLAINED].x, [np.nan, 40.0, np.nan])
+    np.testing.assert_array_equal(bars["with the effects"].x, [0.8, np.nan, 1.1])
 
 
 def test_the_error_that_fails_is_the_first_figure_of_a_verification():

@@ -13,6 +13,7 @@ from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
 from trihedron.records import FindingCode, Onboard, Severity
 from trihedron.report.ranking import ranking_report, said_of
+from trihedron.report.verification import verification_report
 
 SWAPPED = np.eye(3)[[1, 0, 2]]
 
@@ -172,9 +173,36 @@ def test_a_ranking_shows_its_order_and_says_which_to_use(session):
     wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
     document = ranking_report(trihedron.rank([wrong, known], log, gravity_m_s2=9.81))
     assert document.next_step.startswith("Use calibration 2: `trihedron apply FILE LOG")
-    assert document.verdict == "calibration 2 fits this log best; calibration 1 is rejected."
+    assert document.verdict.startswith("calibration 2 fits this log best; calibration 1 is rejected. Verified")
     gravity, tilt = document.lead.chart().panels
     assert gravity.y.names == tilt.y.names == ("calibration 2", "calibration 1")
     interval, right, rejected = gravity.marks
     assert (right.colour, rejected.colour) == ("c1", "accent")
     assert interval.x[0] <= right.x[0] <= interval.x[1] < rejected.x[0]
+
+
+def test_the_best_of_several_has_the_verdict_that_it_has_alone(session):
+    """Also where it is doubtful: another gyro scale by 0.2 %."""
+    log, known = session
+    off = replace(known, gyroscope=replace(known.gyroscope, S=1.002 * known.gyroscope.S))
+    alone = trihedron.verify(off, log, gravity_m_s2=9.81)
+    single = verification_report(alone.verification)
+    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
+    document = ranking_report(trihedron.rank([wrong, off], log, gravity_m_s2=9.81))
+    assert "Doubtful" in single.verdict
+    assert document.verdict.endswith(single.verdict)
+    assert (document.level, document.foremost, document.what_next) == (single.level, single.foremost, single.what_next)
+    assert document.headlines == single.headlines
+
+
+def test_errors_of_one_sign_in_all_poses_are_no_matter_of_a_single_pose(session):
+    """Another gravity is named as a common offset; a bias on one axis has either sign."""
+    log, known = session
+    elsewhere = trihedron.verify(known, log, gravity_m_s2=9.83).verification
+    b = known.accelerometer.b + np.array([0.05, 0.0, 0.0])
+    biased = replace(known, accelerometer=replace(known.accelerometer, b=b))
+    judged = (elsewhere, trihedron.verify(biased, log, gravity_m_s2=9.81).verification)
+    offset, single = (next(f for f in v.findings if f.code is FindingCode.RESIDUAL_ABOVE_NOISE) for v in judged)
+    assert (offset.numbers["n_same"], "pose 1" in offset.action) == (len(elsewhere.norm_error), False)
+    assert offset.numbers["mean_m_s2"] == pytest.approx(9.81 - 9.83, abs=5e-3)
+    assert f"pose {single.numbers['worst_pose']:.0f} " in single.action

@@ -121,7 +121,8 @@ def _judge(
         segments = segments_of(None, recording, None)
         known = with_bias_of_log(known, segments, gravity_m_s2)
     judged = verify_calibration(known, recording, segments, gravity_m_s2, source, own)
-    return replace(judged, findings=(*doubted(known), *same_recording(known, recording), *judged.findings, *more))
+    findings = (*recording.findings, *segments.findings, *judged.findings, *more)
+    return replace(judged, findings=(*doubted(known), *same_recording(known, recording), *findings))
 
 
 def _on_this_log(known: Calibration, recording: Recording) -> Calibration:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
+_OF_DIAGNOSE = ("--alpha",)
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
@@ -82,8 +83,8 @@ def _word(value: Any) -> str:
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command) in its next step replaced by those of this run; where
-    nothing was stored, ``stored_by`` is the command that does."""
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in its next step
+    replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
     said = document.next_step
     commands = " ".join(_COMMAND.findall(said))
     if re.search(r"\bFILE\b", commands) and not _file.get():
@@ -96,17 +97,18 @@ def _filled(command: str) -> str:
     verb = command.strip("`").split(" ")[1]
     more = (_beside.get(), _place.get()) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_log.get(), *more)))
-    same = again([word for word in typed.get() if word not in _excluded.get()])
+    given = [word for word in typed.get() if word not in _excluded.get()]
+    same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
     words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
 
 
-def again(given: Sequence[str]) -> str:
+def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:
     """The command as typed, without its outputs."""
     words, skip = [], False
     for word in given:
         name = word.partition("=")[0]
-        if not skip and name not in _NOT_AGAIN:
+        if not skip and name not in without:
             words.append(word)
-        skip = not skip and name in _NOT_AGAIN and name not in _WITHOUT_VALUE and "=" not in word
+        skip = not skip and name in without and name not in _WITHOUT_VALUE and "=" not in word
     return shlex.join(["trihedron", *words]) if words else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from trihedron.cli.next_step import note_file
 from trihedron.cli.options import with_options
 from trihedron.cli.output import check_outputs, show, write_report
 from trihedron.errors import InputError
@@ -52,6 +53,7 @@ def _read(path: Path) -> tuple[Document, dict[str, Any]]:
         from trihedron.files.calibration import read_calibration
         from trihedron.report.calibration import calibration_report
 
+        note_file(path)
         return calibration_report(read_calibration(path)), saved
     try:
         return report_of(saved), {key: value for key, value in saved.items() if key != KEY}

@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.next_step import note_file
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
-from trihedron.cli.output import FullResults, is_stdout, leave
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, is_stdout, leave
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -43,7 +43,7 @@ def verify(
 
     Calibrations may be files of other programs (Kalibr, PX4, ArduPilot, ...); several are ranked. Exit status 2 when a
     limit is exceeded, or, without one, when an error is more than ten times the expected one; of several, when the
-    best is.
+    best is rejected.
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying
@@ -63,6 +63,8 @@ def verify(
         results.show(document, FIRST_SCREEN)
         results.write(document, lambda: ranking_record(ranking))
         leave(ranking.best.verification.findings, is_shown=not is_stdout(results.json))
+        if ranking.best.is_rejected:
+            raise typer.Exit(NOT_TO_BE_TRUSTED)
         return
     from trihedron.report import verification_report
 

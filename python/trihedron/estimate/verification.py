@@ -81,7 +81,7 @@ def verify_calibration(
         moves_left_out=moves.left_out,
         parameters=parameters,
         findings=(
-            *_norm_findings(error, error_sigma),
+            *_norm_findings(error, error_sigma, gravity_m_s2),
             *_angle_findings(moves),
             *worse,
             *_bias_findings(calibration.gyroscope, rest),
@@ -189,17 +189,24 @@ def _carried(
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 
 
-def _norm_findings(error: FloatArray, sigma: FloatArray) -> Iterator[Finding]:
+def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> Iterator[Finding]:
     z2 = (error / sigma) ** 2
     if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return
     rms = float(np.sqrt(np.mean(error**2)))
     times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
+    n_same, mean = int(max(np.sum(error > 0.0), np.sum(error < 0.0))), float(np.mean(error))
     yield Finding.of(
         FindingCode.RESIDUAL_ABOVE_NOISE,
         "verify-static",
         severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
         norm_rms_m_s2=rms,
+        # Sign test: the errors of single poses have either sign.
+        is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
+        n_same=n_same,
+        n_poses=len(error),
+        mean_m_s2=mean,
+        share=abs(mean) / gravity_m_s2,
         worst_pose=worst + 1,
         worst_m_s2=error[worst],
         chi2_per_dof=times**2,

@@ -70,6 +70,7 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
         passed_over = f"{passed_over} and {more}" if passed_over else more
     repeated = repeated_parameters(sessions) if len(sessions) > 1 else ()
     changes = changes_among(list(by_device.values()), alpha=ALPHA)
+    outliers, farthest = _outliers(by_device)
     diagnosed = [row for row in rows if row.get("diagnosis")]
     summary = FleetSummary(
         logs,
@@ -78,10 +79,11 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
         len({row["serial"] for row in diagnosed}),
         repeated,
         changes,
-        _outliers(by_device),
+        outliers,
         _shared(diagnosed),
         passed_over,
         mixed,
+        farthest,
     )
     return FleetResult(folder, tuple(rows), summary)
 
@@ -149,19 +151,21 @@ def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
     return out
 
 
-def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
-    """Outlying devices: moderated deleted residual of each mean, Bonferroni-corrected over devices and parameters.
+def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...], Outlier | None]:
+    """Outlying devices, and the farthest of the others (None with too few): moderated deleted residual of each mean,
+    Bonferroni-corrected over devices and parameters.
 
     One at a time, the farthest first, each excluded before the next test, so that two outliers do not mask each other.
     """
     if len(by_device) < FEWEST:
-        return ()
+        return (), None
     names = list(by_device)
     means = np.array([np.mean([s.numbers for s in by_device[name]], axis=0) for name in names])
     own = np.array([np.mean([np.diag(s.covariance) for s in group], axis=0) for group in by_device.values()])
     prior, prior_dof = _spread_of_axes(means)
     n_tests = means.size
     found: list[Outlier] = []
+    within: list[Outlier] = []
     for k in range(means.shape[1]):
         kept = list(range(len(names)))
         while len(kept) >= FEWEST:
@@ -175,13 +179,15 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
             spread = float(np.sqrt(variance * (1.0 + 1.0 / len(others)) + worse))
             sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
             p = min(1.0, fdtrc(1, prior_dof + dof, sigmas**2) * n_tests)
-            if p >= ALPHA:
-                break
-            serial = names[kept[worst]]
             away = float(column[worst] - np.median(others))
-            found.append(Outlier(serial, PARAMETERS[k], float(column[worst]), away, sigmas, p))
+            one = Outlier(names[kept[worst]], PARAMETERS[k], float(column[worst]), away, sigmas, p)
+            if p >= ALPHA:
+                within.append(one)
+                break
+            found.append(one)
             kept.pop(worst)
-    return tuple(sorted(found, key=lambda one: one.p_adjusted))
+    farthest = max(within, key=lambda one: abs(one.sigmas), default=None)
+    return tuple(sorted(found, key=lambda one: one.p_adjusted)), farthest
 
 
 def _spread_of_axes(means: FloatArray) -> tuple[FloatArray, float]:

@@ -68,7 +68,8 @@ class EffectCount:
 @dataclass(frozen=True, eq=False)
 class FleetSummary:
     """Statistics of the fleet. ``repeated`` is the spread between devices and between sessions of one device;
-    ``None`` where there are too few logs. ``n_before`` results are from an earlier run."""
+    ``None`` where there are too few logs. ``n_before`` results are from an earlier run. ``farthest`` is the largest
+    deviation that makes no outlier; ``None`` where there are too few devices to tell."""
 
     logs: tuple[FleetLog, ...]
     n_before: int
@@ -80,3 +81,4 @@ class FleetSummary:
     effects: tuple[EffectCount, ...]
     passed_over: str = ""
     mixed: tuple[MixedLogs, ...] = ()
+    farthest: Outlier | None = None

@@ -106,8 +106,12 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 
 def verdict(calibration: Calibration) -> str:
-    """The verdict in one sentence: usable or not."""
-    return verdict_of(calibration.findings, "OK: no problems found.", "Usable", "NOT TO BE TRUSTED")
+    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+    times = [f.numbers["times_noise"] for f in calibration.findings if "times_noise" in f.numbers]
+    above = f": gravity error in static poses {plain_number(times[0], 2)} times the noise" if times else ""
+    effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
+    said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
+    return " ".join([said, *effects])
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

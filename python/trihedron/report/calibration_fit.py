@@ -54,7 +54,7 @@ def _norm_words(quality: FitQuality) -> str:
     if quality.dof <= 0:
         parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
-        parts.append(f"{in_mm_s2(quality.held_out_rms)} cross-validated (held out)")
+        parts.insert(0, f"{in_mm_s2(quality.held_out_rms)} rms cross-validated (held out)")
     parts.append(f"noise alone {in_mm_s2(quality.floor)}")
     return "; ".join(parts)
 
@@ -79,11 +79,14 @@ def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
 def _angle_words(quality: FitQuality) -> str:
     angles = angles_of(quality)
     if angles:
-        parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
+        # The one of the headline first, as for the accelerometer.
+        parts = [
+            f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles[::-1]
+        ]
         assert quality.angle_deg is not None
         n_moves, n_counted = len(quality.angle_deg), int(counted_moves(quality).sum())
         if n_counted < n_moves:
-            parts[0] += f" ({n_counted} of {n_moves} moves, the others excluded)"
+            parts[-1] += f" ({n_counted} of {n_moves} moves, the others excluded)"
         parts.append(f"noise alone {plain_number(move_floor(quality))}° rms")
         return "; ".join(parts)
     if quality.dof <= 0:

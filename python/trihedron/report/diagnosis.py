@@ -23,8 +23,11 @@ from trihedron.report.diagnosis_numbers import (
 )
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
+    NOT_JUDGED,
     differing_headline,
     headlines_of,
+    is_explained,
+    judged_in_words,
     level_of,
     next_step_in_words,
     own_serious,
@@ -147,10 +150,11 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head: tuple[str, ...] = ("residual", "linear model", "rms", "χ²/dof", "p")
     rows: list[tuple[str, ...]] = [
         (
-            MEANING[d.domain], "disagrees" if d.disagrees else "agrees",
-            rms_in_words(d), plain_number(d.chi2_per_dof), p_in_words(d.p_value),
+            MEANING[d.domain], judged, rms_in_words(d), plain_number(d.chi2_per_dof),
+            "–" if judged == NOT_JUDGED else p_in_words(d.p_value),
         )
         for d in diagnosis.domains
+        for judged in (judged_in_words(diagnosis, d),)
     ]  # fmt: skip
     if diagnosis.effects:
         head = (*head[:2], "with the effects", *head[2:], "rms with them", "χ²/dof with them")
@@ -178,10 +182,7 @@ def _after(before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
     """Judgement, rms and χ²/dof of a domain with the effects."""
     if test is None:
         return "–", "–", "–"
-    judged = "disagrees" if test.disagrees else "agrees"
-    if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
-        # An effect that leaves the residual unchanged explains it: disturbed poses, a spectral line.
-        judged = "explained"
+    judged = "explained" if is_explained(before, test) else "disagrees" if test.disagrees else "agrees"
     return judged, rms_in_words(test), plain_number(test.chi2_per_dof)
 
 

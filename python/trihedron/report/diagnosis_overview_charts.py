@@ -13,6 +13,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import in_print
+from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
 from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
@@ -29,6 +30,8 @@ FEWEST_DOMAINS = 2
 MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
+JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", NOT_JUDGED: "shade"}
+EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
 SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
@@ -58,11 +61,13 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
 def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     """A row per domain: its limit in the shade, and bars without and with the effects in front of it."""
     tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
-    after = {d.domain: d.chi2_per_dof for d in diagnosis.remaining} if diagnosis.effects else {}
+    after = {d.domain: d for d in diagnosis.remaining} if diagnosis.effects else {}
     names = tuple(MEANING[d.domain] for d in tests)
     rows, apart = -np.arange(1.0, len(tests) + 1.0), THICK / 2.0 if after else 0.0
-    before, differs = np.array([d.chi2_per_dof for d in tests]), np.array([d.disagrees for d in tests])
-    with_them = np.array([after.get(d.domain, math.nan) for d in tests])
+    before, judged = np.array([d.chi2_per_dof for d in tests]), [judged_in_words(diagnosis, d) for d in tests]
+    pairs = [(d, after.get(d.domain)) for d in tests]
+    with_them = np.array([math.nan if now is None else now.chi2_per_dof for _, now in pairs])
+    explained = np.array([now is not None and is_explained(d, now) for d, now in pairs])
     limit = np.array([d.limit or math.nan for d in tests])
     seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
     low, high = float(seen.min()) / MARGIN, float(seen.max()) * MARGIN
@@ -70,9 +75,12 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     marks: list[Mark] = []
     sides: list[tuple[str, str, Colour, FloatArray, FloatArray, float]] = [
         ("agrees up to here", "agrees up to", "shade", limit, rows, SHADED),
-        ("disagrees", "disagrees:", "accent", np.where(differs, before, math.nan), rows + apart, THICK),
-        ("agrees", "agrees:", "soft", np.where(differs, math.nan, before), rows + apart, THICK),
-        ("with the effects", "with the effects:", "c1", with_them, rows - apart, THICK),
+        *(
+            (word, f"{word}:", colour, np.where([one == word for one in judged], before, math.nan), rows + apart, THICK)
+            for word, colour in JUDGED.items()
+        ),
+        ("with the effects", "with the effects:", "c1", np.where(explained, math.nan, with_them), rows - apart, THICK),
+        (EXPLAINED, f"{EXPLAINED}:", "c3", np.where(explained, with_them, math.nan), rows - apart, THICK),
     ]
     for name, words, colour, values, at, width in sides:
         if np.any(np.isfinite(values)):

@@ -39,6 +39,9 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
+NOT_JUDGED = "not judged"
+OF_SAMPLES = ("within-static", "timing", "rate")
+"""Domains that need no poses."""
 
 
 def verdict_in_words(diagnosis: Diagnosis) -> str:
@@ -58,8 +61,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "not-testable":
         tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
-            f"NOT TESTABLE: this recording has too few poses for a diagnosis (tested: {tested}, no effect found); "
-            "record 18 or more poses of 3 to 5 s in different orientations."
+            f"NOT TESTABLE: this recording has too few poses for a diagnosis (searched for effects: {tested}; none "
+            "found)."
         )
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
@@ -104,11 +107,14 @@ def _disagree(subjects: list[str]) -> str:
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     if diagnosis.verdict == "consistent":
-        store = "Nothing is missing: store S and b (`trihedron calibrate LOG -o calibration.json`), and use them."
+        use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
+        if diagnosis.parameters:
+            use = f"Keep using {model or 'the model'}: it agrees with this log."
         serious = own_serious(diagnosis)
-        return _dependent(diagnosis) or (store if serious is None else capital(serious.action))
+        return _dependent(diagnosis) or (use if serious is None else capital(serious.action))
     if diagnosis.verdict == "not-testable":
-        return ""
+        record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
+        return f"{record}; the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "unexplained":
         experiments = [one.experiment for one in diagnosis.relations if one.experiment]
         again = "Record again: what returns belongs to the sensor, what does not to the session."
@@ -142,10 +148,11 @@ def _taken_by(model: str) -> str:
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
-    """The colour of the verdict; consistency alone is not good where the reference was computed from these readings, or
-    the log's own calibration is not to be trusted."""
-    is_doubted = _dependent(diagnosis) or own_serious(diagnosis) is not None
-    return "usable" if diagnosis.verdict == "consistent" and is_doubted else LEVELS[diagnosis.verdict]
+    """The colour of the verdict: bad where the log's own calibration is not to be trusted; consistency is not good
+    where the reference was computed from these readings."""
+    if own_serious(diagnosis) is not None:
+        return "bad"
+    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
 
 
 def _dependent(diagnosis: Diagnosis) -> str:
@@ -179,6 +186,17 @@ def quantity(held: HeldOut) -> str:
     """The quantity of a cross-validated figure; effects on the acceleration during rotations are judged by that."""
     is_acceleration = (held.domain, held.unit) == ("dynamics", "m/s^2")
     return "acceleration during rotations" if is_acceleration else MEANING[held.domain]
+
+
+def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
+    """Whether a domain agrees; in a log of too few poses χ² of poses is searched for effects, not judged."""
+    is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
+    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else "agrees"
+
+
+def is_explained(before: DomainTest, after: DomainTest) -> bool:
+    """Whether an effect explains a residual that it leaves unchanged: disturbed poses, a spectral line."""
+    return before.disagrees and not after.disagrees and after.chi2_per_dof == before.chi2_per_dof
 
 
 def rms_in_words(test: DomainTest) -> str:
@@ -263,8 +281,11 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     if not tests:
         return ()
     worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    chi2, judged = plain_number(worst.chi2_per_dof), f"1 by noise alone; p {p_in_words(worst.p_value)}"
+    is_open = judged_in_words(diagnosis, worst) == NOT_JUDGED
+    judged = "1 by noise alone; " + (NOT_JUDGED if is_open else f"p {p_in_words(worst.p_value)}")
+    chi2 = plain_number(worst.chi2_per_dof)
     if not worst.unit:
         return (Headline(f"{MEANING[worst.domain]}, χ²/dof", chi2, "", judged),)
     size, _, unit = rms_in_words(worst).partition(" ")
-    return (Headline(MEANING[worst.domain], size, unit, f"rms by this diagnosis; χ²/dof {chi2}, {judged}"),)
+    of = "rms" if getattr(diagnosis, "model_is_given", False) else "rms in sample"
+    return (Headline(MEANING[worst.domain], size, unit, f"{of}; χ²/dof {chi2}, {judged}"),)

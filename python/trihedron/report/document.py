@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
-from trihedron.records import Finding, Severity
+from trihedron.records import Finding, FindingCode, Severity
 
 if TYPE_CHECKING:
     from trihedron.report.chart import Chart
@@ -15,6 +15,28 @@ Level = Literal["good", "usable", "bad"]
 """The colour of a verdict: no problems, usable with warnings, not to be trusted."""
 EMPTY = ("", "–")
 """Cells without a value."""
+CONSEQUENCE = (
+    FindingCode.SAME_RECORDING,
+    FindingCode.SENSORS_EXCHANGED,
+    FindingCode.GRAVITY_MISSING,
+    FindingCode.UNIT_CONTRADICTED,
+    FindingCode.COLUMNS_ASSUMED,
+    FindingCode.NOT_FIT,
+    FindingCode.RATE_ASSUMED,
+    FindingCode.CALIBRATION_DOUBTED,
+    FindingCode.WORSE_THAN_UNCALIBRATED,
+    FindingCode.FILTER_NOISE_FOLLOWED,
+    FindingCode.FILTER_NOISE_INCONSISTENT,
+    FindingCode.FILTER_NOISE_UNCERTAIN,
+    FindingCode.REFERENCE_NOT_INDEPENDENT,
+    FindingCode.GRAVITY_DEFAULTED,
+    FindingCode.RESIDUAL_ABOVE_NOISE,
+    FindingCode.HELD_OUT_WORSE,
+    FindingCode.NOT_OBSERVABLE,
+    FindingCode.WEAKLY_OBSERVABLE,
+    FindingCode.GYRO_G_SENSITIVITY,
+)
+"""Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 
 
 @dataclass(frozen=True)
@@ -97,9 +119,9 @@ class Headline:
 class Document:
     """A whole report. The first section is the one that fits one screen.
 
-    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` overrides
-    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` is how the report was made;
-    ``next_step`` is the advice for the use of the result.
+    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
+    without a serious finding, in place of that from ``is_trustworthy`` and the warnings; ``provenance`` is how the
+    report was made; ``next_step`` is the advice for the use of the result.
     """
 
     title: str
@@ -115,7 +137,9 @@ class Document:
 
     @property
     def level(self) -> Level:
-        """The verdict's colour."""
+        """The verdict's colour: that of the gravest finding at least."""
+        if any(finding.severity is Severity.SERIOUS for finding in self.findings):
+            return "bad"
         if self.stated_level is not None:
             return self.stated_level
         if not self.is_trustworthy:
@@ -131,11 +155,16 @@ class Document:
 
     @property
     def what_next(self) -> str:
-        """The action of the gravest finding where it is serious, else ``next_step``."""
-        first = self.foremost
-        if first is None or first.severity is not Severity.SERIOUS or not first.action:
-            return self.next_step
-        return first.action[:1].upper() + first.action[1:]
+        """The action of a serious finding; that of a warning about the whole result before ``next_step``."""
+        first, then = self.foremost, self.next_step
+        if first is None or not first.action or first.action[1:] == then[1:]:
+            return then
+        action = first.action[:1].upper() + first.action[1:]
+        if first.severity is Severity.SERIOUS:
+            return action
+        if first.code not in CONSEQUENCE:
+            return then
+        return f"{action} Then: {then[:1].lower()}{then[1:]}" if then else action
 
     @property
     def foremost(self) -> Finding | None:

@@ -78,7 +78,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if summary.repeated and len(devices) > 1 and not strays:
-        verdict += " No device stands out."
+        verdict += f" {_within(summary)}"
     if strays:
         verdict += f" {_named(strays)} outside the others."
     if moved:
@@ -216,9 +216,21 @@ def _spread(summary: FleetSummary) -> list[Block]:
     return [Paragraph(said), Table(tuple(head), tuple(rows), "Standard deviations between devices and of one device")]
 
 
+def _within(summary: FleetSummary) -> str:
+    """The largest deviation beside the limit, where no device is an outlier."""
+    one = summary.farthest
+    if one is None:
+        return "Whether a device stands out is tested from 4 devices on."
+    what, away = _by(one.parameter, one.deviation)
+    return (
+        f"No device stands out: the farthest is {one.serial} by {what}, {away} or {plain_number(one.sigmas, 2)} σ of "
+        f"the others, p {plain_number(one.p_adjusted, 2)} over all devices and parameters (limit 0.01)."
+    )
+
+
 def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
-        return [Paragraph("No outliers (1 % over all devices and parameters).")]
+        return [Paragraph(_within(summary))]
     rows = [
         (
             one.serial, *_by(one.parameter, one.deviation),

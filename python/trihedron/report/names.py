@@ -36,8 +36,8 @@ def id_in_print(name: str) -> str:
 
 
 def label_of(group: str, name: str) -> str:
-    """A parameter as the label of a row or an axis: ``accel bias X``."""
-    return f"{_spaced(group)} {parameter_in_print(name)}"
+    """A parameter as the label of a row or an axis, by the name that it has in sentences: ``accelerometer bias X``."""
+    return f"{id_in_print(group)} {parameter_in_print(name)}"
 
 
 def _spaced(name: str) -> str:

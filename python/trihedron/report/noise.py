@@ -23,8 +23,8 @@ _NO_UNIT = (
 )
 NEXT = """Take N, B, K into a filter: `trihedron export CALIBRATION --to kalibr --noise NOISE.json -o imu.yaml`, with \
 NOISE.json of `... --json NOISE.json`; average for no longer than the best averaging time."""
-SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb "X deg/s" --accel-lsb "Y mg"`, X and Y \
-from the data sheet of this part at its range, or --calibration FILE."""
+SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
+as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
 MOST_ROWS = 12
 """Rows of a curve's table, about; averaging times between them are omitted."""
 

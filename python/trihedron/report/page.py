@@ -81,7 +81,7 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
     clause = opening(first.seen)
     rest = first.seen[len(clause) :].lstrip(" .;")
     seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
-    is_said = not first.action or first.action[1:] == document.what_next[1:]
+    is_said = document.what_next[1:].startswith(first.action[1:])
     foremost = seen if is_said else f"{seen} → {first.action}"
     return unbroken(foremost), others, f"s{list(listing).index(True) + 1}"
 

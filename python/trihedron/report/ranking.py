@@ -7,17 +7,20 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import FloatArray
+from trihedron.records import Severity
 from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.findings import by_weight, findings_block
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import USES, headlines_of, parameters_table
+from trihedron.report.verification import above_noise, headlines_of, parameters_table, use_in_words, verified_in_words
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 AGAIN = "Calibrate again: none of these fits this log."
 ROW_PX = 34
 INTERVAL = "95 % interval"
+JUDGED: dict[str, Colour] = {"verified": "c1", "doubtful": "soft", "rejected": "accent"}
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
@@ -34,18 +37,20 @@ def ranking_report(ranking: Ranking) -> Document:
     """Lay out a ranking: the order, likely mistakes of each, and the parameters of the best."""
     best = ranking.best
     rejected = [one.name for one in ranking.candidates if one.is_rejected]
+    v = best.verification
     verdict = f"{best.name} fits this log best"
-    verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected." if rejected else "."
+    verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected" if rejected else ""
+    verdict += f". {verified_in_words(v)}"
     if best.is_rejected:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
     caption = "Errors of each calibration on this log, the best first."
-    v = best.verification
     judged_on = f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
     facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", judged_on))
     sections = [
         Section("Ranking", (Facts(facts), _order(ranking))),
         Section("What is wrong with each", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
-        Section("Parameters of the best", (parameters_table(best.verification),)),
+        Section("Findings about the best", (findings_block(v.findings),)),
+        Section("Parameters of the best", (parameters_table(v),)),
     ]
     return Document(
         title="Ranking of calibrations",
@@ -53,17 +58,17 @@ def ranking_report(ranking: Ranking) -> Document:
         verdict=verdict,
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
-        headlines=headlines_of(best.verification),
+        headlines=headlines_of(v),
         lead=Picture("order", caption, partial(_ranking_chart, ranking)),
-        next_step=AGAIN if best.is_rejected else f"Use {best.name}: {USES}.",
+        next_step=AGAIN if best.is_rejected else use_in_words(v, best.name),
     )
 
 
 def said_of(one: Ranked) -> str:
-    """Likely mistakes or serious findings of a calibration, with figures, and sensors whose bias its file lacks."""
+    """Likely mistakes or the gravest findings of a calibration, with figures, and sensors whose bias its file lacks."""
     said = [_mistake(found) for found in one.suspicions]
     if not said:
-        said = [f.seen for f in one.verification.findings if f.severity.value == "serious"][:2]
+        said = [f.seen.rstrip(".") for f in by_weight(one.verification.findings) if f.severity is not Severity.NOTE][:2]
     if not said and one.behind > 2.0 * one.behind_sigma:
         said = ["nothing found, but another fits better"]
     said = said or ["nothing found"]
@@ -95,7 +100,7 @@ def _order(ranking: Ranking) -> Table:
     rows = tuple(
         (
             f"{k + 1}. {one.name}",
-            "rejected" if one.is_rejected else "fits",
+            _judged(one),
             _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
             _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
             with_sigma(one.behind, one.behind_sigma) if one.behind_sigma > 0.0 else plain_number(one.behind, 3),
@@ -109,6 +114,10 @@ def _order(ranking: Ranking) -> Table:
         "the log is by this calibration, ± 1 σ; beyond 2 σ the best is clearly better"
     )
     return Table(head, rows, caption)
+
+
+def _judged(one: Ranked) -> str:
+    return "rejected" if one.is_rejected else "doubtful" if above_noise(one.verification) else "verified"
 
 
 def _with_interval(rms: float, interval: tuple[float, float], factor: float) -> str:
@@ -160,14 +169,14 @@ def _panel(ranking: Ranking, what: str, unit: str, errors: FloatArray) -> Panel:
     """``errors`` (n, 3): the rms of each calibration and both ends of its interval."""
     names = tuple(one.name for one in ranking.candidates)
     place = -np.arange(1.0, len(names) + 1.0)
-    rejected = np.array([one.is_rejected for one in ranking.candidates])
+    judged = np.array([_judged(one) for one in ranking.candidates])
     # Bootstrap intervals are not symmetric: drawn as one line with gaps between rows.
     ends = np.column_stack([errors[:, 1:], np.full(len(names), np.nan)]).ravel()
     marks: list[Mark] = [Line(ends, np.repeat(place, 3), INTERVAL, "soft")]
-    kinds: tuple[tuple[BoolArray, Colour, str], ...] = ((~rejected, "c1", "fits"), (rejected, "accent", "rejected"))
-    for part, colour, judged in kinds:
+    for word, colour in JUDGED.items():
+        part = judged == word
         if part.any():
-            tips = [f"{names[i]}: {plain_number(errors[i, 0])} {unit}, {judged}" for i in np.flatnonzero(part)]
-            marks.append(Points(errors[part, 0], place[part], tips, None, judged, colour))
+            tips = [f"{names[i]}: {plain_number(errors[i, 0])} {unit}, {word}" for i in np.flatnonzero(part)]
+            marks.append(Points(errors[part, 0], place[part], tips, None, word, colour))
     x = Scale(f"{what} [{unit}], rms", unit, includes=(0.0,))
     return Panel(x, Scale("", names=names), tuple(marks), title=what, height_px=ROW_PX * (len(names) + 1))

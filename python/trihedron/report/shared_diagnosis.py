@@ -79,7 +79,7 @@ def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
         )
     if any(found.of_single_recordings):
         return "What single recordings name belongs to their sessions: diagnose each by itself."
-    return "Nothing is to be added: calibrate the recordings together (`trihedron calibrate LOG OTHER_LOG`)."
+    return "Nothing is to be added. Calibrate the recordings together: `trihedron calibrate ... -o calibration.json`."
 
 
 def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import BoolArray
-from trihedron.records import FindingCode, Recording, Segments, Verification
+from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
@@ -26,7 +26,6 @@ _ABOVE_NOISE = {
 }
 USES = "`trihedron apply FILE LOG -o corrected.csv`, `trihedron export FILE --to c -o calibration.h`"
 """What a calibration is for, in the next steps of reports."""
-USE = f"Use the calibration: {USES}."
 ALLOWED = "3 σ of noise and calibration uncertainty"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
@@ -38,12 +37,6 @@ def verification_report(
     """Lay out a verification."""
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    above = [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
-    usable = "Verified"
-    if above:
-        errors = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above)
-        usable = f"Doubtful: {listed(list(errors))} above noise and uncertainty"
-    good = "Verified: errors are within noise and uncertainty."
     caption = (
         "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow."
     )
@@ -58,14 +51,32 @@ def verification_report(
     return Document(
         title="Verification",
         subtitle=f"{made_from}, tested on {v.source}",
-        verdict=verdict_of(v.findings, good, usable, "NOT VERIFIED"),
+        verdict=verified_in_words(v),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
-        headlines=_failed_first(v, bool(above)),
+        headlines=headlines_of(v),
         lead=Picture("errors", caption, partial(verification_chart, v)),
-        # Advice about the errors; else to use the calibration, unless it is rejected.
-        next_step=above[0].action if above else USE if v.is_passed else "",
+        next_step=use_in_words(v, "the calibration"),
     )
+
+
+def above_noise(v: Verification) -> list[Finding]:
+    """Findings about errors beyond noise and uncertainty."""
+    return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
+
+
+def verified_in_words(v: Verification) -> str:
+    """The verdict in one sentence."""
+    above = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above_noise(v))
+    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else "Verified"
+    return verdict_of(v.findings, "Verified: errors are within noise and uncertainty.", usable, "NOT VERIFIED")
+
+
+def use_in_words(v: Verification, what: str) -> str:
+    """Advice about errors above noise; else to use the calibration, unless it is rejected."""
+    above = above_noise(v)
+    use = f"Use {what}: {USES}." if v.is_passed else ""
+    return above[0].action if above else use
 
 
 def _expected(size: str, chi2_per_dof: float) -> str:
@@ -73,15 +84,9 @@ def _expected(size: str, chi2_per_dof: float) -> str:
     return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
 
 
-def _failed_first(v: Verification, is_above: bool) -> tuple[Headline, ...]:
-    """The headlines, the error that fails first: by its limit, else the farther above noise and uncertainty."""
-    limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
-    is_tilt = "limit_deg" in limits[0] if limits else is_above and v.angle_chi2_per_dof > v.norm_chi2_per_dof
-    return headlines_of(v)[:: -1 if is_tilt else 1]
-
-
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """Gravity and tilt error with their expected size."""
+    """Gravity and tilt error with their expected size, the one that fails first: by its limit, else the farther above
+    noise and uncertainty."""
     expected = _expected(in_mm_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))), v.norm_chi2_per_dof)
     norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
     beside = f"rms over {how_many(len(v.norm_error), 'pose')}; {expected}"
@@ -90,7 +95,10 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
         expected = _expected(f"{plain_number(v.angle_expected_deg)}°", v.angle_chi2_per_dof)
         beside = f"rms over {how_many(len(v.angle_deg), 'move')}; {expected}"
         out.append(Headline("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", beside))
-    return tuple(out)
+    limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
+    is_farther = v.angle_chi2_per_dof > v.norm_chi2_per_dof
+    is_tilt = "limit_deg" in limits[0] if limits else bool(above_noise(v)) and is_farther
+    return tuple(out[:: -1 if is_tilt else 1])
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:

@@ -35,17 +35,22 @@ def residual_findings(
     scale = covariance_scale(chi2, quality.dof)
     if scale == 1.0:
         return
-    rms, floor = quality.rms, quality.floor
-    if bias_repeatability_m_s2 is None:
-        yield Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE, "poses", rms_m_s2=rms, floor_m_s2=floor, chi2_per_dof=scale,
-            dof=quality.dof, widening=np.sqrt(scale),
-        )  # fmt: skip
-    else:
-        yield Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE, "poses-joint", rms_m_s2=rms, floor_m_s2=floor, chi2_per_dof=scale,
-            dof=quality.dof, bias_repeatability_m_s2=bias_repeatability_m_s2,
-        )  # fmt: skip
+    is_held = quality.held_out_rms is not None
+    rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
+    yield Finding.of(
+        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "poses",
+        rms_m_s2=rms,
+        is_held_out=is_held,
+        rms_in_sample_m_s2=quality.rms,
+        floor_m_s2=quality.floor,
+        times_noise=rms / max(quality.floor, 1e-300),
+        chi2_per_dof=scale,
+        dof=quality.dof,
+        is_joint=bias_repeatability_m_s2 is not None,
+        bias_repeatability_m_s2=bias_repeatability_m_s2 or 0.0,
+        widening=np.sqrt(scale),
+    )
 
 
 def observability_findings(
@@ -89,7 +94,7 @@ def observability_findings(
         yield Finding.of(
             FindingCode.WEAKLY_OBSERVABLE,
             "poses",
-            times_worse=worst / relative_sigma,
+            measured_g=relative_sigma,
             weakest=design.weakest(),
             advice=advice,
             rank=design.rank,

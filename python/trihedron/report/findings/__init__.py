@@ -2,6 +2,7 @@
 
 from trihedron.report.findings.grouping import (
     beyond_headline,
+    by_weight,
     combined,
     findings_block,
     ranged,
@@ -9,4 +10,4 @@ from trihedron.report.findings.grouping import (
     verdict_of,
 )
 
-__all__ = ["beyond_headline", "combined", "findings_block", "ranged", "serious_ones", "verdict_of"]
+__all__ = ["beyond_headline", "by_weight", "combined", "findings_block", "ranged", "serious_ones", "verdict_of"]

@@ -12,16 +12,12 @@ _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
-        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom); all standard uncertainties of the accelerometer "
-        "are multiplied by {widening:.3g}.",
-        _UNQUIET,
-        _LOOK,
-    ),
-    (Code.RESIDUAL_ABOVE_NOISE, "poses-joint", WARNING): Words(
-        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms in sample, noise alone {floor_m_s2:.3g mm/s²} "
-        "(χ²/dof {chi2_per_dof:.3g}, {dof:.0f} degrees of freedom). The fit includes a bias repeatability of "
-        "{bias_repeatability_m_s2:.2g mm/s²} rms per axis between poses, and so do the standard uncertainties.",
+        "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
+        "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
+        "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
+        "{is_joint:?The fit includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between "
+        "poses, and so do the standard uncertainties|All standard uncertainties of the accelerometer are multiplied by "
+        "{widening:.3g}}.",
         _UNQUIET,
         _LOOK,
     ),
@@ -39,11 +35,11 @@ ENTRIES = {
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
     (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
-        "In some orientations the predicted gravity is {times_worse:.2g} times as uncertain as a measurement in one "
-        "pose; least certain: {weakest}.",
+        "In some orientations gravity is predicted to {worst_prediction_g:.2g %} only (1 σ; measured in one pose to "
+        "{measured_g:.2g %}); least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
-        numbers=("rank", "n_parameters", "worst_prediction_g"),
+        numbers=("rank", "n_parameters"),
     ),
     (Code.OUTLIER_POSE, "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
@@ -102,10 +98,14 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
-        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, most in pose "
-        "{worst_pose} ({worst_m_s2:.3g mm/s²}); χ²/dof {chi2_per_dof:.2g}, each pose weighted by its uncertainty.",
-        "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not static.",
-        "Look at pose {worst_pose} first; if it was static, calibrate again near the conditions of use.",
+        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, "
+        "{is_offset:?with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average ({share:.2g %} of "
+        "gravity)|most in pose {worst_pose} ({worst_m_s2:.3g mm/s²})}; χ²/dof {chi2_per_dof:.2g}, each pose weighted "
+        "by its uncertainty.",
+        "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|The sensor "
+        "has changed since (temperature, shock, supply), gravity is another here, or poses were not static}.",
+        "{is_offset:?Check gravity (--gravity, --latitude) and unit; if both are right|Look at pose {worst_pose} "
+        "first; if it was static}, calibrate again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }

@@ -6,32 +6,12 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from trihedron.records import Finding, FindingCode, Severity
-from trihedron.report.document import Document, FindingList, Paragraph
+from trihedron.records import Finding, Severity
+from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import MINUS, capital, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
-_CONSEQUENCE = (
-    FindingCode.SAME_RECORDING,
-    FindingCode.SENSORS_EXCHANGED,
-    FindingCode.GRAVITY_MISSING,
-    FindingCode.UNIT_CONTRADICTED,
-    FindingCode.NOT_FIT,
-    FindingCode.RATE_ASSUMED,
-    FindingCode.CALIBRATION_DOUBTED,
-    FindingCode.WORSE_THAN_UNCALIBRATED,
-    FindingCode.FILTER_NOISE_FOLLOWED,
-    FindingCode.FILTER_NOISE_INCONSISTENT,
-    FindingCode.REFERENCE_NOT_INDEPENDENT,
-    FindingCode.GRAVITY_DEFAULTED,
-    FindingCode.RESIDUAL_ABOVE_NOISE,
-    FindingCode.HELD_OUT_WORSE,
-    FindingCode.NOT_OBSERVABLE,
-    FindingCode.WEAKLY_OBSERVABLE,
-    FindingCode.GYRO_G_SENSITIVITY,
-)
-"""Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 # A number that is a value; a number in a name (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
 _NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
@@ -40,19 +20,24 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
-    ordered = sorted(combined(findings), key=_weight)
+    ordered = by_weight(findings)
     sentences = tuple(replace(one, seen=capital(one.seen), cause=capital(one.cause)) for one in ordered)
     return FindingList(sentences) if sentences else Paragraph("None.")
 
 
+def by_weight(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings, equal ones merged, gravest first."""
+    return tuple(sorted(combined(findings), key=_weight))
+
+
 def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The serious findings, the one of the verdict first."""
-    return tuple(one for one in sorted(combined(findings), key=_weight) if one.severity is Severity.SERIOUS)
+    return tuple(one for one in by_weight(findings) if one.severity is Severity.SERIOUS)
 
 
 def _weight(finding: Finding) -> tuple[int, int]:
-    is_listed = finding.code in _CONSEQUENCE
-    return _ORDER[finding.severity], _CONSEQUENCE.index(finding.code) if is_listed else len(_CONSEQUENCE)
+    is_listed = finding.code in CONSEQUENCE
+    return _ORDER[finding.severity], CONSEQUENCE.index(finding.code) if is_listed else len(CONSEQUENCE)
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
@@ -66,13 +51,13 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
 
 def beyond_headline(finding: Finding, document: Document) -> Finding:
     """What verdict and next action of the document have not stated of a finding; unchanged where they do not."""
-    if finding.severity is not Severity.SERIOUS or finding is not document.foremost:
+    if finding is not document.foremost:
         return finding
     clause = opening(finding.seen)
     rest = finding.seen[len(clause) :].lstrip(" .;")
     is_stated = clause.lower() in document.verdict.lower()
     seen = f"Stated above. {rest[:1].upper()}{rest[1:]}".rstrip() if is_stated else finding.seen
-    is_next = finding.action[1:] == document.what_next[1:]
+    is_next = document.what_next[1:].startswith(finding.action[1:])
     return replace(finding, seen=seen, action="" if is_next else finding.action)
 
 

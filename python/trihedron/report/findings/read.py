@@ -90,7 +90,7 @@ _WHY_FIRST = {
     "level": "its steady reading stands far above its noise, as gravity does",
 }
 _WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
-_NAME_THEM = "If that is right, confirm it with --columns {mapping}; else give their order."
+_NAME_THEM = "If the columns are right, confirm them with --columns {mapping}; else give their order."
 _COLUMNS = {
     (Code.CORRECTED_ON_BOARD, "", NOTE): Words(
         "{autopilot} had corrected these readings (accelerometer {accel:.0f}, gyro {gyro:.0f}) by its own offsets and "
