@@ -6,13 +6,21 @@ import io
 import json
 import re
 import shlex
+import sys
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 
+import trihedron
+from board import counts_recording
 from documented import DOCS, blocks
+from test_read_ecosystems import write_bag
+from trihedron.capture import open_source
 from trihedron.cli import main
+from trihedron.simulate.device.faults import Sent
+from trihedron.simulate.device.serving import Device
 
 mpl.use("Agg")
 
@@ -107,6 +115,37 @@ def test_the_python_of_a_page_runs_on_logs_of_its_names(page, tmp_path, monkeypa
     assert shown
     for text in shown:
         exec(compile(text, page, "exec"), {})
+
+
+def python_of(page):
+    (text,) = (block.text for block in blocks(DOCS / page) if block.language == "python")
+    return compile(text, page, "exec")
+
+
+def test_every_way_to_read_a_log_runs_as_shown(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(4)
+    t = np.arange(500) / 100.0
+    acc, gyr = rng.normal([0.0, 0.0, 9.81], 0.02, (500, 3)), rng.normal(0.0, 0.001, (500, 3))
+    table = np.column_stack([t, acc, gyr])
+    np.savetxt("log.csv", table, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
+    np.savetxt("log.txt", np.column_stack([np.arange(500), np.zeros(500), acc, gyr]))
+    for name, values in (("acc.csv", acc), ("gyro.csv", gyr)):
+        np.savetxt(name, np.column_stack([t, values]), delimiter=",", header="t,x,y,z", comments="")
+    np.savez("board.npz", inertial=np.repeat(table[:, None, 1:], 4, axis=1), fs=100.0)
+    write_bag(tmp_path / "flight.bag", {"/imu/data_raw": table}, kind="ros1")
+    exec(python_of("reading.md"), {"trihedron": trihedron, "t": t, "acc": acc, "gyr": gyr})
+
+
+def test_capture_in_python_runs_as_shown(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    stream = b"".join(piece for _, piece in Device(counts_recording(300, 100.0), "lines").pieces(Sent()))
+    Path("stream.txt").write_bytes(stream)
+    # In place of the board at the port.
+    monkeypatch.setattr(sys.modules["trihedron.capture"], "open_source", lambda _port: open_source("stream.txt"))
+    exec(python_of("capture.md"), {})
+    assert len(capsys.readouterr().out.splitlines()) > 0
+    assert trihedron.read("log.csv").n_samples == 300
 
 
 def test_every_kind_of_reader_has_a_tutorial():
