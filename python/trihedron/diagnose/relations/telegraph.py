@@ -108,7 +108,6 @@ def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> _Level
         return None
     # The level of a pose without a switch is one of two, chosen by the mean that it is to explain.
     gain = inside.gain - float(np.log(2.0)) * np.count_nonzero(~inside.switches)
-    time = context.time_s[: len(error)]
     time, dof = context.time_s[: len(error)], float(np.trace(rest))
     levels = np.column_stack([known, seen * state])
     gain += _likelihood(reading, levels, time, dof) - _likelihood(reading, known, time, dof)
