@@ -162,6 +162,9 @@ def test_a_calibration_file_that_is_printed_again_is_not_stored_again(capsys):
 
 def test_a_log_that_was_excluded_is_not_in_the_next_command():
     begin(("calibrate", "bad.csv", "good.csv", "fine.csv", "--latitude", "59.9"))
-    note_excluded(["bad.csv"])
-    said = filled("Store it: `... -o calibration.json`.")
+    logs = [LogSource(log=Path(name)) for name in ("bad.csv", "good.csv", "fine.csv")]
+    note_log(logs[0])
+    note_excluded(["bad.csv"], logs)
+    said = filled("Store it: `... -o calibration.json`; use it: `trihedron apply FILE LOG`.")
     assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said
+    assert "calibration.json good.csv`" in said

@@ -85,7 +85,7 @@ def calibrate_many(
             progress=notify,
             **place.said,
         )
-    note_excluded(name for name, _ in result.model.left_out)
+    note_excluded((name for name, _ in result.model.left_out), given)
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
     machine = partial(sessions_record, result.model)

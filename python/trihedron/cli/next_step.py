@@ -65,9 +65,12 @@ def note_file(path: Path | None) -> None:
     _file.set("" if path is None else shlex.quote(str(path)))
 
 
-def note_excluded(logs: Iterable[str]) -> None:
-    """Store the logs, as typed, that were not used: the next step is without them."""
+def note_excluded(logs: Iterable[str], sources: Iterable[Any]) -> None:
+    """Store the logs, as typed, that were not used of several: the next step is without them."""
     _excluded.set(tuple(logs))
+    used = [one for one in sources if str(one.log) not in _excluded.get()]
+    if _excluded.get() and used:
+        name_log(used[0])
 
 
 def _words(source: Any) -> list[str]:

@@ -32,11 +32,12 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out the common parameters of many recordings, and the repeatability of each."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    used = f"{n} of {how_many(n + len(model.left_out), 'recording')}" if model.left_out else how_many(n, "recording")
-    agree = f"{used} differ by no more than their uncertainty"
-    good = f"{agree} and the bias drift within one."
+    used = how_many(n, "recording")
+    without = f"; {len(model.left_out)} excluded" if model.left_out else ""
+    agree = f"{used} differ by no more than their uncertainty{without}"
+    good = f"{used} differ by no more than their uncertainty and the bias drift within a recording{without}."
     if model.thermal is not None:
-        agree = f"{used} make one model from {_range(model.thermal)}"
+        agree = f"{used} make one model from {_range(model.thermal)}{without}"
         good = f"{agree}."
     sections = [
         Section("Result", (Facts(_facts(model)), *_repeatability(model))),
