@@ -16,6 +16,7 @@ from trihedron.api.sessions_combined import ALPHA, combine
 from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
+from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Frame, Recording, SensorCalibration
 from trihedron.records.progress import Progress
 from trihedron.records.recording import distinct_names
@@ -26,8 +27,6 @@ from trihedron.sensor_model import in_frame
 from trihedron.session.noise import between_sessions
 
 BYS: tuple[By, ...] = get_args(By)
-MEDIAN_CHI2 = 0.4549
-"""Median of a squared standard normal number."""
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
 resolution of 0.1 to 0.5 °C."""
@@ -197,7 +196,7 @@ def _excess(sensor: SensorCalibration) -> float:
         return 1.0
     z = (quality.held_out / quality.held_out_sigma).ravel()
     z = z[np.isfinite(z)]
-    return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2) if len(z) > 3 else 1.0
+    return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2[1]) if len(z) > 3 else 1.0
 
 
 def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:

@@ -23,8 +23,8 @@ from trihedron.threads import side_by_side
 
 LEAST_TIMES = 2.0
 """Rms of the bias changes, in standard errors of a pose mean, above which a bias process is named. 1/f noise below the
-white noise inside poses causes changes of about one such error: at most 1.6 in 280 healthy sessions, 120 of them with
-the 1/f noise of consumer parts."""
+white noise inside poses causes changes of about one such error: at most 1.3 in 220 healthy sessions of three grades, up
+to 1.63 with 1/f noise of 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
 FLICKER_WITHIN = 1.5
 """Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small."""
 

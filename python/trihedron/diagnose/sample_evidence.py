@@ -12,11 +12,10 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
+from trihedron.probability import chdtri
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState, misfits
 
-QUARTILE_OF_ONE = 1.323
-"""Upper quartile of a chi-square with one degree of freedom."""
 VISIBLE = 0.98
 """A correction of the readings must lower the held-out misfit of some domain by at least this factor."""
 
@@ -128,7 +127,7 @@ def _mends(before: Fit, after: Fit, touched: tuple[int, ...] | None) -> bool:
         return True
     (there, others), (there_after, _) = (_of_moves(*pair, touched) for pair in ((before, was), (after, now)))
     # The upper quartile: up to a quarter of the other moves may have lost samples too.
-    usual = max(float(np.quantile(others, 0.75)) / QUARTILE_OF_ONE if len(others) else 1.0, 1.0)
+    usual = max(float(np.quantile(others, 0.75) / chdtri(1, 0.25)) if len(others) else 1.0, 1.0)
     fall = float(there.sum() - there_after.sum())
     return fall > MIN_FALL * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
 

@@ -116,8 +116,9 @@ def _by_evidence(model: Hypothesis, known: Collection[Name]) -> Iterator[Follows
 def _by_levels(context: Context, known: Collection[Name]) -> Iterator[Follows]:
     """Every random telegraph signal, which has a score of its own."""
     for one in telegraphs(context):
-        if (one.signal.sensor, one.signal.names) not in known:
-            yield replace(_follows(context, one.signal, (one.axis,)), score=one.score)
+        found = replace(_follows(context, one.signal, (one.axis,)), score=one.score)
+        if found.name not in known:
+            yield found
 
 
 def _best(model: Hypothesis, known: Collection[Name]) -> Follows | None:

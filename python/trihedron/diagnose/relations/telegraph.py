@@ -20,6 +20,7 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.relations.signals import Sensor, Signal
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import MEDIAN_CHI2
 
 TELEGRAPH = "telegraph"
 """Family of the variable."""
@@ -193,8 +194,8 @@ def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]
             mean = np.add.reduceat(np.where(known, values, 0.0), first, axis=0) / present
         out.append(mean * np.sqrt(len(values) / N_BLOCKS))
     blocks = np.array(out)
-    # Robust: the median over all poses of squared differences (0.455 of a chi-square's mean), half of it per block.
-    noise = np.sqrt(np.nanmedian(np.diff(blocks, axis=1) ** 2, axis=(0, 1)) / 0.4549 / 2.0)
+    # Robust: the median over all poses of squared differences, half of it per block.
+    noise = np.sqrt(np.nanmedian(np.diff(blocks, axis=1) ** 2, axis=(0, 1)) / MEDIAN_CHI2[1] / 2.0)
     return np.asarray(np.nan_to_num(blocks / np.where(noise > 0.0, noise, np.inf)))
 
 

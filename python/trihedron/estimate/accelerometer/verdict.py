@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
 from trihedron.records.calibration import FitQuality
 from trihedron.records.finding import Finding, FindingCode
@@ -44,7 +44,7 @@ def residual_findings(
         is_held_out=is_held,
         rms_in_sample_m_s2=quality.rms,
         floor_m_s2=quality.floor,
-        times_noise=rms / max(quality.floor, 1e-300),
+        times_noise=rms / max(quality.floor, TINY),
         chi2_per_dof=scale,
         dof=quality.dof,
         is_joint=bias_repeatability_m_s2 is not None,
