@@ -7,7 +7,7 @@ import pytest
 
 import trihedron
 from small_session import G, made_once
-from trihedron.api.diagnosing import gravity_of_scenario
+from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 

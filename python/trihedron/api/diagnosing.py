@@ -2,41 +2,26 @@
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
+from typing import TYPE_CHECKING
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
-from trihedron.api.asking import WrongTypeError
-from trihedron.api.beside import beside, shared_log
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log, model_of_static_log
-from trihedron.api.driving import MovedAlike, driven
-from trihedron.api.reading import AnyRecording, read, recording_of, segment, segments_of
-from trihedron.api.referring import AnyReference
-from trihedron.api.simulating import names_scenario, scenario_of
-from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
-from trihedron.comparison.model import compared, with_noise_stage
-from trihedron.comparison.noise import Sampled, compare_noise, sampled
-from trihedron.comparison.quantisation import quantisation_noise
-from trihedron.comparison.ranges import stated_ranges
-from trihedron.comparison.slow import correlation_times, slow_noise
+from trihedron.api.reading import AnyRecording, accelerometer_only, recording_of, segments_of
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
-from trihedron.simulate import Scenario
-from trihedron.units import STANDARD_GRAVITY_M_S2
 
-GivenModel = Recording | Scenario | str | os.PathLike[str]
-"""A simulated recording or its file, or a scenario or its .toml."""
-BIASES = ("accel-bias", "gyro-bias")
+if TYPE_CHECKING:
+    from trihedron.api.diagnosing_with_simulation import GivenModel, Simulated
+    from trihedron.api.referring import AnyReference
 
 
 def diagnose(
@@ -99,16 +84,21 @@ def diagnose(
     if not 0.0 < alpha < 0.5:
         raise InputError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     notify = progress or (lambda _fraction, _text: None)
-    recording, against = recording_of(recording), _opened(against)
-    ordinary = partial(
-        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, notify
-    )
-    if reference is None and against is not None:
-        reference = shared_log(recording, against, gravity_m_s2)
+    # A reference and a simulation are imported where one is given: that takes longer than reading the log.
+    place = (gravity_m_s2, latitude_deg, height_m)
+    recording = recording_of(recording)
+    if against is not None:
+        from trihedron.api.beside import shared_log
+        from trihedron.api.diagnosing_with_simulation import opened
+
+        against = opened(against)
+        reference = reference or shared_log(recording, against, gravity_m_s2)
+    ordinary = partial(_of_poses, recording, place, segments, calibration, against, alpha, notify)
     if reference is None:
         return ordinary()
+    from trihedron.api.beside import beside
+
     given = None if calibration is None else calibration_of(calibration)
-    place = (gravity_m_s2, latitude_deg, height_m)
     return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
 
 
@@ -123,7 +113,12 @@ def _of_poses(
 ) -> DiagnosisResult:
     """The diagnosis by poses and moves, without a reference."""
     known = None if calibration is None else calibration_of(calibration)
-    gravity, source, said = settle_gravity(*place, gravity_of(known) or gravity_of_scenario(against))
+    gravity_known = gravity_of(known)
+    if against is not None:
+        from trihedron.api.diagnosing_with_simulation import gravity_of_scenario, simulated_beside
+
+        gravity_known = gravity_known or gravity_of_scenario(against)
+    gravity, source, said = settle_gravity(*place, gravity_known)
     findings = [*said, *recording.findings]
     if known is not None:
         check_units(known, recording)
@@ -139,9 +134,9 @@ def _of_poses(
     if model is not None:
         notify(0.1, "looking at biases and spectral lines")
         return diagnosed_static_log(recording, segments, model, stated, (*findings,), alpha, is_given=known is not None)
-    simulated: _Free | None = None
+    simulated: Simulated | None = None
     if against is not None:
-        simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, notify)
+        simulated, recording, segments, more = simulated_beside(against, recording, segments, gravity, alpha, notify)
         known = simulated.calibration
         findings += more
     begun = 0.05 if simulated is None else 0.45
@@ -153,7 +148,7 @@ def _of_poses(
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
             Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
         ]
-        recording_used, segments_used = _accelerometer_only(recording, segments)
+        recording_used, segments_used = accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
         resegment(recording_used, segments_used),
@@ -164,20 +159,10 @@ def _of_poses(
     )
     updated, own_effects = None, found.effects
     if known is not None and free:
+        from trihedron.api.diagnosing_with_simulation import compared_with_model
+
         given = replace(known, gravity_m_s2=gravity)
-        noise: tuple[NoiseDifference, ...] = ()
-        if simulated is not None:
-            turned = sign_of_gravity((simulated.segments, simulated.calibration), (segments, used))
-            frames = (*simulated.frames, *(() if turned is None else (turned,)))
-            noise = (*frames, *_noise(simulated, found, recording_used, segments_used, alpha))
-        free_simulation = None if simulated is None else _with_ranges(simulated, found, recording)
-        fit = model_of_diagnosis(found)
-        found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
-        if simulated is not None:
-            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
-            found = replace(found, stages=stages)
-            if simulated.scenario is not None:
-                found = _beside_scenario(found, simulated.scenario, (recording_used, segments_used, used), alpha)
+        found = compared_with_model(found, given, simulated, (recording_used, segments_used, used), alpha)
         updated, used = used, given
     return DiagnosisResult(
         **vars(found),
@@ -191,39 +176,6 @@ def _of_poses(
         segments=segments,
         recording=recording,
     )
-
-
-def _beside_scenario(
-    found: Diagnosis, scenario: Scenario, fitted: tuple[Recording, Segments, Calibration], alpha: float
-) -> Diagnosis:
-    """Repeated simulations with the recording's motion; drops the remark on biases that were never applied."""
-    asked = tuple(replace(p, remark="") if p.id in BIASES else p for p in found.parameters)
-    found = replace(found, parameters=asked)
-    if fitted[0].gyroscope is None or fitted[2].gyroscope is None:
-        return found
-    return judged_by_motion(found, scenario, MovedAlike(*fitted), alpha)
-
-
-@dataclass(frozen=True, eq=False)
-class _Free:
-    """A simulated recording with its own calibration and diagnosis."""
-
-    calibration: Calibration
-    segments: Segments
-    diagnosis: Diagnosis
-    sampled: Sampled
-    recording: Recording
-    frames: tuple[NoiseDifference, ...] = ()
-    scenario: Scenario | None = None
-
-
-def _with_ranges(simulated: _Free, found: Diagnosis, recording: Recording) -> tuple[Diagnosis, Recording]:
-    """Diagnosis and log of the simulation, with range limits that its scenario states but no reading reaches."""
-    if simulated.scenario is None:
-        return simulated.diagnosis, simulated.recording
-    shown = {effect.id for effect in simulated.diagnosis.effects}
-    stated = [one for one in stated_ranges(simulated.scenario, found.effects, recording) if one.id not in shown]
-    return replace(simulated.diagnosis, effects=(*simulated.diagnosis.effects, *stated)), simulated.recording
 
 
 def _start(
@@ -243,102 +195,3 @@ def _start(
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
     return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
-
-
-def _opened(against: GivenModel | None) -> GivenModel | None:
-    """The scenario where ``against`` names one, else ``against`` as given."""
-    if isinstance(against, str | os.PathLike) and names_scenario(against):
-        return scenario_of(against)
-    return against
-
-
-def _simulated_log(
-    against: GivenModel, recording: Recording, segments: Segments, gravity: float
-) -> tuple[Recording, Scenario | None]:
-    if isinstance(against, Recording):
-        return against, None
-    if not isinstance(against, Scenario):
-        if not isinstance(against, str | os.PathLike):
-            kind = type(against).__name__
-            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
-        return read(against), None
-    if recording.gyroscope is None:
-        raise InputError(
-            "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
-            "or compare with a simulated log of your own"
-        )
-    own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    return driven(against, recording, segments, own), against
-
-
-def _simulated(
-    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, notify: Progress
-) -> tuple[_Free, Recording, Segments, tuple[Finding, ...]]:
-    """The simulation's own diagnosis, the recording with the sensors that both have, its segments, and findings."""
-    notify(0.05, "diagnosing the simulated recording")
-    logged = _simulated_log(against, recording, segments, gravity)
-    logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
-    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
-    return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
-
-
-def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> _Free:
-    recording, scenario = logged
-    of_world = rates_of_world(recording, segment(recording))
-    if of_world is not None:
-        recording = replace(recording, gyroscope=None)
-    # A scenario states its own gravity; a simulated log is taken to be of the recording's place.
-    own = gravity if scenario is None else scenario.environment.gravity
-    try:
-        result = calibrate(recording, gravity_m_s2=own)
-    except INPUT_ERRORS as error:
-        raise InputError(f"the simulated recording cannot be calibrated: {error}") from None
-    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=notify)
-    noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
-    frames = () if of_world is None else (of_world,)
-    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
-
-
-def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
-    n, m = simulated.n_poses, segments.n_poses
-    return () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
-
-
-def _both_sensors(
-    logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
-) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
-    """Both sides without the gyro where one side has none."""
-    theirs, scenario = logged
-    if (theirs.gyroscope is None) == (recording.gyroscope is None):
-        return logged, recording, segments, ()
-    if recording.gyroscope is None:
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "recording-has-none")
-        return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
-    return logged, *_accelerometer_only(recording, segments), (finding,)
-
-
-def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
-    bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
-    return replace(recording, gyroscope=None), bare
-
-
-def _noise(
-    simulated: _Free, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
-) -> tuple[NoiseDifference, ...]:
-    """Noise and slow noise of the simulation compared with those of the recording."""
-    ours = sampled(recording, segments.poses, model_of_diagnosis(found))
-    theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
-    return (
-        *compare_noise(simulated.sampled, ours, alpha=alpha),
-        *quantisation_noise(simulated.sampled, ours, alpha=alpha),
-        *correlation_times(simulated.sampled, ours, alpha=alpha),
-        *slow_noise(theirs, (found, recording, segments), alpha=alpha),
-    )
-
-
-def gravity_of_scenario(model: object) -> tuple[float, str] | None:
-    """|g| [m/s²] that a scenario states and the words for this source; ``None`` where it states none."""
-    if not isinstance(model, Scenario) or model.environment.gravity == STANDARD_GRAVITY_M_S2:
-        return None
-    return model.environment.gravity, "that of the scenario"

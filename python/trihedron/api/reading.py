@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy.typing as npt
@@ -224,3 +225,9 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     from trihedron.segment import segment_recording
 
     return segment_recording(recording, progress=progress)
+
+
+def accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
+    """The recording and its segments without the gyroscope."""
+    bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
+    return replace(recording, gyroscope=None), bare

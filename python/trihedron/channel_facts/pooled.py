@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
+from trihedron.probability import fdtrc, stdtrit
 from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
@@ -88,8 +89,6 @@ def ratio_of(one: Measured, other: Measured) -> Ratio:
     ValueError
         When a figure is not positive.
     """
-    from scipy.stats import t
-
     if not (one.value > 0.0 and other.value > 0.0):
         raise InputError("only positive figures have a ratio")
     squares = (one.sigma_log**2, other.sigma_log**2)
@@ -98,15 +97,13 @@ def ratio_of(one: Measured, other: Measured) -> Ratio:
     dof = sigma**4 / parts if parts > 0.0 else math.inf
     log_ratio = math.log(one.value / other.value)
     reach = _quantile(dof) * sigma
-    p_value = 2.0 * float(t.sf(abs(log_ratio) / sigma, min(dof, 1e9))) if sigma > 0.0 else float(log_ratio == 0.0)
+    p_value = fdtrc(1.0, min(dof, 1e9), (log_ratio / sigma) ** 2) if sigma > 0.0 else float(log_ratio == 0.0)
     value = math.exp(log_ratio)
     return Ratio(value, value * math.exp(-reach), value * math.exp(reach), p_value)
 
 
 def _quantile(dof: float) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, min(dof, 1e9)))
+    return stdtrit(min(dof, 1e9), 0.975)
 
 
 def root_of(power: Measured, factor: float) -> Measured:

@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
@@ -17,6 +16,7 @@ from trihedron.comparison.draws import NAMES, one_draw_for_all, uniform_for_norm
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.noise.poses import noise_of_poses
+from trihedron.probability import chdtrc
 from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.pose_noise import Measured, PoseNoise
@@ -229,7 +229,7 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
         return True
     weight = 1.0 / np.maximum([w.sigma_log for w in known], 1e-9) ** 2
     away = logs - float(weight @ logs / weight.sum())
-    chance = float(chi2.sf(float(weight @ away**2), len(known) - 1))
+    chance = chdtrc(len(known) - 1.0, float(weight @ away**2))
     return chance > UNLIKE_BY_CHANCE and float(np.ptp(logs)) < math.log(UNLIKE_AXES)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from trihedron.arrays import AXES, XYZ, FloatArray
+from trihedron.probability import chdtri
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
 from trihedron.report.calibration_charts import mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
@@ -91,7 +91,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         ]
         marks.append(Points(pose, np.minimum(nis, 12.0), tips, None, f"{name}: one pose", AXIS_COLOURS[k], True))
         marks.append(Line(pose[window - 1 :], mean, f"{name}: running mean", AXIS_COLOURS[k]))
-    low, high = (np.full(2, float(stats.chi2.ppf(p, window)) / window) for p in (0.005, 0.995))
+    low, high = (np.full(2, chdtri(window, above) / window) for above in (0.995, 0.005))
     name = f"99 % of running means (of {window}) when the noise model is right"
     band = Band(np.array([0.3, n + 0.7]), low, high, name)
     y = Scale("innovation² / predicted variance", "", includes=(0.0,))

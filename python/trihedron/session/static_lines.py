@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar
 from scipy.special import gammaincc
 
 from trihedron.arrays import TINY, FloatArray
@@ -165,6 +164,8 @@ def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
 
     bin_ = 1.0 / len(part)
     within = (near - bin_, near + bin_)
+    from scipy.optimize import minimize_scalar  # imported here: most logs have no line
+
     return float(minimize_scalar(left, bounds=within, method="bounded", options={"xatol": REFINED * bin_}).x)
 
 

@@ -9,11 +9,10 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from scipy.stats import norm
 
 from trihedron.diagnose.accepted import HEADLINE
 from trihedron.diagnose.effects import by_id, catalogue
-from trihedron.probability import f_upper
+from trihedron.probability import f_upper, ndtr
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
 from trihedron.records.words import effect_words
@@ -237,7 +236,7 @@ def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) 
         max(abs(r.value - m.value) - FRAME_TOLERANCE * largest[r.unit], 0.0) / s
         for (m, r), s in zip(shared, sigma, strict=True)
     ]
-    p_value = min(1.0, 2.0 * len(shared) * float(norm.sf(max(beyond))))
+    p_value = min(1.0, 2.0 * len(shared) * ndtr(-max(beyond)))
     return [
         ParameterDifference(
             model.id, sensor, r.name, m.value, r.value, r.value - m.value, s, r.unit, p_value, p_value < alpha / 2.0

@@ -10,12 +10,11 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
 
 from trihedron.arrays import AXES, TINY, FloatArray
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
+from trihedron.probability import chdtri, fdtrc
 from trihedron.records.diagnosis import ParameterDifference
 from trihedron.records.words import words
 from trihedron.units import STANDARD_GRAVITY_M_S2
@@ -75,7 +74,7 @@ class _Group:
         n = len(self.difference)
         ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, TINY)
         distance = float(self.difference @ np.linalg.solve(self.covariance + ridge * np.eye(n), self.difference))
-        return max(float(f_distribution.sf(distance / n, n, self.dof)), TINY)
+        return max(float(fdtrc(n, self.dof, distance / n)), TINY)
 
 
 @dataclass(frozen=True)
@@ -219,7 +218,7 @@ def _never_added(
 ) -> str:
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
-    is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_BIAS, 3))
+    is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, NO_BIAS)
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
     if not (is_none and would_show):
         return ""
@@ -272,7 +271,7 @@ def _as_gravity(scale: _Group, alpha: float) -> _Group:
     common = variance * float(ones @ weight @ scale.difference)
     rest = scale.difference - common
     unlike = float(rest @ weight @ rest) / 2.0
-    if f_distribution.sf(unlike, 2, SPREAD_DOF) < alpha:
+    if fdtrc(2.0, SPREAD_DOF, unlike) < alpha:
         return scale
     return _Group(
         "gravity", "accelerometer", ("common scale",), np.ones(1), np.exp([common]), np.array([common]),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -50,7 +49,6 @@ def _play(context: Context, width: float) -> Variant:
 
 def _creep(context: Context, tau: float) -> Variant:
     coarse, index, step = _coarse(context)
-    keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
-    slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
+    slow = _core.simulate_first_order(coarse, step / context.obs.recording.rate_hz, (tau,) * 3)
     columns = on_axes(context, ACCELEROMETER, context.at_points((slow - coarse)[index]))
     return Variant(columns, per_axis("creep"), ("1",) * 3, {"time_constant": (tau, "s")}, "creep")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import trapezoid
 from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.arrays import FloatArray
@@ -50,7 +49,7 @@ def table_turns(context: Context) -> list[TableTurn]:
         t = context.time_s[where]
         about_up = context.rate[where] @ up
         across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
-        angle = float(trapezoid(about_up, t))
+        angle = float(np.trapezoid(about_up, t))
         if abs(angle) < HALF_RIGHT_RAD or np.mean(across) > MOST_ACROSS * np.mean(np.abs(about_up)):
             continue
         error = (angle + HALF_RIGHT_RAD) % (2.0 * HALF_RIGHT_RAD) - HALF_RIGHT_RAD

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -193,6 +192,8 @@ def maximum(
     start = np.log(best[live])
     corners = np.vstack([start, start + FIRST_STEP * np.eye(len(start))])
     options: Any = {"initial_simplex": corners, "fatol": ENOUGH, "xatol": ENOUGH}
+    from scipy.optimize import minimize  # imported here: sessions of many poses do without
+
     found = minimize(loss, start, method="Nelder-Mead", bounds=bounds, options=options)
     best[live] = np.exp(found.x)
     return -float(found.fun), best

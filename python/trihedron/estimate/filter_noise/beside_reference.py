@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
@@ -309,4 +308,4 @@ def _twice_summed(h: float, tau_s: FloatArray, alike: FloatArray) -> FloatArray:
     """Variance (k,) of the integral over h of a unit Matérn-3/2 process, its correlation multiplied by ``alike``."""
     lag = np.linspace(0.0, h, 101)
     kernel = matern(lag[None, :], tau_s[:, None]) * np.interp(lag, np.linspace(0.0, h, len(alike)), alike)
-    return np.asarray(2.0 * trapezoid((h - lag) * kernel, lag, axis=1))
+    return np.asarray(2.0 * np.trapezoid((h - lag) * kernel, lag, axis=1))

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp, ndtr, ndtri, stdtrit
-from scipy.stats import multivariate_t
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
@@ -215,6 +214,8 @@ def _effective(weights: FloatArray) -> float:
 
 def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
     """(k,) log density of points (k, f) under the equal mixture of Student's distributions (mean, Cholesky root)."""
+    from scipy.stats import multivariate_t  # imported here: the import takes longer than the rest of the command
+
     each = [multivariate_t(middle, root @ root.T, TAILS).logpdf(x) for middle, root in proposals]
     return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
 

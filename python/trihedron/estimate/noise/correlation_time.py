@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import chdtri
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 
 TIMES_PER_OCTAVE = 8
@@ -50,7 +50,7 @@ def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     best = int(np.argmin(misfit))
     # Where no corner explains the octaves the interval is widened (Birge ratio).
     scale = max(float(misfit[best]) / max(dof, 1), 1.0)
-    inside = np.flatnonzero(misfit < misfit[best] + float(chi2.isf(0.05, 1)) * scale)
+    inside = np.flatnonzero(misfit < misfit[best] + chdtri(1.0, 0.05) * scale)
     if rival - float(misfit[best]) < BETTER * scale or inside[0] == 0 or inside[-1] == n - 1:
         return None
     if min(t.best(t.corner(float(tau[best])))[0] / t.density[-1] for t in tables) < FLOOR:

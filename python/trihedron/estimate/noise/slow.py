@@ -25,9 +25,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2, qmc
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import chdtrc
 from trihedron.records.pose_noise import Measured, Ratio
 
 FEWEST_CONTRASTS = 11
@@ -123,7 +123,7 @@ def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> S
         by_b += float((p.max(axis=0) + q.max(axis=0)).max()) - together
         by_k += float((p.max(axis=1) + q.max(axis=1)).max()) - together
         drawn.append((_Drawn.of(parts[0], b, k), _Drawn.of(parts[1], b, k)))
-    p_value = float(chi2.sf(2.0 * won, 2.0 * len(first)))
+    p_value = chdtrc(2.0 * len(first), 2.0 * won)
     sides_terms = [tuple(term for pair in drawn for term in pair[j].terms()) for j in (0, 1)]
     ratios = tuple(_ratios(*pair, axis) for pair in drawn for axis in range(pair[0].B.shape[1]))
     return SlowDifference(p_value, "B" if by_b > by_k else "K", sides_terms[0], sides_terms[1], ratios)
@@ -189,6 +189,8 @@ class _Drawn:
     @classmethod
     def of(cls, parts: _Parts, b: FloatArray, k: FloatArray) -> _Drawn:
         """Draws within the levels ``b``, ``k``: prior flat in the logarithm, with a share of the points at zero."""
+        from scipy.stats import qmc  # imported here: the import takes longer than most noise analyses
+
         axes = len(parts.of_b)
         u = qmc.Sobol(2 * axes + 1, seed=0).random(DRAWS[axes])
         depth, there = (u - ABSENT) / (1.0 - ABSENT), u >= ABSENT

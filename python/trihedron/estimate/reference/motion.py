@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
@@ -116,7 +116,7 @@ def _deviating(problem: Problem, strengths: FloatArray, mean: FloatArray) -> Flo
     """Times (k,) of blocks whose innovation the fit does not explain."""
     normal = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
     left = (normal.innovations @ np.append(-mean[problem.index], 1.0)).reshape(-1, 3)
-    p = chi2.sf(np.sum(left**2, axis=1), 3)
+    p = chdtrc(3.0, np.sum(left**2, axis=1))
     return np.asarray(problem.blocks.time_s()[p < SURPRISE / max(normal.rows, 1)])
 
 

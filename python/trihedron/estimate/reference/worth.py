@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import chi2
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.likelihood import STRENGTHS
 from trihedron.estimate.reference.motion import MotionFit, fit_motion
 from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.probability import chdtrc, chdtri
 from trihedron.ranges import edges_of
 from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
@@ -77,7 +77,7 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
     change_S = coarse.value(0, "S") - found.value(k, "S")
     both = coarse.covariance(0, ("S",)) + found.covariance(k, ("S",))
     far = float(change_S @ np.linalg.solve(both, change_S))
-    if chi2.sf(far, 9) < CERTAIN:
+    if chdtrc(9.0, far) < CERTAIN:
         out.append(Sign("S-depends-on-duration", far, 9.0))
     return tuple(out)
 
@@ -89,7 +89,7 @@ def residual_density(side: Beside, found: MotionFit, k: int) -> float:
     change = np.diff(fine.observed.reshape(-1, 3), axis=0)[rows[1:] & rows[:-1]]
     # Means of a random walk over neighbouring blocks differ by 2/3 of its variance per block; the median is robust
     # to impacts and divided by that of chi-square with 3 degrees of freedom.
-    return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chi2.median(3))))
+    return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chdtri(3.0, 0.5))))
 
 
 def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
