@@ -24,7 +24,8 @@ def errors(rng, n, name):
     white = np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)]) * G / sigma[:, None]
     chi2 = float(np.sum((residual / sigma) ** 2)) / (n - 9)
     alone = chi2 * np.diag(np.linalg.inv(white.T @ white))
-    return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(covariance_by_bends(up, residual, sigma, G)))
+    added = covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), G)
+    return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(added))
 
 
 @pytest.mark.parametrize(
@@ -48,7 +49,7 @@ def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     pairs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
     up = np.array([np.insert([a, b], k, 0.0) for k in range(3) for a, b in pairs]) / np.sqrt(2.0)
     residual = np.random.default_rng(3).normal(size=12) * 4e-4
-    added = covariance_by_bends(up, residual, np.full(12, 4e-4), G)
+    added = covariance_by_bends(up, residual, np.full(12, 4e-4), np.zeros((12, 0)), G)
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3
 
 
@@ -56,4 +57,14 @@ def test_poses_alike_leave_nothing_to_judge_by():
     rng = np.random.default_rng(9)
     up, _ = drawn(rng, 9)
     alike = np.repeat(up[:5], 8, axis=0)
-    assert not np.any(covariance_by_bends(alike, rng.normal(size=40), np.ones(40), G))
+    assert not np.any(covariance_by_bends(alike, rng.normal(size=40), np.ones(40), np.zeros((40, 0)), G))
+
+
+def test_a_drift_that_is_known_is_no_bend():
+    rng = np.random.default_rng([31, 24])
+    up, sigma = drawn(rng, 24)
+    curve = np.linspace(-1.0, 1.0, 24)[:, None] * up * 0.05
+    residual, _ = linear_fit(up, curve @ rng.normal(size=3) + sigma * rng.normal(size=24), sigma)
+    unknown, known = (covariance_by_bends(up, residual, sigma, of, G) for of in (curve[:, :0], curve))
+    # At least half of the uncertainty goes.
+    assert np.diag(known)[:6].max() < 0.25 * np.diag(unknown)[:6].max()

@@ -130,20 +130,24 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     assert gain[1] - gain[0] == pytest.approx(expected, abs=0.5 * abs(expected))
 
 
-@pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 8.6)])
+@pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 2.6)])
 def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_poses_alone(
     real_data, name, expected_mm_s2
 ):
     # Moves of this log miss by degrees (lost samples, timestamps of arrival). Over the accelerometer they left 19
-    # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone leave 2.94 and 8.30.
+    # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone, with biases that are lines in time, leave 2.79
+    # and 2.09: the second accelerometer drifts by 40 mm/s².
     result = calibrate(read_recording(real_data / "openaxes" / f"{name}.csv"), gravity_m_s2=9.8127)
-    sensor = result.calibration.accelerometer
+    sensor, segments = result.calibration.accelerometer, result.segments
     assert sensor.method == "joint"
-    force = result.segments.accelerometer_mean @ sensor.S.T + sensor.b
-    rms = 1e3 * np.sqrt(np.mean((np.linalg.norm(force, axis=1) - 9.8127) ** 2))
-    assert rms == pytest.approx(1e3 * sensor.quality.rms, rel=1e-9)
-    assert rms < expected_mm_s2
-    assert 1.0 < 1e3 * sensor.quality.held_out_rms / rms < 2.0  # 33 poses for nine parameters
+    force = segments.accelerometer_mean @ sensor.S.T + sensor.b
+    error = np.linalg.norm(force, axis=1) - 9.8127
+    assert 1e3 * np.sqrt(np.mean(error**2)) == pytest.approx(1e3 * sensor.quality.rms, rel=1e-9)
+    up, time_s = force / np.linalg.norm(force, axis=1, keepdims=True), np.asarray(segments.time_mid_s)
+    line = np.column_stack([up, up * (time_s - time_s.mean())[:, None]])
+    left = error - line @ np.linalg.lstsq(line, error, rcond=None)[0]
+    assert 1e3 * np.sqrt(np.mean(left**2)) < expected_mm_s2
+    assert 1.0 < sensor.quality.held_out_rms / sensor.quality.rms < 2.0  # 33 poses for nine parameters
 
 
 def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():

@@ -153,7 +153,9 @@ def calibrate(
             # Serious findings about the log come before the error of the fit.
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
             raise InputError(" ".join((*grave, str(error)))) from None
-    calibration = in_frame(with_bending(calibration, segments), wanted)
+    if calibration.accelerometer.method != "joint":
+        calibration = with_bending(calibration, segments)
+    calibration = in_frame(calibration, wanted)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from trihedron.arrays import FloatArray
+from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.estimate.session.carried import norm_quality
 from trihedron.estimate.session.solved import solved
@@ -32,12 +33,12 @@ def calibrate_joint(
     found = solved(log, nominal_scale)
     solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
     held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
-    quality = norm_quality(found.observed, solution, held)
+    quality = norm_quality(solution, held)
     if left_out is None and alone is not None:
         quality = replace(
             quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
         )
-    return Calibration(
+    calibration = Calibration(
         accelerometer=SensorCalibration(
             S=solution.S_a,
             b=solution.b_a,
@@ -55,6 +56,7 @@ def calibrate_joint(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=(*residual_findings(quality.chi2, quality, solution.accel_bias_rms), *found.findings),
+        findings=(*residual_findings(quality.chi2, quality, *solution.accel_bias_change), *found.findings),
         averaging=solution.averaging,
     )
+    return with_bending(calibration, segments, solution.accel_drift)

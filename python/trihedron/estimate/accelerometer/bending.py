@@ -35,27 +35,30 @@ SAID = 2.0
 """Factor on a standard uncertainty above which the nonlinearity is reported as its cause."""
 
 
-def covariance_by_bends(up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> FloatArray:
+def covariance_by_bends(
+    up: FloatArray, residual: FloatArray, sigma: FloatArray, drift: FloatArray, gravity_m_s2: float
+) -> FloatArray:
     """Covariance (9, 9) that nonlinearity of unknown strength adds to the relative errors of S, row by row of its
     lower triangle, and of b in units of |g|, from unit verticals ``up`` (n, 3) and gravity errors (n,) [m/s²].
 
-    With r = X θ + B c + ε, B of one shape, c ~ N(0, τ²) and ε ~ N(0, σ² + s²), θ fitted without B has the error T c
-    beside its noise, T the part of B that the nine columns X absorb. The second moment T (C_c + ĉ ĉᵀ) Tᵀ is averaged
-    over shapes, τ and s by restricted likelihood and priors (τ half-t about the data sheet, s uniform in its log).
+    With r = X θ + B c + ε, B of one shape, c ~ N(0, τ²) and ε ~ N(0, σ² + s²) beside the errors ``drift`` (n, k) of
+    curves along which the bias drifts, one σ each, θ fitted without B has the error T c beside its noise, T the part of
+    B that the nine columns X absorb. The second moment T (C_c + ĉ ĉᵀ) Tᵀ is averaged over shapes, τ and s by restricted
+    likelihood and priors (τ half-t about the data sheet, s uniform in its log).
     """
     design, bends = design_rows(up) * gravity_m_s2, [of(up) * gravity_m_s2 for of in SHAPES.values()]
     prior = -0.5 * (TAIL_DOF + 1.0) * np.log1p((STRENGTHS / NONLINEARITY) ** 2 / TAIL_DOF) + np.log(STRENGTHS)
     evidence, added = [], []
     for scatter in SCATTERS * np.median(sigma):
-        weights = 1.0 / np.sqrt(sigma**2 + scatter**2)
-        q, r = np.linalg.qr(design * weights[:, None])
+        root = _root(np.hypot(sigma, scatter), drift)
+        q, r = np.linalg.qr(np.linalg.solve(root, design))
         if np.abs(np.diag(r)).min() < UNSEEN * np.abs(np.diag(r)).max():
             return np.zeros((9, 9))
-        left = residual * weights
+        left = np.linalg.solve(root, residual)
         left -= q @ (q.T @ left)
-        of_scatter = np.sum(np.log(weights)) - np.sum(np.log(np.abs(np.diag(r)))) - 0.5 * left @ left
+        of_scatter = -np.sum(np.log(np.diag(root))) - np.sum(np.log(np.abs(np.diag(r)))) - 0.5 * left @ left
         for bend in bends:
-            columns = bend * weights[:, None]
+            columns = np.linalg.solve(root, bend)
             taken = np.linalg.solve(r, q.T @ columns)
             columns -= q @ (q.T @ columns)
             seen, axes = np.linalg.eigh(columns.T @ columns)
@@ -70,19 +73,37 @@ def covariance_by_bends(up: FloatArray, residual: FloatArray, sigma: FloatArray,
     return np.asarray(np.einsum("sk,skij->ij", odds / odds.sum(), np.array(added)))
 
 
-def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
-    """The calibration with nonlinearity added to its covariance, where gravity errors in poses exceed noise (11.12c).
+def _root(sigma: FloatArray, drift: FloatArray) -> FloatArray:
+    """Cholesky root (n, n) of the covariance of gravity errors with noise ``sigma`` (n,) and ``drift`` (n, k)."""
+    return np.linalg.cholesky(np.diag(sigma**2) + drift @ drift.T)
+
+
+def _is_noise(up: FloatArray, residual: FloatArray, sigma: FloatArray, drift: FloatArray) -> bool:
+    """Whether noise and drift explain the gravity errors."""
+    root = _root(sigma, drift)
+    left = np.linalg.solve(root, residual)
+    q, _ = np.linalg.qr(np.linalg.solve(root, design_rows(up)))
+    left -= q @ (q.T @ left)
+    return covariance_scale(float(left @ left), len(left) - q.shape[1]) == 1.0
+
+
+def with_bending(calibration: Calibration, segments: Segments, drift: FloatArray | None = None) -> Calibration:
+    """The calibration with nonlinearity added to its covariance, where gravity errors in poses exceed noise (11.12c)
+    and ``drift`` (n, 3, k), the curves of the bias in the lower-triangular frame, one σ each [m/s²].
 
     The norms determine nine parameters in the lower-triangular frame. A calibration in frame ``case`` is unchanged.
     """
     reading, seen = segments.accelerometer_mean, calibration.accelerometer.quality
     if calibration.frame == "case" or seen is None or reading is None or len(seen.residual) != len(reading):
         return calibration
-    if covariance_scale(seen.chi2, seen.dof) == 1.0:
-        return calibration
     frame, calibration = calibration.frame, in_frame(calibration, "lower")
-    fitted = calibration.accelerometer
-    added = covariance_by_bends(verticals(fitted, reading), seen.residual, seen.sigma, calibration.gravity_m_s2)
+    fitted, is_known = calibration.accelerometer, np.isfinite(seen.residual)  # excluded poses have no residual
+    up = verticals(fitted, reading)[is_known]
+    curves = np.zeros((len(up), 0)) if drift is None else np.einsum("ni,nik->nk", up, drift[is_known])
+    errors = (up, seen.residual[is_known], seen.sigma[is_known], curves)
+    if _is_noise(*errors):
+        return in_frame(calibration, frame)
+    added = covariance_by_bends(*errors, calibration.gravity_m_s2)
     wrt = wrt_relative_errors(fitted.S, fitted.b, calibration.gravity_m_s2)
     if calibration.gyroscope is not None:
         # The gyro shares the accelerometer's frame: its parameters follow by their covariance with S and b.
@@ -92,8 +113,8 @@ def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
         wrt = np.concatenate([wrt, tied])
     covariance = calibration.covariance + wrt @ added @ wrt.T
     before, after = np.diag(calibration.covariance)[:12], np.diag(covariance)[:12]
-    is_known = before > 0.0
-    most = float(np.sqrt((after[is_known] / before[is_known]).max(initial=1.0)))
+    is_free = before > 0.0
+    most = float(np.sqrt((after[is_free] / before[is_free]).max(initial=1.0)))
     gyroscope = calibration.gyroscope
     worst = float(np.sqrt(np.diag(added)[:6].max()))
     said = Finding.of(FindingCode.NONLINEAR_RESIDUAL, "not-excluded", scale_part=worst, widening=most)

@@ -29,9 +29,10 @@ def covariance_scale(chi2: float, dof: int) -> float:
 
 
 def residual_findings(
-    chi2: float, quality: FitQuality, bias_repeatability_m_s2: float | None = None
+    chi2: float, quality: FitQuality, bias_repeatability_m_s2: float | None = None, drift_m_s2: float = 0.0
 ) -> Iterator[Finding]:
-    """Finding where the stated noise does not explain the residuals; a fit of the session has a bias repeatability."""
+    """Finding where the stated noise does not explain the residuals; a fit of the session has a bias repeatability, and
+    perhaps a drift, its range over the session."""
     scale = covariance_scale(chi2, quality.dof)
     if scale == 1.0:
         return
@@ -49,6 +50,8 @@ def residual_findings(
         dof=quality.dof,
         is_joint=bias_repeatability_m_s2 is not None,
         bias_repeatability_m_s2=bias_repeatability_m_s2 or 0.0,
+        is_drift=drift_m_s2 > 0.0,
+        drift_m_s2=drift_m_s2,
         widening=np.sqrt(scale),
     )
 

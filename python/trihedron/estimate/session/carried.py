@@ -28,12 +28,10 @@ N_FOLDS = 5
 """Folds of the cross-validation: a fifth of the poses, then of the moves."""
 
 
-def norm_quality(
-    observed: Observed, solution: SessionSolution, held: tuple[FloatArray, FloatArray] | None
-) -> FitQuality:
+def norm_quality(solution: SessionSolution, held: tuple[FloatArray, FloatArray] | None) -> FitQuality:
     """Gravity errors in static poses at the saved S, b of the accelerometer; ``held`` (n,) are the held-out ones with
     their standard errors."""
-    found = gravity_quality(*norm_errors(observed, solution.S_a, solution.b_a), held)
+    found = gravity_quality(*norm_errors(solution.observed, solution.S_a, solution.b_a), held)
     return replace(
         found,
         n_iterations=solution.iterations,
@@ -60,14 +58,13 @@ class HeldOut:
     moves: Carried
 
 
-def held_out(
-    observed: Observed, measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution
-) -> HeldOut | None:
+def held_out(measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution) -> HeldOut | None:
     """Cross-validation over every k-th pose, then every k-th move; ``None`` where too few would remain.
 
     Noise strengths, and the factors on the moves' errors, are those of the whole session; a fit without the fold is one
     linear step from the optimum (eq. 11.15).
     """
+    observed = solution.observed
     n, m = len(observed.pose_force), len(observed.before)
     if m - -(-m // N_FOLDS) < N_GYROSCOPE // 2 + 1 or n - -(-n // N_FOLDS) < N_PARAMETERS:
         return None

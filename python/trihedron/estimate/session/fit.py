@@ -9,6 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.drift import drifting
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
@@ -34,8 +35,8 @@ class SessionSolution:
 
     ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); one bias for the session. ``moves_chi2`` with
     ``moves_dof`` degrees of freedom is χ² of the tilt errors after rotations by the noise of the samples. ``inflation``
-    has the factors on the standard errors of tilt and velocity; ``accel_bias_rms`` [m/s²] is the rms difference of the
-    poses' biases from the session's: the least gravity error of S, b alone.
+    has the factors on the standard errors of tilt and velocity. ``observed`` is the session with the curves of drifting
+    biases among its unknowns.
     """
 
     S_a: FloatArray
@@ -46,17 +47,17 @@ class SessionSolution:
     moves_chi2: float
     moves_dof: float
     inflation: tuple[float, float]
-    accel_bias_rms: float
     averaging: float
     is_converged: bool
     stopped_because: str
     iterations: int
+    observed: Observed
     core: _core.SessionFit
 
     @property
     def is_drifting(self) -> bool:
-        """Whether the accelerometer's bias random walk is stronger than the noise of parts explains."""
-        return self.core.strengths[0][0] < NOISE_CORNER_S
+        """Whether the accelerometer's bias follows a curve, or walks more than the noise of parts explains."""
+        return self.core.strengths[0][0] < NOISE_CORNER_S or bool(self.accel_drift.any())
 
     def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
         """The moves with this solution's corrections: averaging over the interval, position of undithered biases inside
@@ -65,8 +66,29 @@ class SessionSolution:
         place = np.zeros(3)
         place[hidden] = effect[: len(hidden)]
         rate = sharpened(measured.rate, measured.time_s, self.averaging) - measured.is_hidden * place
-        shared = effect[len(hidden) + 1 : -1]
+        shared = effect[len(hidden) + 1 :][: measured.shared_errors.shape[2]]
         return replace(measured, rate=rate - measured.shared_errors @ shared, bias=measured.bias - place)
+
+    @property
+    def accel_drift(self) -> FloatArray:
+        """Curves of the accelerometer's bias in the poses (n, 3, k), one prior σ each [m/s²]."""
+        drift = self._drift
+        of_poses = self.observed.force_effect[: self.observed.n_poses, :, drift]
+        return np.asarray(np.einsum("ij,njk->nik", self.S_a, of_poses) * self.observed.effect_sigma[drift])
+
+    @property
+    def accel_bias_change(self) -> tuple[float, float]:
+        """RMS difference of the poses' biases from the session's, the least gravity error of S, b alone, and the range
+        of their drift along a curve, largest axis; m/s²."""
+        drift = self._drift
+        along_curves = self.accel_drift @ (self.core.effect[drift] / self.observed.effect_sigma[drift])
+        away = self.core.pose_force_bias @ self.S_a.T + along_curves
+        return float(np.sqrt(np.mean(away**2))), float(np.ptp(along_curves, axis=0).max())
+
+    @property
+    def _drift(self) -> slice:
+        n = len(self.observed.effect_sigma)
+        return slice(n - self.observed.n_drift, n)
 
     @property
     def parameters(self) -> FloatArray:
@@ -84,6 +106,11 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     their size they biased a real accelerometer by five standard errors.
     """
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
+    for sensor in (0, 1):
+        found = drifting(observed, core, sensor)
+        if found is not None:
+            core = _again(found, core, (*START_STRENGTHS[:3], core.strengths[3]), ANYTHING)
+            observed = found
     corner, scatter, between, (gravity, _) = core.strengths
     weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
@@ -101,9 +128,14 @@ def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
     return _solution(observed, _again(observed, solution.core, solution.core.strengths))
 
 
-def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
-    """The fit of a session started from another fit, at given noise strengths."""
-    return _fit(observed, state_of(core, observed.gravity_m_s2), strengths, None)
+def _again(
+    observed: Observed, core: _core.SessionFit, strengths: Strengths, within: Bounds | None = None
+) -> _core.SessionFit:
+    """The fit of a session started from another fit, perhaps without its last unknowns; noise strengths are given, or
+    optimised ``within`` bounds."""
+    state = state_of(core, observed.gravity_m_s2)
+    added = len(observed.effect_sigma) - len(state.effect)
+    return _fit(observed, replace(state, effect=np.append(state.effect, np.zeros(added))), strengths, within)
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
@@ -111,7 +143,6 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    away = core.pose_force_bias @ S_a.T
     return SessionSolution(
         S_a=S_a,
         b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
@@ -121,11 +152,11 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         moves_chi2=chi2 * inflation[0] ** 2,
         moves_dof=dof,
         inflation=inflation,
-        accel_bias_rms=float(np.sqrt(np.mean(away**2))),
         averaging=EITHER + float(core.effect[observed.n_hidden]),
         is_converged=core.is_converged,
         stopped_because=words(core.stopped_because),
         iterations=core.iterations,
+        observed=observed,
         core=core,
     )
 

@@ -30,7 +30,9 @@ class Observed(SessionReadings):
     ``force_effect``, ``rate_effect`` (poses, then samples of moves, 3, k), raw, are the derivatives of the readings by
     k unknowns with prior σ ``effect_sigma`` (k,): position of the bias inside its LSB, for the ``n_hidden`` axes whose
     noise does not dither it; averaging of readings over their interval, relative to ``EITHER``; errors that all moves
-    share; delay of the accelerometer. ``prior`` is that of both linear models on centred readings.
+    share; delay of the accelerometer; the ``n_drift`` last ones are curves of drifting biases. ``effect_time_s`` are
+    the times of their rows, ``pose_lasts_s`` (n,) the lengths of the poses. ``prior`` is that of both linear models on
+    centred readings.
     """
 
     gravity_m_s2: float
@@ -42,7 +44,10 @@ class Observed(SessionReadings):
     force_effect: FloatArray
     rate_effect: FloatArray
     effect_sigma: FloatArray
+    effect_time_s: FloatArray
+    pose_lasts_s: FloatArray
     n_hidden: int
+    n_drift: int = 0
     prior: Prior | None = None
 
     def model(self) -> _core.SessionModel:
@@ -112,6 +117,7 @@ def arranged(
         effect_sigma=np.array([
             *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
+        effect_time_s=np.concatenate([pose_time_s, _samples_of(ranges, measured.time_s)]), pose_lasts_s=lasts_s,
         n_hidden=len(coarse),
     )  # fmt: skip
 

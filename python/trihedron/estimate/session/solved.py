@@ -13,7 +13,7 @@ from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
-from trihedron.estimate.session.observed import Observed, with_prior
+from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import chdtri
 from trihedron.records.calibration import SensorCalibration
@@ -53,7 +53,6 @@ class SolvedSession:
     the gyro's record, ``held_out`` the cross-validated residuals; ``findings`` are those of the moves.
     """
 
-    observed: Observed
     solution: SessionSolution
     covariance: FloatArray
     gyroscope: SensorCalibration
@@ -67,7 +66,6 @@ class _Fit:
 
     measured: MoveMeasurements
     used: BoolArray
-    observed: Observed
     solution: SessionSolution
     seen: Carried
 
@@ -87,7 +85,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     found = _with_hidden_turns(log, _fitted(log, measured, near), near)
     measured, solution, seen = found.measured, found.solution, found.seen
     shown = solution.as_read(measured)
-    left_out = held_out(found.observed, shown, log.anchors_s(measured), solution)
+    left_out = held_out(shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -114,7 +112,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     )
     said = findings_of(found.outliers, measured, solution, gyroscope, seen)
     return SolvedSession(
-        found.observed, solution, covariance, gyroscope, left_out, (*said, *losses.findings(own_sigma))
+        solution, covariance, gyroscope, left_out, (*said, *losses.findings(own_sigma))
     )  # fmt: skip
 
 
@@ -127,7 +125,7 @@ def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
         used = used | (~measured.is_lost & ~_denied(found))
         found = found if np.array_equal(used, found.used) else _fit(log, measured, used, near)
     while True:
-        observed = found.observed
+        observed = found.solution.observed
         far = np.isin(measured.links[:, 0], observed.before[far_moves(found.solution, len(observed.before))])
         if not np.any(used & far) or not is_enough(used & ~far):
             return found
@@ -136,11 +134,10 @@ def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
 
 
 def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _Fit:
-    observed = log.observed(measured, used, near)
-    solution = solve_session(observed, *near)
+    solution = solve_session(log.observed(measured, used, near), *near)
     shown = solution.as_read(measured)
     seen = log.carried(shown, (solution.S_a, solution.b_a, solution.S_w))
-    return _Fit(measured, used, observed, solution, seen)
+    return _Fit(measured, used, solution, seen)
 
 
 def _denied(found: _Fit) -> BoolArray:
@@ -186,7 +183,7 @@ def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> Senso
     covariance = to_frame @ found.gyroscope.covariance @ to_frame.T
     for direction in _standard_errors(accelerometer.covariance):
         S_a, b_a, into = lower(accelerometer.S + direction[:9].reshape(3, 3), accelerometer.b + direction[9:])
-        observed = with_prior(found.observed, S_a, b_a, found.solution.S_w, is_given=True)
+        observed = with_prior(found.solution.observed, S_a, b_a, found.solution.S_w, is_given=True)
         other = refitted(observed, found.solution)
         off = np.concatenate([(into.T @ other.S_w - S).ravel(), into.T @ other.b_w - b])
         covariance += np.outer(off, off)

@@ -15,9 +15,9 @@ ENTRIES = {
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
         "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
         "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
-        "{is_joint:?The fit includes a bias repeatability of {bias_repeatability_m_s2:.2g mm/s²} rms per axis between "
-        "poses, and so do the standard uncertainties|All standard uncertainties of the accelerometer are multiplied by "
-        "{widening:.3g}}.",
+        "{is_joint:?The fit includes a bias that differs between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per "
+        "axis{is_drift:?, of which a drift of {drift_m_s2:.2g mm/s²} over the session is part|}, and so do the "
+        "standard uncertainties|All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
         _UNQUIET,
         _LOOK,
     ),

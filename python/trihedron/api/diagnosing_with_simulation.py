@@ -1,0 +1,181 @@
+"""Diagnose with a simulation: the simulated log's own diagnosis, and what differs between it and the recording."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+
+from trihedron.api.asking import WrongTypeError
+from trihedron.api.calibrating import calibrate
+from trihedron.api.driving import MovedAlike, driven
+from trihedron.api.reading import accelerometer_only, read, segment
+from trihedron.api.simulating import names_scenario, scenario_of
+from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
+from trihedron.comparison.model import compared, with_noise_stage
+from trihedron.comparison.noise import Sampled, compare_noise, sampled
+from trihedron.comparison.quantisation import quantisation_noise
+from trihedron.comparison.ranges import stated_ranges
+from trihedron.comparison.slow import correlation_times, slow_noise
+from trihedron.diagnose import diagnose_recording
+from trihedron.diagnose.against.fitted import model_of_diagnosis
+from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.records.progress import Progress
+from trihedron.simulate import Scenario
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+GivenModel = Recording | Scenario | str | os.PathLike[str]
+"""A simulated recording or its file, or a scenario or its .toml."""
+BIASES = ("accel-bias", "gyro-bias")
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A simulated recording with its own calibration and diagnosis."""
+
+    calibration: Calibration
+    segments: Segments
+    diagnosis: Diagnosis
+    sampled: Sampled
+    recording: Recording
+    frames: tuple[NoiseDifference, ...] = ()
+    scenario: Scenario | None = None
+
+
+def compared_with_model(
+    found: Diagnosis,
+    known: Calibration,
+    simulated: Simulated | None,
+    fitted: tuple[Recording, Segments, Calibration],
+    alpha: float,
+) -> Diagnosis:
+    """The diagnosis of a recording (``fitted``: recording, segments, own calibration) compared with the given model.
+
+    Parameters and effects are compared; with a simulation noise, stages and repeated simulations too.
+    """
+    recording, segments, _ = fitted
+    if simulated is None:
+        return compared(found, known, None, (), recording, segments, alpha)
+    turned = sign_of_gravity((simulated.segments, simulated.calibration), fitted[1:])
+    frames = (*simulated.frames, *(() if turned is None else (turned,)))
+    noise = (*frames, *_noise(simulated, found, recording, segments, alpha))
+    fit = model_of_diagnosis(found)
+    found = compared(found, known, _with_ranges(simulated, found, recording), noise, recording, segments, alpha)
+    stages = with_noise_stage(found.stages, simulated.sampled, recording, segments, fit, noise)
+    found = replace(found, stages=stages)
+    return found if simulated.scenario is None else _beside_scenario(found, simulated.scenario, fitted, alpha)
+
+
+def _beside_scenario(
+    found: Diagnosis, scenario: Scenario, fitted: tuple[Recording, Segments, Calibration], alpha: float
+) -> Diagnosis:
+    """Repeated simulations with the recording's motion; drops the remark on biases that were never applied."""
+    asked = tuple(replace(p, remark="") if p.id in BIASES else p for p in found.parameters)
+    found = replace(found, parameters=asked)
+    if fitted[0].gyroscope is None or fitted[2].gyroscope is None:
+        return found
+    return judged_by_motion(found, scenario, MovedAlike(*fitted), alpha)
+
+
+def _with_ranges(simulated: Simulated, found: Diagnosis, recording: Recording) -> tuple[Diagnosis, Recording]:
+    """Diagnosis and log of the simulation, with range limits that its scenario states but no reading reaches."""
+    if simulated.scenario is None:
+        return simulated.diagnosis, simulated.recording
+    shown = {effect.id for effect in simulated.diagnosis.effects}
+    stated = [one for one in stated_ranges(simulated.scenario, found.effects, recording) if one.id not in shown]
+    return replace(simulated.diagnosis, effects=(*simulated.diagnosis.effects, *stated)), simulated.recording
+
+
+def opened(against: GivenModel) -> GivenModel:
+    """The scenario where ``against`` names one, else ``against`` as given."""
+    if isinstance(against, str | os.PathLike) and names_scenario(against):
+        return scenario_of(against)
+    return against
+
+
+def _simulated_log(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float
+) -> tuple[Recording, Scenario | None]:
+    if isinstance(against, Recording):
+        return against, None
+    if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
+        return read(against), None
+    if recording.gyroscope is None:
+        raise InputError(
+            "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
+            "or compare with a simulated log of your own"
+        )
+    own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    return driven(against, recording, segments, own), against
+
+
+def simulated_beside(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, notify: Progress
+) -> tuple[Simulated, Recording, Segments, tuple[Finding, ...]]:
+    """The simulation's own diagnosis, the recording with the sensors that both have, its segments, and findings."""
+    notify(0.05, "diagnosing the simulated recording")
+    logged = _simulated_log(against, recording, segments, gravity)
+    logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
+    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
+    return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
+
+
+def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> Simulated:
+    recording, scenario = logged
+    of_world = rates_of_world(recording, segment(recording))
+    if of_world is not None:
+        recording = replace(recording, gyroscope=None)
+    # A scenario states its own gravity; a simulated log is taken to be of the recording's place.
+    own = gravity if scenario is None else scenario.environment.gravity
+    try:
+        result = calibrate(recording, gravity_m_s2=own)
+    except INPUT_ERRORS as error:
+        raise InputError(f"the simulated recording cannot be calibrated: {error}") from None
+    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=notify)
+    noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
+    frames = () if of_world is None else (of_world,)
+    return Simulated(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
+
+
+def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
+    n, m = simulated.n_poses, segments.n_poses
+    return () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
+
+
+def _both_sensors(
+    logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
+) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
+    """Both sides without the gyro where one side has none."""
+    theirs, scenario = logged
+    if (theirs.gyroscope is None) == (recording.gyroscope is None):
+        return logged, recording, segments, ()
+    if recording.gyroscope is None:
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "recording-has-none")
+        return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
+    return logged, *accelerometer_only(recording, segments), (finding,)
+
+
+def _noise(
+    simulated: Simulated, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
+) -> tuple[NoiseDifference, ...]:
+    """Noise and slow noise of the simulation compared with those of the recording."""
+    ours = sampled(recording, segments.poses, model_of_diagnosis(found))
+    theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
+    return (
+        *compare_noise(simulated.sampled, ours, alpha=alpha),
+        *quantisation_noise(simulated.sampled, ours, alpha=alpha),
+        *correlation_times(simulated.sampled, ours, alpha=alpha),
+        *slow_noise(theirs, (found, recording, segments), alpha=alpha),
+    )
+
+
+def gravity_of_scenario(model: object) -> tuple[float, str] | None:
+    """|g| [m/s²] that a scenario states and the words for this source; ``None`` where it states none."""
+    if not isinstance(model, Scenario) or model.environment.gravity == STANDARD_GRAVITY_M_S2:
+        return None
+    return model.environment.gravity, "that of the scenario"

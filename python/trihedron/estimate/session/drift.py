@@ -1,0 +1,70 @@
+"""Biases that drift along a curve of time, a line or a warm-up, beside the random walk that every session allows.
+
+A walk decouples the poses that a warm-up connects: S and b of a sensor that warms up would be several times less
+certain than the session determines them (docs/model-session.md, 11.12e).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import FloatArray
+from trihedron.estimate.session.observed import Observed
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, strengths_of_all
+
+TYPICAL = (0.05, 4e-3)
+"""Bias change of typical parts while they warm up, one sigma, m/s² and rad/s."""
+WARM_UP_FRACTIONS = (0.1, 0.25, 0.6)
+"""Time constants of warm-ups, as fractions of the session: a faster one concerns a pose or two, a slower is a line."""
+NOTHING: tuple[None, None, list[float]] = (None, None, [])
+CERTAIN = 4.0
+"""Gain in log-evidence from which a curve is used: about 50 to 1."""
+QUIET = strengths_of_all(8.0 * NOISE_CORNER_S)
+"""Noise as parts have it: a strong random walk absorbs a curve that low noise shows."""
+
+
+def drifting(observed: Observed, core: _core.SessionFit, sensor: int) -> Observed | None:
+    """The session with the likeliest curve of the bias of a sensor (0 the accelerometer, 1 the gyro) as three more
+    unknowns, one an axis; ``None`` where no curve is more likely than none. ``core`` is its fit without one."""
+    asked = [_columns(curve, sensor) for curve in _curves(observed)]
+    # Moves are believed as in the fit: their normalisation is part of the evidence.
+    strengths = [core.strengths, (*QUIET[:3], core.strengths[3])]
+    found = core.candidate_gains(asked, [1.0], strengths)
+    gains = [float(one[0].max()) for one in found]
+    best, asking = int(np.argmax(gains)), CERTAIN + np.log(len(asked))
+    if gains[best] < asking:
+        return None
+    (without, *_), (evidence, *_) = core.evidence([NOTHING, asked[best]], strengths, ANYTHING)
+    if evidence - max(without, core.log_marginal) < asking:
+        return None
+    *sides, sigma = asked[best]
+    raw = [
+        np.zeros((len(known), 3, 3)) if of is None else np.einsum("ij,njk->nik", np.linalg.inv(scale), of)
+        for known, of, scale in zip(
+            (observed.force_effect, observed.rate_effect), sides, (core.force_scale, core.rate_scale), strict=True
+        )
+    ]
+    return replace(
+        observed,
+        force_effect=np.concatenate([observed.force_effect, raw[0]], axis=2),
+        rate_effect=np.concatenate([observed.rate_effect, raw[1]], axis=2),
+        effect_sigma=np.append(observed.effect_sigma, sigma),
+        n_drift=observed.n_drift + len(sigma),
+    )
+
+
+def _curves(observed: Observed) -> list[FloatArray]:
+    """Shapes (n,) of a drift where effects act, zero on average over the static time, as the session's bias is."""
+    lasts_s, time_s = observed.pose_lasts_s, observed.effect_time_s
+    x = time_s - observed.pose_time_s[0]
+    length = float(observed.pose_time_s[-1] - observed.pose_time_s[0])
+    out = [x / length, *(np.exp(-x / (length * fraction)) for fraction in WARM_UP_FRACTIONS)]
+    return [curve - np.average(curve[: len(lasts_s)], weights=lasts_s) for curve in out]
+
+
+def _columns(curve: FloatArray, sensor: int) -> tuple[FloatArray | None, FloatArray | None, list[float]]:
+    own, sigma = np.ascontiguousarray(curve[:, None, None] * np.eye(3)), [TYPICAL[sensor]] * 3
+    return (own, None, sigma) if sensor == 0 else (None, own, sigma)
