@@ -12,12 +12,11 @@ from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parame
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Variant, on_axes, per_axis
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
+from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 
 MOST_M_S2, MOST_RAD_S = 0.6, 0.09
 """Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
 indicates a disturbed pose."""
-WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
-"""Time constants tried, as fractions of the recording: faster ones concern one or two poses, slower are a line."""
 COSINES = (1, 2, 3, 4)
 """Half periods of a slow curve in the session: as many bends as a fit of S and b leaves to twenty poses."""
 
@@ -27,7 +26,7 @@ class BiasDrift(BiasProcess):
 
     walks = True
     typical: ClassVar[float]
-    """Bias change of typical parts while they warm up, one sigma, SI."""
+    """Bias change of typical parts, SI."""
 
     def variants(self, context: Context) -> list[Variant]:
         """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
@@ -76,7 +75,7 @@ class AccelBiasDrift(BiasDrift):
 
     id, sensor = "accel-bias-drift", ACCELEROMETER
     confounded_with = ("accel-bias",)
-    typical = 0.05
+    typical = TYPICAL[0]
 
 
 class GyroBiasDrift(BiasDrift):
@@ -84,7 +83,7 @@ class GyroBiasDrift(BiasDrift):
 
     id, sensor = "gyro-bias-drift", GYRO
     confounded_with = ("gyro-bias",)
-    typical = 4e-3
+    typical = TYPICAL[1]
 
 
 def _duration_s(context: Context) -> float:

@@ -13,12 +13,9 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
+from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, strengths_of_all
 
-TYPICAL = (0.05, 4e-3)
-"""Bias change of typical parts while they warm up, one sigma, m/s² and rad/s."""
-WARM_UP_FRACTIONS = (0.1, 0.25, 0.6)
-"""Time constants of warm-ups, as fractions of the session: a faster one concerns a pose or two, a slower is a line."""
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
 CERTAIN = 4.0
 """Gain in log-evidence from which a curve is used: about 50 to 1."""
@@ -57,11 +54,14 @@ def drifting(observed: Observed, core: _core.SessionFit, sensor: int) -> Observe
 
 
 def _curves(observed: Observed) -> list[FloatArray]:
-    """Shapes (n,) of a drift where effects act, zero on average over the static time, as the session's bias is."""
+    """Shapes (n,) of a drift where effects act, zero on average over the static time, as the session's bias is.
+
+    Without the fastest warm-up: alone, one or two poses may as well be disturbed.
+    """
     lasts_s, time_s = observed.pose_lasts_s, observed.effect_time_s
     x = time_s - observed.pose_time_s[0]
     length = float(observed.pose_time_s[-1] - observed.pose_time_s[0])
-    out = [x / length, *(np.exp(-x / (length * fraction)) for fraction in WARM_UP_FRACTIONS)]
+    out = [x / length, *(np.exp(-x / (length * fraction)) for fraction in WARM_UP_FRACTIONS[1:])]
     return [curve - np.average(curve[: len(lasts_s)], weights=lasts_s) for curve in out]
 
 
