@@ -165,3 +165,15 @@ def test_what_misalignment_turns_inside_a_step_is_an_error_that_all_moves_share(
     # 24 or 72 numbers, of which those of a session share its readings.
     assert np.abs(scores).max() < 4.0
     assert np.sqrt(np.mean(np.square(scores))) < 1.45
+
+
+def test_an_accelerometer_that_warms_up_is_as_certain_as_its_errors_are_small():
+    # A random walk in place of the warm-up left S ten times less certain, and its errors twice as large.
+    errors, sizes = [], []
+    for seed in (881002, 881006, 881014, 881016):
+        result, z = calibrated(seed, drift="accelerometer", pose_s=2.0, move_s=0.6)
+        errors += list(z["S_f"])
+        sizes.append(float(np.max(result.accelerometer.sigma_S / np.linalg.norm(result.accelerometer.S, 2))))
+    assert max(sizes) < 4e-4
+    # 24 values, rms of z between the 0.1 and 99.9 % points of chi-square.
+    assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.45

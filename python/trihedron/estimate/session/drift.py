@@ -17,8 +17,6 @@ from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, strengths_of_all
 
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
-CERTAIN = 4.0
-"""Gain in log-evidence from which a curve is used: about 50 to 1."""
 QUIET = strengths_of_all(8.0 * NOISE_CORNER_S)
 """Noise as parts have it: a strong random walk absorbs a curve that low noise shows."""
 
@@ -31,11 +29,11 @@ def drifting(observed: Observed, core: _core.SessionFit, sensor: int) -> Observe
     strengths = [core.strengths, (*QUIET[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
     gains = [float(one[0].max()) for one in found]
-    best, asking = int(np.argmax(gains)), CERTAIN + np.log(len(asked))
-    if gains[best] < asking:
+    best, choice = int(np.argmax(gains)), np.log(len(asked))
+    if gains[best] < choice:
         return None
     (without, *_), (evidence, *_) = core.evidence([NOTHING, asked[best]], strengths, ANYTHING)
-    if evidence - max(without, core.log_marginal) < asking:
+    if evidence - max(without, core.log_marginal) < choice:
         return None
     *sides, sigma = asked[best]
     raw = [
