@@ -16,11 +16,10 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
 from trihedron.diagnose.session.state import Distortion, stacked
 from trihedron.records.domains import HeldOut
-from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
+from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
 from trihedron.threads import side_by_side
 
-NOTHING: tuple[None, None, list[float]] = (None, None, [])
 ELSEWHERE = (
     strengths_of_all(640.0),
     strengths_of_all(300.0, scatter=3.0, between=0.5, moves=2.0),

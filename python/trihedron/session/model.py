@@ -20,6 +20,9 @@ LOWER = np.tril_indices(3)
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep undetermined directions finite and belong to no domain."""
 
+NOTHING: tuple[None, None, list[float]] = (None, None, [])
+"""No further columns, as a hypothesis of the core."""
+
 
 @dataclass(frozen=True, eq=False)
 class Prior:

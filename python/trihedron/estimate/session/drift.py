@@ -14,19 +14,17 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
 from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, strengths_of_all
-
-NOTHING: tuple[None, None, list[float]] = (None, None, [])
-QUIET = strengths_of_all(8.0 * NOISE_CORNER_S)
-"""Noise as parts have it: a strong random walk absorbs a curve that low noise shows."""
+from trihedron.session.model import NOTHING
+from trihedron.session.noise import ANYTHING, START_STRENGTHS
 
 
 def drifting(observed: Observed, core: _core.SessionFit, sensor: int) -> Observed | None:
     """The session with the likeliest curve of the bias of a sensor (0 the accelerometer, 1 the gyro) as three more
     unknowns, one an axis; ``None`` where no curve is more likely than none. ``core`` is its fit without one."""
     asked = [_columns(curve, sensor) for curve in _curves(observed)]
-    # Moves are believed as in the fit: their normalisation is part of the evidence.
-    strengths = [core.strengths, (*QUIET[:3], core.strengths[3])]
+    # Also with noise as parts have it: a strong random walk absorbs a curve that low noise shows. Moves are believed as
+    # in the fit, because their normalisation is part of the evidence.
+    strengths = [core.strengths, (*START_STRENGTHS[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
     gains = [float(one[0].max()) for one in found]
     best, choice = int(np.argmax(gains)), np.log(len(asked))
