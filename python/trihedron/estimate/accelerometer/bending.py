@@ -75,7 +75,7 @@ def covariance_by_bends(
 
 def _root(sigma: FloatArray, drift: FloatArray) -> FloatArray:
     """Cholesky root (n, n) of the covariance of gravity errors with noise ``sigma`` (n,) and ``drift`` (n, k)."""
-    return np.linalg.cholesky(np.diag(sigma**2) + drift @ drift.T)
+    return np.asarray(np.linalg.cholesky(np.diag(sigma**2) + drift @ drift.T), dtype=np.float64)
 
 
 def _is_noise(up: FloatArray, residual: FloatArray, sigma: FloatArray, drift: FloatArray) -> bool:
