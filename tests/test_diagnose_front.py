@@ -16,7 +16,8 @@ import trihedron
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
-from trihedron.files.diagnosis import complaint_about, read_diagnosis, schema
+from trihedron.files.calibration import schema_of, violation
+from trihedron.files.diagnosis import read_diagnosis
 from trihedron.files.log import write_recording
 from trihedron.records import FindingCode
 from trihedron.report.document import Picture
@@ -63,17 +64,18 @@ def said(folder):
 
 def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contract(said):
     _, document, _ = said
-    assert complaint_about(document) == ""
+    assert violation(document, "diagnosis") == ""
     contract = {"verdict", "domains", "effects", "remaining", "candidates", "calibration", "noise", "schema_version"}
     assert contract <= set(document)
-    assert contract <= set(schema()["required"])
-    assert set(document) <= set(schema()["properties"])
+    assert contract <= set(schema_of("diagnosis")["required"])
+    assert set(document) <= set(schema_of("diagnosis")["properties"])
     assert set(document["figures"]) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
     bent = {
         **document["figures"],
         "gravity_error_in_static_poses": {**document["figures"]["gravity_error_in_static_poses"], "unit": "mg"},
     }
-    assert complaint_about({**document, "figures": bent}).startswith("figures.gravity_error_in_static_poses.unit")
+    said = violation({**document, "figures": bent}, "diagnosis")
+    assert said.startswith("figures.gravity_error_in_static_poses.unit")
     effect = document["effects"][0]
     assert {"id", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "confounded_with"} <= set(effect)
     assert effect["heldout"]["chi2_per_dof_after"] < 1.3 < effect["heldout"]["chi2_per_dof_before"]

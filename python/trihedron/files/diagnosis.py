@@ -8,7 +8,7 @@ from typing import Any
 
 from trihedron.documents import read_json
 from trihedron.errors import InputError
-from trihedron.files.calibration import plain, schema_of, violation
+from trihedron.files.calibration import plain, violation
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
 
 
@@ -22,7 +22,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     Raises ``InputError`` when it does not follow the schema: a defect of this program.
     """
     document: dict[str, Any] = plain(diagnosis.to_dict())
-    complaint = complaint_about(document)
+    complaint = violation(document, "diagnosis")
     if complaint:
         raise InputError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
     return document
@@ -45,19 +45,9 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise DiagnosisFileError(
             f"{path}: written in schema {version}, this version reads {SCHEMA_VERSION}; diagnose the log again."
         )
-    complaint = complaint_about(document)
+    complaint = violation(document, "diagnosis")
     if complaint:
         raise DiagnosisFileError(
             f"{path}: does not follow the diagnosis schema ({complaint}); it was changed or damaged."
         )
     return document
-
-
-def schema() -> dict[str, Any]:
-    """The JSON schema (draft 2020-12) that every diagnosis follows."""
-    return schema_of("diagnosis")
-
-
-def complaint_about(document: object) -> str:
-    """How a document violates the schema; empty when it follows it."""
-    return violation(document, "diagnosis")

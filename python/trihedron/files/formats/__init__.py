@@ -40,7 +40,7 @@ def formats() -> dict[str, Format]:
 
 def targets() -> list[str]:
     """Names of the formats in which a calibration can be written."""
-    return [name for name, one in formats().items() if one.write is not None]
+    return list(formats())
 
 
 def needs(one: Format) -> list[str]:
@@ -48,7 +48,7 @@ def needs(one: Format) -> list[str]:
     identity = (np.eye(3), np.zeros(3))
     example = given("trihedron", {"accelerometer": identity, "gyroscope": identity})
     try:
-        one.write(example, ExportOptions())  # type: ignore[misc]
+        one.write(example, ExportOptions())
     except InputError as error:
         return list(dict.fromkeys(re.findall(r"--(?:noise|rate|current-parameters)", str(error))))
     return []
@@ -61,17 +61,12 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     that convention.
     """
     one = formats().get(target)
-    if one is None or one.write is None:
+    if one is None:
         raise InputError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
     made = one.write(require_plausible(calibration), options or ExportOptions())
     texts = {"": made} if isinstance(made, str) else made
     # The texts contain file names, which may contain control characters.
     return {ending: escaped(text) for ending, text in texts.items()}
-
-
-def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
-    """As :func:`export_files`, in one text; several files are joined one after the other."""
-    return "\n".join(export_files(calibration, target, options).values())
 
 
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
