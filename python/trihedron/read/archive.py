@@ -15,8 +15,7 @@ import numpy.typing as npt
 from numpy.lib import format as npy_format
 
 from trihedron.errors import InputError
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line, from_os_error
+from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
 from trihedron.read.memory import check_memory, check_unpacked
 from trihedron.read.table import Table
 

@@ -10,8 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line, from_os_error
+from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
 from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -69,10 +68,8 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
 def _reject_containers(path: Path, names: list[str]) -> None:
     known = {
         "xl/workbook.xml": ("an Excel workbook (.xlsx)", "save the sheet as CSV"),
-        "word/document.xml": ("a Word document", "name the log itself"),
         "content.xml": ("an OpenDocument file", "save the sheet as CSV"),
         "log.bin": ("an ActiGraph .gt3x archive", "export its IMU as CSV in ActiLife"),
-        "AndroidManifest.xml": ("an Android program", "name the log itself"),
     }
     for member, (kind, remedy) in known.items():
         if member in names:
