@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.next_step import note_excluded
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
 from trihedron.cli.output import FullResults
+from trihedron.cli.run import note_excluded
 
 if TYPE_CHECKING:
     from trihedron.records import Recording

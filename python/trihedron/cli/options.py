@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from trihedron.cli.next_step import note_file, note_log, note_place, note_reference
-from trihedron.cli.provenance import note_input, note_options
+from trihedron.cli.run import note_file, note_input, note_log, note_options, note_place, note_reference
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
