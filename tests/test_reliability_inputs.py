@@ -21,7 +21,6 @@ from trihedron.cli import main
 from trihedron.documents import DocumentError, read_text
 from trihedron.errors import InputError
 from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
-from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
 from trihedron.read import ReadError, open_chunks, read_recording
 from trihedron.sanitise import escaped, escaped_json
@@ -31,7 +30,6 @@ from trihedron.simulate.scenario_file import read_scenario
 READERS = [
     (read_calibration, CalibrationFileError),
     (read_noise, NoiseFileError),
-    (read_diagnosis, DiagnosisFileError),
     (read_scenario, ValueError),
 ]
 
