@@ -54,7 +54,7 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.simulate.scenario_file import read_scenario
 
     def log(path: Path) -> object:
-        return read_whole(path, device=1) if path.name == "a.npz" else read_whole(path)
+        return read_whole(path, instance=1) if path.name == "a.npz" else read_whole(path)
 
     def calibration(path: Path) -> object:
         known = read_calibration(path)

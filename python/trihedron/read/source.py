@@ -94,8 +94,6 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
         return read_zip(path, choice, progress)
-    if choice.device is not None:
-        raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
     # The library for tables is large, and arrays do not need it.
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet

@@ -36,9 +36,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
         with zipfile.ZipFile(path) as archive:
             names = [info.filename for info in archive.infolist() if not info.is_dir()]
             if not names or any(name.endswith(".npy") for name in names):
-                return (read_npz(path, choice.device),)
-            if choice.device is not None:
-                raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
+                return (read_npz(path, choice.instance),)
             _reject_containers(path, names)
             members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
             picked = _chosen(path, members, choice.topic) or _by_name(members)
