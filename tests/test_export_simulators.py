@@ -1,7 +1,7 @@
 """A simulator's own noise law, run on the exported file, gives the unit's noise and bias, or the file names the loss.
 
 The laws are written here from the simulators' published sources and documentation: gz-sensors (slow bias as in RotorS),
-gnss-ins-sim (pathgen), MathWorks' page of imuSensor, AirSim (ImuSimple).
+gnss-ins-sim (pathgen), MathWorks' page of imuSensor, AirSim (ImuSimple), mvsim (Forster's model).
 """
 
 import json
@@ -92,6 +92,18 @@ def airsim(text, rng, truth):
     return out
 
 
+def mvsim(text, rng, truth):
+    p = {one.tag: float(one.text) for one in ElementTree.fromstring(text)}
+    dt = p["sensor_period"]
+    words = {"gyroscope": "angular_velocity", "accelerometer": "linear_acceleration"}
+    return {
+        name: truth[name]
+        + walk(rng, len(truth[name]), p[f"{word}_random_walk_std_noise"] * np.sqrt(dt))
+        + p[f"{word}_white_noise_std_noise"] * rng.standard_normal(truth[name].shape)
+        for name, word in words.items()
+    }
+
+
 def isaac(text, rng, truth):
     """Isaac Lab's gaussian_noise of operation "add", then the scale of the observation."""
     lines = [line for line in text.splitlines() if "import" not in line]
@@ -107,6 +119,7 @@ def isaac(text, rng, truth):
 
 LAWS = {
     "gazebo": gazebo, "gnss-ins-sim": gnss_ins_sim, "imusensor": imusensor, "isaac": isaac, "airsim": airsim,
+    "mvsim": mvsim,
 }  # fmt: skip
 
 
@@ -133,7 +146,7 @@ def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
         if target in ("imusensor", "isaac"):
             held = A if target == "imusensor" else np.diag(np.diag(A))
             wanted = held @ TRUTH[name][0] + b - TRUTH[name][0]
-        elif target == "airsim":
+        elif target in ("airsim", "mvsim"):
             assert f"bias of the {name} cannot be held" in text
             wanted = np.zeros(3)
         else:

@@ -120,6 +120,28 @@ def to_airsim(calibration: Calibration, options: ExportOptions) -> str:
     return json.dumps({"Sensors": {"Imu": imu}, "written_by_trihedron": said}, indent=2) + "\n"
 
 
+def to_mvsim(calibration: Calibration, options: ExportOptions) -> str:
+    """A ``<sensor>`` for a vehicle.
+
+    mvsim: an IMU of a vehicle, ``reading = truth + b + N(0, white)``, ``b <- b + N(0, walk² dt)``; b starts at 0, no S.
+    By the documentation of its sensors and its class IMU, https://github.com/MRPT/mvsim.
+    """
+    known, _, figures = distortion(calibration, options, "mvsim")
+    both = ("accelerometer", "gyroscope")
+    lost = ("Of the rate only its part about the vertical is simulated: the program's vehicles move in a plane.",)
+    said = said_of(known, options, "reading = truth + bias random walk + noise, SI.", lost_bias=both, lost=lost)
+    root = math.sqrt(figures.rate_hz)
+    lines = ["<!--", *(line.replace("--", "- -") for line in said), "-->", '<sensor class="imu" name="imu1">']
+    lines.append(f"  <sensor_period>{number(1.0 / figures.rate_hz)}</sensor_period>")
+    for word, N, K in (
+        ("angular_velocity", figures.gyro_N, figures.gyro_K),
+        ("linear_acceleration", figures.accel_N, figures.accel_K),
+    ):
+        lines.append(f"  <{word}_white_noise_std_noise>{number(N.value * root)}</{word}_white_noise_std_noise>")
+        lines.append(f"  <{word}_random_walk_std_noise>{number(K.value)}</{word}_random_walk_std_noise>")
+    return "\n".join([*lines, "</sensor>", ""])
+
+
 def to_gnss_ins_sim(calibration: Calibration, options: ExportOptions) -> str:
     """A Python module with ``imu_err`` for ``imu_model.IMU(accuracy=imu_err)``.
 
@@ -223,6 +245,7 @@ def _lost_walks(figures: Figures) -> tuple[str, ...]:
 FORMATS = (
     Format("gazebo", to_gazebo, in_si=True),
     Format("airsim", to_airsim, in_si=True),
+    Format("mvsim", to_mvsim, in_si=True),
     Format("gnss-ins-sim", to_gnss_ins_sim, in_si=True),
     Format("imusensor", to_imusensor, in_si=True),
     Format("isaac", to_isaac, in_si=True),
