@@ -1,11 +1,11 @@
-"""Logs that are no table of named columns: JSON, labels in front of readings, messages, names of words."""
+"""Logs that are no table of named columns: JSON, labels in front of readings, messages, folders, names of words."""
 
 import json
 
 import numpy as np
 import pytest
 
-from makers.structured import documents
+from makers.structured import documents, drive
 from test_read_in_silence import motion, table
 from trihedron.read import ReadError, read_recording
 from trihedron.units import AccelerationUnit, RateUnit
@@ -55,17 +55,31 @@ def test_whole_numbers_of_json_beyond_a_double_are_no_clock(tmp_path):
     assert recording.rows_in_file == len(force) + 1
 
 
-def test_rawimu_keeps_every_reading(tmp_path):
+def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     t, force, rate = motion(n_poses=3)
-    messages = []
-    for x, a, w in zip(t, force, rate, strict=True):
+    lines, messages = [], []
+    oxts = tmp_path / "drive" / "oxts"
+    (oxts / "data").mkdir(parents=True)
+    for place, text in drive(t, force, rate).items():
+        (oxts / place).write_text(text)
+    for k, (x, a, w) in enumerate(zip(t, force, rate, strict=True)):
+        acc, gyr = (", ".join(f"{v:.4f}" for v in s) for s in (a, w))
+        lines.append(f"{x:.3f}, 3, {acc}, 4, {gyr}" + (", 5, 1.0, 2.0, 3.0" if k % 2 else ""))
         c = np.rint(np.r_[a / 1e-3, w / 1e-4]).astype(int)
         counts = f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}"
         messages.append(f"%RAWIMUSA,2105,{x:.3f};2105,{366000 + x:.9f},00000077,{counts}*b5c3d6f8")
+    (tmp_path / "stream.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "rawimu.txt").write_text("\n".join([*messages[:50], "#BESTPOSA,COM1;x,y", *messages[50:]]) + "\n")
+    stream = read_recording(tmp_path / "stream.csv")
+    np.testing.assert_allclose(stream.gyroscope, rate, atol=1e-4)
     raw = read_recording(tmp_path / "rawimu.txt")
     np.testing.assert_allclose(raw.accelerometer * 1e-3, force, atol=1e-3)
     assert raw.rows_in_file == len(t) + 1
+    folder = read_recording(tmp_path / "drive")
+    np.testing.assert_allclose(folder.accelerometer, force)
+    assert folder.rate_hz == pytest.approx(100.0)
+    np.testing.assert_allclose(folder.time_s - folder.time_s[0], t - t[0], atol=1e-6)
+    assert read_recording(oxts / "data").rows_read == folder.rows_read
 
 
 def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):

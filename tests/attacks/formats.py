@@ -94,6 +94,8 @@ def _logs() -> Iterator[tuple[str, Log]]:
     yield "log.ulg", Log({"": ecosystems.ulog(ecosystems.raw_topics(0, TABLE))})
     yield "fifo.ulg", Log({"": ecosystems.ulog_of_batches(ecosystems.batches(0, TABLE))})
     yield "flash.bin", Log({"": ecosystems.dataflash(1, TABLE)})
+    oxts = structured.drive(TABLE[:40, 0], TABLE[:40, 1:4], TABLE[:40, 4:])
+    yield "drive", Log({f"oxts/{place}": text.encode() for place, text in oxts.items()})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for kind in ("ros1", "sqlite", "mcap"):

@@ -1,4 +1,4 @@
-"""Logs that are no table of named columns: JSON as boards and programs write it."""
+"""Logs that are no table of named columns: JSON as boards and programs write it, and the folder of a KITTI drive."""
 
 from __future__ import annotations
 
@@ -23,3 +23,11 @@ def documents(time_s: np.ndarray, force: np.ndarray, rate: np.ndarray) -> dict[s
             ]
         },
     }
+
+
+def drive(time_s: np.ndarray, force: np.ndarray, rate: np.ndarray) -> dict[str, str]:
+    """Texts of an ``oxts`` folder by their places in it."""
+    files = {"timestamps.txt": "".join(f"2011-09-26 13:02:{t:012.9f}\n" for t in time_s)}
+    for k, (a, w) in enumerate(zip(force.tolist(), rate.tolist(), strict=True)):
+        files[f"data/{k:010d}.txt"] = " ".join(map(str, [*range(11), *a, *a, *w, *w, *range(7)]))
+    return files

@@ -9,6 +9,7 @@ from pathlib import Path
 from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.read.kitti import oxts_folder, read_kitti
 from trihedron.read.table import Table
 from trihedron.read.zipped import read_zip
 from trihedron.records.progress import Progress
@@ -84,6 +85,8 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         from trihedron.read.ros import read_bag
 
         return tuple(replace(table, is_chosen=True) for table in read_bag(path, "", choice, progress))
+    if path.is_dir() and (oxts := oxts_folder(path)) is not None:
+        return (read_kitti(oxts),)
     size = check_readable(path)
     try:
         with path.open("rb") as stream:
