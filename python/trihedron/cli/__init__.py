@@ -82,6 +82,14 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
+def _manual(asked: bool) -> None:
+    if asked:
+        from trihedron.cli.manual import manual
+
+        typer.echo(manual(typer.main.get_command(build_app())))
+        raise typer.Exit
+
+
 def build_app() -> typer.Typer:
     """The command with all its subcommands."""
     app = typer.Typer(
@@ -101,6 +109,9 @@ def build_app() -> typer.Typer:
 
 def trihedron(
     version: bool = typer.Option(False, "--version", help="Print the version.", is_eager=True, callback=_version),
+    man: bool = typer.Option(
+        False, "--man", help="Print the manual page (trihedron --man | man -l -).", is_eager=True, callback=_manual
+    ),
 ) -> None:
     """Calibrate an IMU from a raw log, with the uncertainty of every parameter."""
 
