@@ -130,7 +130,7 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
 
 
 # A device, several recordings or minutes: the tutorials run these.
-SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet"}
+SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
 def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(tmp_path, monkeypatch):

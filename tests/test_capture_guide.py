@@ -4,28 +4,28 @@ import http.client
 import json
 import re
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from rich.console import Console
 
 import trihedron
 from following_hand import FollowingHand
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.planning_poses import move_rows, shortest_path
+from trihedron.api.replaying import readings_of, replay, steps
 from trihedron.api.simulating import simulate
 from trihedron.capture.guide import Guide
 from trihedron.capture.stillness import Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
-from trihedron.cli.screen import screen
+from trihedron.cli.screen import as_text
+from trihedron.files.log import write_recording
 from trihedron.records.guiding import Accuracy, Examination, Phase
-from trihedron.simulate import scenario_by_name
-from trihedron.simulate.device.faults import Sent
-from trihedron.simulate.device.serving import Device
+from trihedron.simulate import hand_session, scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
@@ -45,10 +45,8 @@ def led():
     while not guide.is_done and hand.n_poses < 40:
         recording, truth = hand.session()
         state |= {"recording": recording, "truth": truth}
-        readings = np.hstack([recording.accelerometer, recording.gyroscope])
-        # Blocks of a quarter second, as in a live session.
-        edges = np.searchsorted(recording.time_s[done:], np.arange(recording.time_s[done], recording.time_s[-1], 0.25))
-        for first, last in pairwise([*edges, recording.n_samples - done]):
+        readings = readings_of(recording)
+        for first, last in steps(recording.time_s[done:]):
             state["now"] = float(recording.time_s[done + last - 1])
             views.append(
                 guide.advance(recording.time_s[done + first : done + last], readings[done + first : done + last])
@@ -182,10 +180,7 @@ def test_an_accuracy_that_is_not_understood_is_refused(text):
 def test_the_screen_fits_the_terminal_and_says_what_matters(led, width, height):
     _, views, _, _ = led
     for view in (views[0], next(v for v in views if v.phase is Phase.MOVE and v.n_poses > 9), views[-1]):
-        console = Console(width=width, height=height, color_system=None, force_terminal=False, legacy_windows=False)
-        with console.capture() as captured:
-            console.print(screen(view, width, height))
-        lines = captured.get().rstrip("\n").split("\n")
+        lines = as_text(view, width, height).rstrip("\n").split("\n")
         assert len(lines) <= height
         assert max(len(line) for line in lines) <= width
         assert view.instruction[:40] in lines[1]
@@ -193,16 +188,25 @@ def test_the_screen_fits_the_terminal_and_says_what_matters(led, width, height):
     assert "uncertainty" in "\n".join(lines)
 
 
-def test_a_stream_is_led_to_a_calibration(led, tmp_path, capsys):
+def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, capsys):
     _, _, recording, truth = led
-    raw, log, calibration = tmp_path / "raw", tmp_path / "log.csv", tmp_path / "cal.json"
-    raw.write_bytes(b"".join(piece for _, piece in Device(recording, "lines").pieces(Sent())))
-    words = ["capture", str(raw), "-o", str(log), "--guide", "--calibration", str(calibration)]
-    assert main([*words, "--gravity", f"{truth.gravity_m_s2}", "--accuracy", ACCURACY.sentence()]) == 0
-    said = capsys.readouterr()
-    assert "Accuracy reached." in said.err
-    assert "Verification" in said.out
+    log, calibration = tmp_path / "log.csv", tmp_path / "cal.json"
+    write_recording(recording, log)
+    assert main(["guide", str(log), "--gravity", f"{truth.gravity_m_s2}", "-o", str(calibration)]) == 0
+    said = capsys.readouterr().out
+    assert "Accuracy reached. 3 more poses to check it." in " ".join(said.split())
+    assert "Verification" in said
     assert trihedron.read_calibration(calibration).is_trustworthy
+
+
+def test_poses_of_a_log_that_was_not_guided_count_where_the_segmentation_finds_them():
+    # Every pose is shorter than the six seconds that the guide requests for the first.
+    motion = hand_session(n_poses=8, pose_s=3.0, first_pose_s=3.0)
+    recording, truth = trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)
+    done = replay(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2)
+    assert done.view.n_poses == trihedron.segment(recording).n_poses
+    assert done.view.n_poses >= 8
+    assert done.view.target_up is not None
 
 
 def get(page, path, cookie="", host=None):

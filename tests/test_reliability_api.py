@@ -70,7 +70,7 @@ def right(folder, recording, result, tmp_path_factory):
         "twin": both,
         "verify": both,
         "write_calibration": {"calibration": result, "path": place / "c.json"},
-    } | {verb: {"recording": recording} for verb in ("calibrate", "check", "diagnose", "kalman", "segment")}
+    } | {verb: {"recording": recording} for verb in ("calibrate", "check", "diagnose", "guide", "kalman", "segment")}
 
 
 NO_NUMBER = ("1", [1.0], None, 1j, object(), np.zeros(3), True, b"1", np.datetime64("2020-01-01"))

@@ -39,6 +39,7 @@ OUTPUTS = {
         ["simulate", "--like", "log.csv", "--calibration", "c.json", "-o"],
         ["simulate", "s.toml", "-o", "x.csv", "--truth"],
     ],
+    "guide": [["guide", "log.csv", "-o"]],
     "report": [["report", "n.json", "--report"]],
 }
 NO_INPUT_FILE = {"demo", "plan", "ports", "capture"}
@@ -244,8 +245,8 @@ def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one(
     takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)} | {
         "verify"
     }
-    # Where it is an output (capture) nothing is read.
-    assert takes - {"capture", "calibrate", "kalman"} == set(UNTRUSTED)
+    # Where it is an output (capture, guide) nothing is read.
+    assert takes - {"capture", "guide", "calibrate", "kalman"} == set(UNTRUSTED)
 
 
 @pytest.mark.parametrize("words", UNTRUSTED.values(), ids=list(UNTRUSTED))

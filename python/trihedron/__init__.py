@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from trihedron.api.reading import read as read
     from trihedron.api.reading import segment as segment
     from trihedron.api.references import calibrate_references as calibrate_references
+    from trihedron.api.replaying import guide as guide
     from trihedron.api.sessions import calibrate_sessions as calibrate_sessions
     from trihedron.api.simulating import simulate as simulate
     from trihedron.api.simulating import twin as twin
@@ -116,6 +117,7 @@ _PUBLIC = {
     "api.ranking": "rank",
     "api.reading": "read segment",
     "api.references": "calibrate_references",
+    "api.replaying": "guide",
     "api.sessions": "calibrate_sessions",
     "api.simulating": "simulate twin",
     "api.verifying": "verify",
@@ -167,6 +169,7 @@ __all__ = [
     "extend",
     "filter_noise",
     "fleet",
+    "guide",
     "identify_noise",
     "integrate_rate",
     "kalman",

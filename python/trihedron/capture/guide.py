@@ -101,6 +101,12 @@ class Guide:
             n_events=self._events,
         )
 
+    def finish(self) -> GuideView:
+        """Count a pose that the end of the readings left unfinished; return what to show."""
+        if not self.is_done and self._here.is_uncounted:
+            self._take_left()
+        return self.view()
+
     def _step(self) -> None:
         still_s = self._stillness.still_for_s
         if self._here.is_over(self._stillness) and self._here.is_uncounted:

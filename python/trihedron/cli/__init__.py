@@ -28,6 +28,7 @@ from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.fleet import fleet
+from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
 from trihedron.cli.noise import noise
@@ -49,6 +50,7 @@ COMMANDS = (
     plan,
     ports,
     capture,
+    guide,
     check,
     segment,
     calibrate,

@@ -20,6 +20,13 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Led through a calibration:", "trihedron capture /dev/ttyUSB0 -o log.csv --guide --calibration cal.json"),
         ("A stream over the network:", "trihedron capture tcp://192.168.1.20:9000 -o log.csv"),
     ),
+    "guide": (
+        ("What the guide would have said:", "trihedron guide log.csv"),
+        (
+            "How long such a session must be for twice the accuracy:",
+            'trihedron guide log.csv --accuracy "accel 0.05 %"',
+        ),
+    ),
     "report": (
         ("A page of a result that was saved with --json:", "trihedron report result.json --report result.html"),
     ),

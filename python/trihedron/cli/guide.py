@@ -1,8 +1,11 @@
-"""``trihedron capture --guide``: the guide's loop, with a screen, a page or neither."""
+"""``trihedron guide`` and ``trihedron capture --guide``: the guide's loop, with a screen, a page or neither."""
 
 from __future__ import annotations
 
+import math
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from trihedron.cli.options import GravitySource, LogSource, with_options
+
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Recorder
-    from trihedron.cli.options import GravitySource
     from trihedron.records import Recording
     from trihedron.records.guiding import GuideView
 
@@ -21,6 +25,57 @@ MOST_COLUMNS = 120
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
+
+
+OPTIONS = {
+    "accuracy": ("TEXT", 'When to stop: "accel 0.05 %, gyro 0.1 %".'),
+    "every": "Print the screen after every pose, not only the last.",
+    "output": ("FILE", "Calibration to write.", "-o"),
+}
+
+
+@with_options(OPTIONS, source=LogSource, place=GravitySource)
+def guide(
+    source: LogSource,
+    place: GravitySource,
+    accuracy: str = DEFAULT_ACCURACY,
+    every: bool = False,
+    output: Path | None = None,
+    force: bool = False,
+) -> None:
+    """Replay a log through the guide of capture, which names the next pose after each, then calibrate and verify."""
+    from trihedron.api.replaying import replay
+    from trihedron.cli.output import check_outputs, put
+    from trihedron.cli.screen import as_text
+    from trihedron.records.guiding import Accuracy
+
+    wanted = Accuracy.parse(accuracy)
+    check_outputs(output, force=force, inputs=source.files)
+
+    def notify(view: GuideView) -> None:
+        put(_line(view) + "\n")
+        if every:
+            put(as_text(view, *_size()) + "\n")
+
+    done = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=notify)
+    put(as_text(done.view, *_size()) + "\n")
+    finish(done.recording, done.cut_s, place, output, force=force)
+
+
+def _size() -> tuple[int, int]:
+    """Columns and lines of the terminal; elsewhere COLUMNS and LINES, or 80 x 24."""
+    size = shutil.get_terminal_size((80, 24))
+    return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
+
+
+def _line(view: GuideView) -> str:
+    known = view.examination
+    if known is None:
+        return ""
+    far = f"{known.shortfall:.2g} x goal" if math.isfinite(known.shortfall) else "unknown"
+    left = "goal reached" if known.is_good_enough else far
+    head = f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  worst uncertainty {left:13s} "
+    return textwrap.fill(view.instruction, _size()[0], initial_indent=head, subsequent_indent=" " * len(head))
 
 
 def finish(

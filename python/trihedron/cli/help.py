@@ -11,7 +11,7 @@ from trihedron.cli.examples import EXAMPLES
 
 COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("First look", ("demo",)),
-    ("Record", ("plan", "ports", "capture")),
+    ("Record", ("plan", "ports", "capture", "guide")),
     ("Calibrate", ("check", "segment", "calibrate", "kalman", "allan", "noise")),
     ("Judge", ("verify", "diagnose")),
     ("Many devices", ("fleet",)),
@@ -22,7 +22,7 @@ _OF_THE_LOG = (
     *("accel", "gyro", "columns", "rate", "accel_unit", "gyro_unit", "time_unit", "topic", "instance"),
     *("gyro_lsb", "accel_lsb", "samples", "stream", "curve", "exclude", "keep_events"),
 )
-_OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "updated", "improved", "truth")
+_OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "updated", "improved", "truth", "every")
 OPTION_GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     ("The log", frozenset(_OF_THE_LOG)),
     ("Gravity", frozenset({"gravity", "latitude", "height"})),

@@ -148,3 +148,13 @@ def _groups(all_of_them: tuple[Uncertain, ...]) -> list[Uncertain]:
         words = {"scale": "scales", "bias": "biases", "axes": "angles"}[kind]
         out.append(Uncertain(sensor, words, worst.now, max(after) if after else None, worst.wanted))
     return out
+
+
+def as_text(view: GuideView, width: int = 80, height: int = 24) -> str:
+    """The screen as plain text: for tests and documentation."""
+    from rich.console import Console
+
+    console = Console(width=width, height=height, color_system=None, force_terminal=False, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(screen(view, width, height))
+    return captured.get()
