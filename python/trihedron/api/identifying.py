@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
+from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
@@ -146,13 +147,15 @@ def noise_of_file(
     gyroscope_lsb: str | None = None,
     exclude_s: Sequence[tuple[float, float]] = (),
     automatic: bool = True,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Noise:
     """Noise of a .npy, Parquet or text log of any size in bounded memory; its columns are as given, not detected.
 
     Up to half a gigabyte the log is read whole; beyond, in one pass (:func:`stream_noise`) that excludes no
-    disturbance.
+    disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
+    continues from it with bit-identical results, and the end removes it.
 
-    Raises ``InputError`` when file, columns, excluded intervals or LSBs do not match.
+    Raises ``InputError`` when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
     """
     log = open_chunks(Path(path), columns)
     stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
@@ -185,8 +188,23 @@ def noise_of_file(
         )
     if exclude_s:
         raise InputError(f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead.")
-    parts = map(scaled, log.chunks())
-    return stream_noise(parts, rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path))
+
+    kept = None
+    if checkpoint is not None:
+        kept = Checkpoint(Path(checkpoint), made_of(log.path, "allan", rate_hz, log.roles, factor))
+    done, state = kept.load() if kept else (0, {})
+
+    def parts() -> Iterator[npt.NDArray[np.float64]]:
+        for part in log.chunks(first=done):
+            yield scaled(part)
+
+    found = stream_noise(
+        parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path), state=state,
+        keep=kept.keep if kept else None,
+    )  # fmt: skip
+    if kept:
+        kept.remove()
+    return found
 
 
 def noise_of_curve(

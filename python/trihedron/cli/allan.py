@@ -9,6 +9,7 @@ import typer
 
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import FullResults, is_stdout, leave, say
+from trihedron.cli.streamed import needs_stream
 from trihedron.files.output import write_whole
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def allan(
     curve: bool = False,
     samples: int | None = None,
     stream: bool = False,
+    checkpoint: Path | None = None,
     results: FullResults,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
@@ -59,6 +61,7 @@ def allan(
     results.check(csv, plot, inputs=(*source.files, calibration))
     if calibration is not None and (curve or stream):
         raise typer.BadParameter("--calibration goes with a log that is read whole: no --curve, no --stream")
+    needs_stream(checkpoint, stream=stream)
     if curve:
         if exclude or stream or keep_events:
             raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
@@ -66,7 +69,7 @@ def allan(
     else:
         options: dict[str, Any] = {"exclude_s": stretches, "automatic": not keep_events}
         options |= {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
-        found = _of_file(source, options) if stream else _of_log(source, calibration, options)
+        found = _of_file(source, checkpoint, options) if stream else _of_log(source, calibration, options)
     from trihedron.api.identifying import recording_lengths
     from trihedron.report.noise import all_findings, noise_report
     from trihedron.report.noise_files import curve_csv, noise_record
@@ -97,7 +100,7 @@ def _of_log(source: LogSource, calibration: Path | None, options: dict[str, Any]
         return identified(recording, calibration=calibration, **options)
 
 
-def _of_file(source: LogSource, options: dict[str, Any]) -> Noise:
+def _of_file(source: LogSource, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
     from trihedron.api.identifying import noise_of_file
 
     if source.log is None or source.columns is None or source.rate is None:
@@ -109,6 +112,7 @@ def _of_file(source: LogSource, options: dict[str, Any]) -> Noise:
             rate_hz=source.rate,
             accelerometer_unit=source.accel_unit,
             gyroscope_unit=source.gyro_unit,
+            checkpoint=checkpoint,
             **options,
         )
 

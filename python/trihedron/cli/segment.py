@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import Results, leave
-from trihedron.cli.streamed import opened
+from trihedron.cli.streamed import needs_stream, opened
 
 
 @with_options(source=LogSource, results=Results)
-def segment(source: LogSource, *, stream: bool = False, results: Results) -> None:
+def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None = None, results: Results) -> None:
     """Find the poses and the moves between them."""
     results.check(inputs=source.files)
+    needs_stream(checkpoint, stream=stream)
     from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
 
@@ -19,7 +22,7 @@ def segment(source: LogSource, *, stream: bool = False, results: Results) -> Non
         from trihedron.api.streaming import condensed, segment_file
 
         with progress("segmenting") as notify:
-            found = segment_file(log, progress=notify)
+            found = segment_file(log, checkpoint=checkpoint, progress=notify)
         # Figures and times are from the rows of moves and of the ends of poses.
         recording, segments = condensed(log, found)
     else:

@@ -180,9 +180,9 @@ class ChunkedLog:
     columns: tuple[int, ...]
     read: Rows
 
-    def chunks(self, rows: int = ROWS) -> Iterator[npt.NDArray[np.float64]]:
-        """Yield arrays (k, columns) in order, in the file's data type."""
-        for start in range(0, self.n_rows, rows):
+    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
+        """Yield arrays (k, columns) in order from row ``first`` on, in the file's data type."""
+        for start in range(first, self.n_rows, rows):
             yield self.read(start, min(start + rows, self.n_rows), self.columns)
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
