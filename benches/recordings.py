@@ -29,7 +29,7 @@ def recordings(folder: Path):
     for k in (1, 2, 3):
         yield f"kim run {k}", {"path": folder / f"kim/kim_imu_good{k}.txt"}, 9.79871
     for k in (2, 3, 4, 5, 7):
-        yield f"mimu4444 exp {k}", {"path": folder / f"mimu4444/exp_{k}.npz", "device": 1}, 9.8184
+        yield f"mimu4444 exp {k}", {"path": folder / f"mimu4444/exp_{k}.npz", "instance": 1}, 9.8184
     for k in (2, 3):
         names = [next((folder / "phone").glob(f"rec_{k}*__{w}.csv")) for w in ("Acceleration", "AngularVelocity")]
         yield f"phone rec_{k}", {"accelerometer_path": names[0], "gyroscope_path": names[1]}, 9.7974

@@ -42,7 +42,7 @@ matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 
 
 def made_once() -> Path:
-    """Folder with log.csv, log.npy, static.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
+    """Folder with log.csv, log.npy, static.csv, c.json, untrusted.json, noise.json and s.toml."""
     return once("session", _made)
 
 
@@ -60,7 +60,6 @@ def _made(folder: Path) -> None:
     log, known = str(folder / "log.csv"), folder / "c.json"
     quietly("calibrate", log, "--gravity", G, "-o", str(known))
     quietly("allan", str(folder / "static.csv"), "--json", str(folder / "noise.json"))
-    quietly("diagnose", log, "--gravity", G, "--json", str(folder / "diagnosis.json"))
     document = json.loads(known.read_text())
     finding = {"code": "not-observable", "severity": "serious", "seen": "Scale 3 is not determined."}
     document["findings"] = [finding | {"cause": "", "action": "", "numbers": {}}]

@@ -292,8 +292,6 @@ def test_a_refusal_is_told_from_a_defect():
 CONVERSIONS = {
     "api/applying.py: float",
     "api/capturing.py: float",
-    "api/streaming.py: json.loads",
-    "api/streaming.py: note.read_text",
     "api/reading.py: np.ma.asanyarray",
     "api/asking.py: result_in_python",
     "api/asking.py: verb",

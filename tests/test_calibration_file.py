@@ -13,7 +13,7 @@ from trihedron.files.calibration import (
     calibration_document,
     calibration_from_document,
     read_calibration,
-    schema,
+    schema_of,
     write_calibration,
 )
 from trihedron.records.frozen import thawed
@@ -59,8 +59,8 @@ def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units
     import jsonschema
 
     document = json.loads(json.dumps(calibration_document(session[1].calibration)))
-    jsonschema.Draft202012Validator.check_schema(schema())
-    jsonschema.validate(document, schema(), cls=jsonschema.Draft202012Validator)
+    jsonschema.Draft202012Validator.check_schema(schema_of("calibration"))
+    jsonschema.validate(document, schema_of("calibration"), cls=jsonschema.Draft202012Validator)
     assert document["format_version"] == 1
     assert document["equation"] == "truth = S * raw + b"
     assert "raw to true" in document["direction"]

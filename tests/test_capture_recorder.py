@@ -167,17 +167,13 @@ def test_rows_wait_for_their_turn_to_be_written_and_synced(tmp_path, monkeypatch
     log.close()
 
 
-class SlowLog(GrowingLog):
-    def _write(self, text):
-        time.sleep(0.4)
-        super()._write(text)
-
-
-def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_loses_nothing(tmp_path):
+def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_loses_nothing(tmp_path, monkeypatch):
+    write = GrowingLog._write
+    monkeypatch.setattr(GrowingLog, "_write", lambda log, text: (time.sleep(0.4), write(log, text)))
     with Board(counts_recording(900, 1000.0), "xsens-mtdata2", speed=1.0) as board:
         source, found = open_device(board.port)
-        log = SlowLog(tmp_path / "log.csv")
-        recorder = Recorder(source, found.make_decoder, first_bytes=found.first_bytes, log=log, wait_for_return_s=0.0)
+        log = tmp_path / "log.csv"
+        recorder = Recorder(source, found.make_decoder, log, first_bytes=found.first_bytes, wait_for_return_s=0.0)
         n = sum(len(block.time_s) for block in recorder)
     assert recorder.count.lost == 0
     back = trihedron.read(tmp_path / "log.csv")

@@ -16,7 +16,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
-from trihedron.files.diagnosis import complaint_about, read_diagnosis, schema
+from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
 from trihedron.records import FindingCode
 from trihedron.report.document import Picture
@@ -24,11 +24,11 @@ from trihedron.report.extended import calibration_result_report
 from trihedron.simulate import (
     Accelerometer,
     Gyroscope,
+    diagnosed_sizes,
     effects_of,
     hand_session,
     profile_by_name,
     simulate,
-    with_diagnosed_effects,
     with_effect,
 )
 from trihedron.simulate.scenario import Scenario
@@ -63,34 +63,21 @@ def said(folder):
 
 def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contract(said):
     _, document, _ = said
-    assert complaint_about(document) == ""
+    assert violation(document, "diagnosis") == ""
     contract = {"verdict", "domains", "effects", "remaining", "candidates", "calibration", "noise", "schema_version"}
     assert contract <= set(document)
-    assert contract <= set(schema()["required"])
-    assert set(document) <= set(schema()["properties"])
+    assert contract <= set(schema_of("diagnosis")["required"])
+    assert set(document) <= set(schema_of("diagnosis")["properties"])
     assert set(document["figures"]) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
     bent = {
         **document["figures"],
         "gravity_error_in_static_poses": {**document["figures"]["gravity_error_in_static_poses"], "unit": "mg"},
     }
-    assert complaint_about({**document, "figures": bent}).startswith("figures.gravity_error_in_static_poses.unit")
+    said = violation({**document, "figures": bent}, "diagnosis")
+    assert said.startswith("figures.gravity_error_in_static_poses.unit")
     effect = document["effects"][0]
     assert {"id", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "confounded_with"} <= set(effect)
     assert effect["heldout"]["chi2_per_dof_after"] < 1.3 < effect["heldout"]["chi2_per_dof_before"]
-
-
-def test_a_diagnosis_file_is_checked_when_read(said, folder, tmp_path):
-    assert read_diagnosis(folder / "bent.json") == said[1]
-    for text, complaint in (("{", "not JSON"), ("{}", "not a diagnosis"), ('{"verdict": 1}', "schema")):
-        bad = tmp_path / "bad.json"
-        bad.write_text(text)
-        with pytest.raises(ValueError, match=complaint):
-            read_diagnosis(bad)
-    with pytest.raises(ValueError, match="no such file"):
-        read_diagnosis(tmp_path / "nowhere.json")
-    bad.write_text(json.dumps({**said[1], "schema_version": 2}))
-    with pytest.raises(ValueError, match="written in schema 2, this version reads 3; diagnose the log again"):
-        read_diagnosis(bad)
 
 
 def test_an_extended_calibration_holds_on_another_session_where_the_linear_one_does_not(folder, capsys):
@@ -163,18 +150,6 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     assert after < 0.02 * before
 
 
-def test_a_simulation_includes_what_a_diagnosis_accepted(said, folder, tmp_path, capsys):
-    log, truth = tmp_path / "again.csv", tmp_path / "truth.json"
-    words = ["simulate", "hand-session", "--with-effects", str(folder / "bent.json")]
-    assert main([*words, "-o", str(log), "--truth", str(truth)]) == 0
-    simulated = json.loads(truth.read_text())["effects"]["accel-quadratic"]["k2"]
-    accepted = [p["value"] for p in said[1]["effects"][0]["parameters"]]
-    # The suspension is solved for K2 to first order of the bridge: to rounding.
-    assert np.allclose(simulated, accepted, rtol=1e-6)
-    assert main(["simulate", "hand-session", "--with-effects", "nowhere.json", "-o", str(tmp_path / "x.csv")]) == 1
-    assert "nowhere.json" in capsys.readouterr().err
-
-
 def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():
     numbers = {"K2_x": 1e-4, "offset_x": 0.01, "half_width": 2.0, "warm_up_x": 0.1, "time_constant": 50.0}
     numbers |= {"bias_per_kelvin_x": 1e-3, "jitter": 1e-4, "accelerometer_delay": 1e-3, "accelerometer_lag": 1e-3}
@@ -185,8 +160,10 @@ def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():
         entry = {"id": effect.id, "parameters": parameters, "model": {"variant": "warm-up"}}
         if effect.id == "accel-hysteresis":
             entry["model"] = {"variant": "play"}
-        _, done, left_out = with_diagnosed_effects(scenario(), [entry])
-        assert done == (effect.id,) or left_out[effect.id]
+        sizes, left_out = diagnosed_sizes([entry])
+        for one, size in sizes:
+            with_effect(scenario(), one, **size)
+        assert {one for one, _ in sizes} == {effect.id} or left_out[effect.id]
 
 
 @pytest.mark.slow
@@ -213,10 +190,15 @@ def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign():
     recording, truth = simulate(with_effect(scenario(n_poses=14), effect_id, **{key: size}), seed=1)
     diagnosis = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
     entries = [effect.to_dict() for effect in diagnosis.effects if effect.id == effect_id]
-    made, done, _ = with_diagnosed_effects(scenario(), entries)
-    assert done == (effect_id,)
+    ((found, sizes),), _ = diagnosed_sizes(entries)
+    assert found == effect_id
     # A mapping with a wrong sign or axis is off by the size itself.
-    assert np.allclose(effects_of(made)[effect_id][key], size, rtol=0.1, atol=0.01 * np.max(np.abs(size)))
+    assert np.allclose(
+        effects_of(with_effect(scenario(), found, **sizes))[effect_id][key],
+        size,
+        rtol=0.1,
+        atol=0.01 * np.max(np.abs(size)),
+    )
 
 
 def test_a_bent_accelerometer_is_no_loss_of_samples_once_its_effect_is_found():

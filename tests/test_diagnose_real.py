@@ -46,7 +46,7 @@ def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains(xsens) -> None:
 
 
 def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(real_data: Path) -> None:
-    d = diagnosed(9.8184, first=0.4, path=real_data / "mimu4444/exp_2.npz", device=1)
+    d = diagnosed(9.8184, first=0.4, path=real_data / "mimu4444/exp_2.npz", instance=1)
     assert [e.id for e in d.effects] == ["gyro-saturation"]
     agree = {t.domain: t.chi2_per_dof for t in d.remaining if not t.disagrees}
     assert {"static-accel", "static-gyro", "moves", "dynamics"} <= set(agree)

@@ -16,7 +16,6 @@ from trihedron.files.formats import (
     ExportOptions,
     NoiseFigure,
     SensorNoise,
-    export_calibration,
     export_files,
     targets,
     upper_frame,
@@ -28,6 +27,10 @@ READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
 
 # Residue of writing numbers with all digits and evaluating in another order.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
+
+
+def export_calibration(known, target, options=None):
+    return "\n".join(export_files(known, target, options).values())
 
 
 def calibration(unit="si", handed=1.0):

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import trihedron
+from test_export import export_calibration
 from trihedron.api.calibrating import of_board
 from trihedron.cli import main
 from trihedron.files.calibration import calibration_document, calibration_from_document, write_calibration
-from trihedron.files.formats import ExportOptions, export_calibration
+from trihedron.files.formats import ExportOptions
 from trihedron.files.formats.autopilot import orientation, parameters_in
 from trihedron.records import Calibration, Onboard, SensorCalibration
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
-from test_export import NOISE, READINGS, ROUNDING, calibration
+from test_export import NOISE, READINGS, ROUNDING, calibration, export_calibration
 from trihedron.cli import main
 from trihedron.files.calibration import write_calibration
-from trihedron.files.formats import export_calibration
 
 RATE, STEPS = 200.0, 1000
 DT = 1.0 / RATE

@@ -13,7 +13,7 @@ from trihedron.cli import main
 from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
 from trihedron.files.formats.parsing import yaml_of
 
-READ = [name for name, one in formats().items() if one.read is not None and one.write is not None]
+READ = [name for name, one in formats().items() if one.read is not None]
 BOARDS = ("ardupilot", "px4")
 GYRO_LOST = ("imu_calib",)
 
@@ -117,23 +117,14 @@ CAMCHAIN = {
         "timeshift_cam_imu": 0.0021,
     }
 }
-OAK = {
-    "boardName": "BW1098OBC",
-    "cameraData": [],
-    "imuExtrinsics": {"rotationMatrix": np.eye(3).tolist(), "toCameraSocket": 0, "translation": {"x": 0, "y": 0}},
-}
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "says"),
-    [("camchain-imucam.yaml", yaml.dump(CAMCHAIN), "Kalibr"), ("oak.json", json.dumps(OAK), "depthai")],
-)
-def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(name, text, says, tmp_path):
-    """Kalibr's camera chain and the EEPROM of an OAK camera hold pose and delay of the IMU, nothing of its readings."""
-    (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=f"(?s){says}.*no scale, misalignment or bias"):
-        any_calibration(tmp_path / name)
-    assert is_calibration(tmp_path / name)
+def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(tmp_path):
+    """Kalibr's camera chain holds pose and delay of the IMU, nothing of its readings."""
+    (tmp_path / "camchain-imucam.yaml").write_text(yaml.dump(CAMCHAIN))
+    with pytest.raises(ValueError, match=r"(?s)Kalibr.*no scale, misalignment or bias"):
+        any_calibration(tmp_path / "camchain-imucam.yaml")
+    assert is_calibration(tmp_path / "camchain-imucam.yaml")
 
 
 def test_a_yaml_in_braces_is_no_calibration_and_no_crash(tmp_path):

@@ -8,9 +8,10 @@ import pytest
 
 from small_session import made_once
 from trihedron.cli import main
-from trihedron.cli.next_step import (
+from trihedron.cli.options import GravitySource, LogSource
+from trihedron.cli.run import (
     again,
-    begin_next_step,
+    begin,
     note_excluded,
     note_file,
     note_log,
@@ -18,8 +19,6 @@ from trihedron.cli.next_step import (
     note_reference,
     with_arguments,
 )
-from trihedron.cli.options import GravitySource, LogSource
-from trihedron.cli.provenance import begin
 from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.files.calibration import read_calibration
 from trihedron.records import Finding, FindingCode, Severity
@@ -33,12 +32,10 @@ from trihedron.report.document import FindingList, Section
 def run():
     """A run on a log whose name has a space, at a stated rate and latitude."""
     begin(("calibrate", "my log.csv", "--rate", "50", "--report", "page.html", "--full", "--latitude", "59.9"))
-    begin_next_step()
     note_log(LogSource(log=Path("my log.csv"), rate=50.0))
     note_place(GravitySource(latitude=59.9))
     yield
     begin(())
-    begin_next_step()
 
 
 def filled(step):

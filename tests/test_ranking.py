@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import trihedron
+from test_export import export_calibration
 from trihedron.cli import main
-from trihedron.files.formats import export_calibration
 from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
 from trihedron.records import FindingCode, Onboard, Severity

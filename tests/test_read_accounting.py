@@ -74,27 +74,6 @@ def test_two_files_account_for_the_rows_of_both(tmp_path):
     assert recording.rows_in_file == recording.rows_read + recording.rows_reported == 330
 
 
-REJECTED = {
-    "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
-    "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
-    "json": (b'{"accel": [[1, 2, 3]]}', "this JSON.*from Python"),
-    "json-list": (b'[{"t": 0}]', "this JSON"),
-    "video": (b"\x00\x00\x00\x18ftypmp42" + bytes(500), "a video.*GPMF"),
-    "7z": (b"7z\xbc\xaf\x27\x1c" + bytes(500), "7-Zip archive.*unpack"),
-    "xml": (b"<?xml version='1.0'?><a/>", "XML"),
-    "mtb": (b"\xfa\xff\x36" + bytes(500), "Xsens MT binary.*MT Manager"),
-}
-
-
-@pytest.mark.parametrize("content, complaint", REJECTED.values(), ids=REJECTED.keys())  # noqa: PT006
-def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint):
-    path = tmp_path / "log.bin"
-    path.write_bytes(content)
-    with pytest.raises(ReadError, match=complaint) as caught:
-        read_recording(path)
-    assert "\n" not in str(caught.value)
-
-
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):

@@ -51,6 +51,16 @@ CASES = {
     "other-table": (b"sensor,freq\nA,100\nB,200\nC,300\n", "no accelerometer and no gyro"),
     "nine-unnamed-columns": ((",".join("123456789") + "\n").encode() * 9, "9 columns without names"),
     "all-nan": ((HEADER + "\n".join(f"{i},nan,1,{i},3,{i},5" for i in range(9))).encode(), "contains no finite number"),
+    "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
+    "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
+    "json": (b'{"accel": [[1, 2, 3]]}', "this JSON.*from Python"),
+    "json-list": (b'[{"t": 0}]', "this JSON"),
+    "video": (b"\x00\x00\x00\x18ftypmp42" + bytes(500), "a video.*GPMF"),
+    "7z": (b"7z\xbc\xaf\x27\x1c" + bytes(500), "7-Zip archive.*unpack"),
+    "xml": (b"<?xml version='1.0'?><a/>", "XML"),
+    "mtb": (b"\xfa\xff\x36" + bytes(500), "Xsens MT binary.*MT Manager"),
+    "novatel": (b"\xaaD\x13" + bytes(400), "NovAtel.*RAWIMUS"),
+    "gpmf": (b"DEVC\0\x01" + bytes(400), "GoPro GPMF"),
 }
 
 

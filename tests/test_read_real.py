@@ -40,7 +40,7 @@ def test_mimu4444_one_of_eight_devices(real_data):
     path = real_data / "mimu4444" / "exp_3.npz"
     with pytest.raises(ReadError, match="8 devices"):
         read_recording(path)
-    recording = read_recording(path, device=5)
+    recording = read_recording(path, instance=5)
     with np.load(path) as archive:
         np.testing.assert_array_equal(recording.accelerometer, archive["counts"][:, 4, :3])
         np.testing.assert_array_equal(recording.gyroscope, archive["counts"][:, 4, 3:])

@@ -229,7 +229,7 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
 @pytest.fixture(scope="module")
 def mimu(real_data):
     """Device 7 calibrated on one session, and another session of it."""
-    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", device=7) for n in (2, 3))
+    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", instance=7) for n in (2, 3))
     return trihedron.calibrate(first, gravity_m_s2=9.8184).calibration, other
 
 

@@ -118,8 +118,8 @@ FIRST = ["Sequence[str | os.PathLike[str]]", "Scenario", "PoseTable", "Noise", "
 FIRST += ["str | os.PathLike[str]", "int | str", "Sequence[int]"]
 ALSO_NEGATIVE = {"gravity_m_s2", "rate_hz", "gyroscope_nominal", "alpha", "confidence", "limit_mg", "limit_deg", "baud"}
 ALSO_NEGATIVE |= {"turn_s", "pose_s", "seconds", "gyroscope_density", "accelerometer_density", "seed", "workers"}
-ALSO_NEGATIVE |= {"sigma_angle_deg", "sigma_turn_rad", "wait_s", "device"}
-ALSO_ZERO = ALSO_NEGATIVE - {"seed", "workers", "sigma_angle_deg", "sigma_turn_rad", "wait_s", "device"}
+ALSO_NEGATIVE |= {"sigma_angle_deg", "sigma_turn_rad", "wait_s"}
+ALSO_ZERO = ALSO_NEGATIVE - {"seed", "workers", "sigma_angle_deg", "sigma_turn_rad", "wait_s"}
 OF_A_LIBRARY = re.compile(
     r"unhashable|float\(\) arg|expected str|object is not|not supported between|truth value|broadcast|could not|"
     r"to unpack|inhomogeneous|iterable|subscriptable|interpreted as|no attribute|can't|valid [A-Z]| at 0x|"

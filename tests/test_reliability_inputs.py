@@ -18,10 +18,9 @@ import pytest
 from small_session import made_elsewhere
 from trihedron import _core
 from trihedron.cli import main
-from trihedron.documents import DocumentError, read_text
+from trihedron.documents import read_text
 from trihedron.errors import InputError
 from trihedron.files.calibration import CalibrationFileError, read_calibration, write_calibration
-from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
 from trihedron.read import ReadError, open_chunks, read_recording
 from trihedron.sanitise import escaped, escaped_json
@@ -31,7 +30,6 @@ from trihedron.simulate.scenario_file import read_scenario
 READERS = [
     (read_calibration, CalibrationFileError),
     (read_noise, NoiseFileError),
-    (read_diagnosis, DiagnosisFileError),
     (read_scenario, ValueError),
 ]
 
@@ -46,7 +44,7 @@ def test_what_is_no_plain_file_of_sane_size_is_refused_at_once(tmp_path, reader,
         with pytest.raises(error, match=words):
             reader(path)
     for name in ("n" * 300, "a\0b", tmp_path / "none"):
-        with pytest.raises(DocumentError):
+        with pytest.raises(InputError):
             read_text(name, "calibration file")
 
 

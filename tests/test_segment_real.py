@@ -15,7 +15,7 @@ def codes(segments):
 
 def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data):
     for device in (1, 8):
-        recording = read_recording(real_data / "mimu4444" / "exp_3.npz", device=device)
+        recording = read_recording(real_data / "mimu4444" / "exp_3.npz", instance=device)
         segments = segment_recording(recording)
         steady = segments.duration_s > 15.0
         assert 19 <= steady.sum() <= 20

@@ -30,11 +30,18 @@ class DocumentError(InputError):
     """An error in a file; the message continues a sentence that begins with the file's name."""
 
 
-def read_text(path: str | os.PathLike[str], what: str) -> str:
+def read_text(path: str | os.PathLike[str], what: str, rejection: type[InputError] = InputError) -> str:
     """The text of a plain file of limited size; ``what`` it should be ("calibration file") is for error messages.
 
-    Raises ``InputError`` when there is no such file, it is no plain file, too large, unreadable, or not text.
+    Raises ``rejection`` when there is no such file, it is no plain file, too large, unreadable, or not text.
     """
+    try:
+        return _text(path, what)
+    except DocumentError as error:
+        raise rejection(f"{Path(path)}: {error}") from None
+
+
+def _text(path: str | os.PathLike[str], what: str) -> str:
     try:
         # Non-blocking: opening a pipe without a writer would block.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
@@ -68,14 +75,23 @@ def read_json(path: str | os.PathLike[str], what: str, meant: str, rejection: ty
 
     Raises ``rejection`` in place of the errors of :func:`read_text` and :func:`parse_json`.
     """
-    try:
-        text = read_text(path, what)
-    except DocumentError as error:
-        raise rejection(of_path(path, error)) from None
+    text = read_text(path, what, rejection)
     try:
         return parse_json(text)
     except DocumentError as error:
         raise rejection(f"{Path(path)}: {error}; {meant}.") from None
+
+
+def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
+    """The TOML of a file that should be ``what``.
+
+    Raises ``InputError``, as :func:`read_text` and :func:`parse_toml`.
+    """
+    text = read_text(path, what)
+    try:
+        return parse_toml(text)
+    except DocumentError as error:
+        raise InputError(f"{Path(path)}: {error}") from None
 
 
 def parse_json(text: str) -> Any:
@@ -132,11 +148,6 @@ def check_values(document: Any) -> None:
         if not level:
             return
     raise DocumentError("this is nested too deeply")
-
-
-def of_path(path: str | os.PathLike[str], error: DocumentError) -> str:
-    """The whole error message: path and error."""
-    return f"{Path(path)}: {error}"
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

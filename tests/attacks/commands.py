@@ -44,8 +44,6 @@ LOGS = ["log.csv", "short.csv", "static.csv", "a.npy", "b.npz", "a.zip", "a.gz",
 BY_FILE = {
     "calibration": (["c.json", "untrusted.json", "noise.json"], ["bad.json", *SPECIAL]),
     "noise": (["noise.json", "axis.json", "static.csv", "bad.json"], []),
-    "with-effects": (["diagnosis.json", "c.json", "bad.json"], []),
-    "diagnosis": (["diagnosis.json", "c.json", "bad.json"], []),
     "reference": (["poses.csv", "bad.csv"], []),
 }
 BY_NAME = {

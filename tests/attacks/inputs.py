@@ -45,7 +45,6 @@ def answered(*readers: Callable[[], object]) -> str:
 def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.api.exporting import export
     from trihedron.files.calibration import read_calibration
-    from trihedron.files.diagnosis import read_diagnosis
     from trihedron.files.frame_declaration import read_frame_declaration
     from trihedron.files.noise import read_noise
     from trihedron.files.scenario import improved_scenario
@@ -55,7 +54,7 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.simulate.scenario_file import read_scenario
 
     def log(path: Path) -> object:
-        return read_whole(path, device=1) if path.name == "a.npz" else read_whole(path)
+        return read_whole(path, instance=1) if path.name == "a.npz" else read_whole(path)
 
     def calibration(path: Path) -> object:
         known = read_calibration(path)
@@ -66,7 +65,6 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
         "c.json": [calibration],
         "untrusted.json": [read_calibration],
         "noise.json": [read_noise],
-        "diagnosis.json": [read_diagnosis],
         "axis.json": [read_axis_noise],
         "s.toml": [read_scenario, lambda path: improved_scenario(path, {}, [("dropped-samples", {"rate": 0.1})])],
         "frame.toml": [read_frame_declaration],

@@ -40,7 +40,6 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "gyroscope_density": (1e-15, 1e3, "rad/s/√Hz, a positive number"),
     "accelerometer_density": (1e-15, 1e5, "m/s²/√Hz, a positive number"),
     "baud": (1, 100_000_000, "bits per second"),
-    "device": (0, MOST_WHOLE, "the number of a device"),
     "seed": (0, MOST_WHOLE, "the start of a series of random numbers"),
     "workers": (0, 100_000, "a number of processes"),
 }

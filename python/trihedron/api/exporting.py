@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from trihedron.api.applying import AnyCalibration, calibration_of
-from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.documents import read_text
 from trihedron.errors import InputError
 from trihedron.files.formats import ExportOptions, any_calibration, export_files
 from trihedron.files.noise import noise_figures, read_noise
@@ -107,7 +107,4 @@ def parameters_text(current: str | os.PathLike[str] | None) -> str:
     """The text of a file of current parameters; ``none`` means that the readings were logged raw."""
     if current is None or str(current) in ("", "none"):
         return str(current or "")
-    try:
-        return read_text(Path(current), "file of parameters")
-    except DocumentError as error:
-        raise InputError(of_path(Path(current), error)) from None
+    return read_text(current, "file of parameters")

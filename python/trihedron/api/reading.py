@@ -31,7 +31,6 @@ def read(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
     time_unit: str | None = None,
-    device: int | None = None,
     topic: str | None = None,
     instance: int | str | None = None,
     progress: Progress | None = None,
@@ -56,8 +55,6 @@ def read(
         Sampling rate [Hz] of a log without a time column. A time column has precedence; a contradiction is a finding.
     accelerometer_unit, gyroscope_unit, time_unit : str
         Units, where the detected ones are wrong.
-    device : int
-        Which device (from 1) of an archive of several.
     topic : str
         Which topic, dataset or member of a file with several.
     instance : int or str
@@ -95,7 +92,6 @@ def read(
         accelerometer_unit=accelerometer_unit,
         gyroscope_unit=gyroscope_unit,
         time_unit=time_unit,
-        device=device,
         topic=topic,
         instance=instance,
         progress=progress,

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from trihedron.api.applying import AnyCalibration, calibration_of
 from trihedron.api.asking import WrongTypeError
@@ -19,7 +16,6 @@ from trihedron.simulate import (
     read_scenario,
     scenario_by_name,
     twin_scenario,
-    with_diagnosed_effects,
 )
 from trihedron.simulate import simulate as run
 
@@ -69,20 +65,6 @@ def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
 def names_scenario(given: str | os.PathLike[str]) -> bool:
     """Whether a name is that of a scenario (a .toml file or a ready-made one) and not of a log."""
     return str(given) in list_scenarios() or Path(given).suffix.lower() == ".toml"
-
-
-@dataclass(frozen=True)
-class WithEffects:
-    """A scenario with the accepted effects of a diagnosis: ids switched on, ids not applied with the reason."""
-
-    scenario: Scenario
-    applied: tuple[str, ...]
-    left_out: Mapping[str, str]
-
-
-def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[Mapping[str, Any]]) -> WithEffects:
-    """Switch on the accepted effects of a diagnosis (``effects`` of ``Diagnosis.to_dict`` or of its JSON)."""
-    return WithEffects(*with_diagnosed_effects(scenario_of(scenario), effects))
 
 
 def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.protocols import PROTOCOLS, Decoder, decoder_factory
-from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import Frame
 from trihedron.capture.protocols.lines import NameColumns, name_by_position
 from trihedron.capture.sources import SerialSource, Source
 from trihedron.records.frame_declaration import FrameDeclaration

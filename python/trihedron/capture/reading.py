@@ -19,17 +19,9 @@ from trihedron.capture.timeline import Timeline
 
 
 class Rows:
-    """Times, indices, remarks and log rows of a recording; without a log (None) no rows are written.
+    """Times, indices, remarks and rows of a recording; ``rate_hz`` is that of a device without a clock, if known."""
 
-    Parameters
-    ----------
-    log : GrowingLog or None
-    source : Source
-    rate_hz : float, optional
-        Rate of a device without a clock, if known.
-    """
-
-    def __init__(self, log: GrowingLog | None, source: Source, rate_hz: float | None) -> None:
+    def __init__(self, log: GrowingLog, source: Source, rate_hz: float | None) -> None:
         self.is_begun = False
         self._log, self._source, self._rate_hz = log, source, rate_hz
         self._started = datetime.now(timezone.utc)
@@ -48,8 +40,6 @@ class Rows:
         self.is_begun = True
         self._has_device_clock = timeline.has_device_clock
         self._has_time = timeline.has_device_clock or self._source.is_live or self._rate_hz is not None
-        if self._log is None:
-            return
         names = ["time [s]"] if self._has_time else []
         names += ["host_s"] if self._source.is_live else []
         names += ["frame", *(["device_ticks"] if self._has_device_clock else [])]
@@ -74,20 +64,19 @@ class Rows:
         if one.restarted:
             self.say(f"the device began to count anew before frame {index} at {time_s:.6f} s")
         self._next_index = index + 1
-        if self._log is not None:
-            parts = [f"{time_s:.6f}"] if self._has_time else []
-            if self._source.is_live:
-                parts.append(f"{one.host_s:.6f}")
-            parts.append(str(index))
-            if self._has_device_clock:
-                parts.append(str(one.frame.ticks))
-            self._log.row(",".join(parts) + "," + one.frame.text, time_s)
+        parts = [f"{time_s:.6f}"] if self._has_time else []
+        if self._source.is_live:
+            parts.append(f"{one.host_s:.6f}")
+        parts.append(str(index))
+        if self._has_device_clock:
+            parts.append(str(one.frame.ticks))
+        self._log.row(",".join(parts) + "," + one.frame.text, time_s)
         return time_s
 
     def say(self, text: str) -> None:
         """Add a remark to the next block, and to the log if it has begun."""
         self._remarks.append(text)
-        if self._log is not None and self.is_begun:
+        if self.is_begun:
             self._log.remark(text)
 
     def take_remarks(self) -> tuple[str, ...]:
@@ -97,24 +86,20 @@ class Rows:
 
     def say_facts(self, count: Count, clock: ClockLine | None, timeline: Timeline | None) -> None:
         """Rewrite the header lines on frames and clocks."""
-        if self._log is not None and self.is_begun:
+        if self.is_begun:
             self._log.fill("frames", count.sentence())
             self._log.fill("clock", clock_sentence(clock, timeline))
 
     def flush(self, *, force: bool = False) -> None:
         """Write pending rows if it is time to, or at once with ``force``."""
-        if self._log is not None:
-            self._log.flush(force=force)
+        self._log.flush(force=force)
 
     def abandon(self) -> None:
         """Close the log after a failure, without writing pending rows."""
-        if self._log is not None:
-            self._log.abandon()
+        self._log.abandon()
 
     def close(self) -> None:
         """Write pending rows and close the log; delete a log without any row."""
-        if self._log is None:
-            return
         self._log.close()
         if not self.is_begun:
             self._log.path.unlink(missing_ok=True)

@@ -56,8 +56,8 @@ class Recorder:
     ----------
     source, make_decoder
         The source of bytes, and the function that makes a decoder for every connection.
-    path : Path or None
-        The log to write; without one nothing is saved.
+    path : Path
+        The log to write.
     rate_hz : float, optional
         Rate of a device without a clock, if known.
     wait_for_return_s : float
@@ -75,14 +75,13 @@ class Recorder:
         self,
         source: Source,
         make_decoder: Callable[[], Decoder],
-        path: Path | None = None,
+        path: Path,
         *,
         overwrite: bool = False,
         rate_hz: float | None = None,
         wait_for_return_s: float = WAIT_FOR_RETURN_S,
         silence_s: float = SILENCE_S,
         first_bytes: bytes = b"",
-        log: GrowingLog | None = None,
     ) -> None:
         self.source = source
         self.count = Count()
@@ -90,9 +89,7 @@ class Recorder:
         self.ended_because = ""
         self._make = make_decoder
         self._decoder = make_decoder()
-        if log is None and path is not None:
-            log = GrowingLog(path, overwrite=overwrite)
-        self._rows = Rows(log, source, rate_hz)
+        self._rows = Rows(GrowingLog(path, overwrite=overwrite), source, rate_hz)
         self._rate_hz = rate_hz
         self._wait_s, self._silence_s = wait_for_return_s, silence_s
         self._sequence: Sequence | None = None

@@ -31,16 +31,14 @@ from trihedron.cli.fleet import fleet
 from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
-from trihedron.cli.next_step import begin_next_step
 from trihedron.cli.noise import noise
-from trihedron.cli.output import silence
+from trihedron.cli.output import silence, spell_out
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
-from trihedron.cli.provenance import begin
 from trihedron.cli.report import report
+from trihedron.cli.run import begin
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
-from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
 from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
@@ -139,7 +137,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = _a_reference_each(words)
     spell_out()
     begin(words)
-    begin_next_step()
     try:
         _make_writable()
         status = typer.main.get_command(build_app()).main(words, prog_name="trihedron", standalone_mode=False)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.next_step import note_excluded
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
 from trihedron.cli.output import FullResults
+from trihedron.cli.run import note_excluded
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
@@ -97,10 +97,10 @@ def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:
     from trihedron.read import devices_of
 
     for source in sources:
-        n = devices_of(source.log) if by == "device" and source.device is None and source.log is not None else 1
+        n = devices_of(source.log) if by == "device" and source.instance is None and source.log is not None else 1
         if n == 1:
             yield source.read()
             continue
         for device in range(1, n + 1):
-            recording = replace(source, device=device).read()
+            recording = replace(source, instance=str(device)).read()
             yield replace(recording, source=f"{recording.source}, device {device}")

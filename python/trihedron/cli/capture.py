@@ -96,7 +96,7 @@ def capture(
         return
     from trihedron.api.reading import read
     from trihedron.cli.guide import finish, run_guided
-    from trihedron.cli.next_step import note_log
+    from trihedron.cli.run import note_log
 
     with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
         made = run_guided(

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from trihedron.cli.next_step import name_log
 from trihedron.cli.options import GravitySource, LogsSource, progress, with_options
 from trihedron.cli.output import FullResults, leave, say
+from trihedron.cli.run import name_log
 
 if TYPE_CHECKING:
     from trihedron.records.results import DiagnosisResult

@@ -109,5 +109,4 @@ def _list() -> None:
 
     typer.echo("TARGET          needs beside CALIBRATION (*: one of counts also needs --accel-lsb and --gyro-lsb)")
     for name, kind in formats().items():
-        if kind.write is not None:
-            typer.echo(f"{name + ('*' if kind.in_si else ''):16}{' '.join(needs(kind)) or '–'}")
+        typer.echo(f"{name + ('*' if kind.in_si else ''):16}{' '.join(needs(kind)) or '–'}")

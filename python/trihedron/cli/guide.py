@@ -83,8 +83,8 @@ def finish(
 ) -> None:
     """Calibrate, verify on the poses held out, report; status 2 where the answer is not to be trusted."""
     from trihedron.api.guiding import conclude
-    from trihedron.cli.next_step import UNSTORED, note_file, with_arguments
     from trihedron.cli.output import leave, put, say, style
+    from trihedron.cli.run import UNSTORED, note_file, with_arguments
     from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report, to_text, verification_report
 

@@ -19,7 +19,7 @@ COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Simulate", ("simulate",)),
 )
 _OF_THE_LOG = (
-    *("accel", "gyro", "columns", "rate", "accel_unit", "gyro_unit", "time_unit", "device", "topic", "instance"),
+    *("accel", "gyro", "columns", "rate", "accel_unit", "gyro_unit", "time_unit", "topic", "instance"),
     *("gyro_lsb", "accel_lsb", "samples", "stream", "curve", "exclude", "keep_events"),
 )
 _OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "updated", "improved", "truth", "every")

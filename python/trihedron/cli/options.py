@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from trihedron.cli.next_step import note_file, note_log, note_place, note_reference
-from trihedron.cli.provenance import note_input, note_options
+from trihedron.cli.run import note_file, note_input, note_log, note_options, note_place, note_reference
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
@@ -52,7 +51,6 @@ class ReadingOptions:
     accel_unit: str | None = None
     gyro_unit: str | None = None
     time_unit: str | None = None
-    device: int | None = None
     topic: str | None = None
     instance: str | None = None
     OPTIONS: ClassVar[Table] = {
@@ -61,9 +59,11 @@ class ReadingOptions:
         "accel_unit": ("UNIT", "m/s^2, g, mg or counts; detected otherwise."),
         "gyro_unit": ("UNIT", "rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
         "time_unit": ("UNIT", "s, ms, us or ns; detected otherwise."),
-        "device": ("N", "Which device (from 1) of an archive of several."),
         "topic": ("NAME", "Which topic, dataset or member of a file that contains several."),
-        "instance": ("N", "Which of several IMUs whose readings one file contains."),
+        "instance": (
+            "N",
+            "Which of several IMUs whose readings one file contains.",
+        ),
     }
 
 
@@ -103,7 +103,6 @@ class LogSource(ReadingOptions):
                 accelerometer_unit=self.accel_unit,
                 gyroscope_unit=self.gyro_unit,
                 time_unit=self.time_unit,
-                device=self.device,
                 topic=self.topic,
                 instance=self.instance,
                 progress=report,

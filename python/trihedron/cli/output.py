@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import errno
 import os
@@ -15,9 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
-from trihedron.cli.next_step import with_arguments
-from trihedron.cli.provenance import with_provenance
-from trihedron.cli.speech import speaks_unicode
+from trihedron.cli.run import with_arguments, with_provenance
 from trihedron.files.output import check_free, check_report, write_whole
 from trihedron.sanitise import escaped
 
@@ -227,3 +226,34 @@ def leave(findings: Iterable[Finding], *, is_shown: bool = False) -> None:
         why = ", for the reason above." if is_seen else f": {opening(reasons[0].seen)}.{more}"
         say(f"trihedron: not to be trusted{why}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)
+
+
+# Streams in ASCII or a Windows code page: unsupported characters are spelt out.
+
+ERRORS = "trihedron-ascii"
+_SAMPLE = "′±²→─σ"
+
+
+def speaks_unicode(stream: TextIO) -> bool:
+    """Whether the stream's encoding has the characters of a report."""
+    try:
+        _SAMPLE.encode(getattr(stream, "encoding", None) or "utf-8")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
+
+
+def spell_out() -> None:
+    """Make stdout and stderr write characters that they cannot encode in ASCII: ``σ`` as ``sigma``."""
+    codecs.register_error(ERRORS, _spelt)
+    for stream in (sys.stdout, sys.stderr):
+        if not speaks_unicode(stream) and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors=ERRORS)
+
+
+def _spelt(error: UnicodeError) -> tuple[str, int]:
+    from trihedron.report.ascii import ascii_of
+
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return ascii_of(error.object[error.start : error.end]), error.end

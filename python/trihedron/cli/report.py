@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.next_step import note_file
 from trihedron.cli.options import with_options
 from trihedron.cli.output import check_outputs, show, write_report
+from trihedron.cli.run import note_file
 from trihedron.errors import InputError
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -58,7 +58,6 @@ OPTIONS = {
     "seed": typer.Option("--seed", metavar="N", min=0, help="Seed of everything random."),
     "like": ("LOG", "Digital twin: repeat this recording, with --calibration."),
     "calibration": ("FILE", "Calibration of the recording to repeat."),
-    "with_effects": ("DIAGNOSIS", "Add the effects that this diagnosis accepted."),
     "serve": ("PTY|TCP", "Send it as a board does; prints the port to open. TCP:PORT too."),
     "protocol": ("NAME", "With --serve: protocol of the board, or a .toml."),
     "faults": ("LIST", "With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'."),
@@ -81,7 +80,6 @@ def simulate(
     seed: int = 0,
     like: Path | None = None,
     calibration: Path | None = None,
-    with_effects: Path | None = None,
     serve: str | None = None,
     protocol: str = "lines",
     faults: str = "",
@@ -107,8 +105,6 @@ def simulate(
         raise typer.BadParameter("give either a SCENARIO (a .toml file or a name) or --like LOG")
     if (like is None) != (calibration is None):
         raise typer.BadParameter("--like and --calibration go together")
-    if with_effects is not None and scenario is None:
-        raise typer.BadParameter("--with-effects belongs to a SCENARIO; a digital twin repeats its recording as it is")
     if output is None and serve is None:
         raise typer.BadParameter("name the log to write with -o LOG, or send it with --serve PTY")
     from trihedron.api.simulating import simulate as run
@@ -117,7 +113,7 @@ def simulate(
     from trihedron.files.truth import write_truth
 
     _check_endings(output, truth)
-    read_from = (None if scenario is None else Path(scenario), like, calibration, with_effects)
+    read_from = (None if scenario is None else Path(scenario), like, calibration)
     check_outputs(output, truth, force=force, report=report, inputs=read_from)
     if like is not None and calibration is not None:
         from trihedron.files.calibration import read_calibration
@@ -125,7 +121,7 @@ def simulate(
         repeated = LogSource(**asdict(how), log=like).read()
         recording, known = twin(repeated, read_calibration(calibration), seed)
     else:
-        recording, known = run(_scenario(str(scenario), with_effects), seed)
+        recording, known = run(str(scenario), seed)
     if output is not None:
         write_recording(recording, output, overwrite=force)
     if truth is not None:
@@ -175,15 +171,3 @@ def _write_template(path: Path, *, force: bool) -> None:
     check_outputs(path, force=force)
     write_scenario(TEMPLATE, path, overwrite=force)
     typer.echo(f"{path}: an ordinary sensor turned by hand; change what you know of yours.")
-
-
-def _scenario(name: str, diagnosis: Path | None) -> Any:
-    if diagnosis is None:
-        return name
-    from trihedron.api.simulating import with_effects
-    from trihedron.files.diagnosis import read_diagnosis
-
-    made = with_effects(name, read_diagnosis(diagnosis)["effects"])
-    for effect_id, why in made.left_out.items():
-        say(f"effect {effect_id} was excluded: {why}.")
-    return made.scenario

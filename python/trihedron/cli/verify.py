@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from trihedron.cli.next_step import note_file
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
 from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, is_stdout, leave
+from trihedron.cli.run import note_file
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration

@@ -163,13 +163,8 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
         raise CalibrationFileError(f"{source}: {error}; the file was changed by hand or damaged.") from None
 
 
-def schema() -> dict[str, Any]:
-    """The JSON schema (draft 2020-12) that every calibration file follows."""
-    return schema_of("calibration")
-
-
 def schema_of(kind: str) -> dict[str, Any]:
-    """The JSON schema of a kind of document."""
+    """The JSON schema (draft 2020-12) of a kind of document."""
     text = files("trihedron.files").joinpath("schema", f"{kind}.schema.json").read_text(encoding="utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, of_path, parse_toml, read_text
+from trihedron.documents import read_toml
 from trihedron.errors import InputError
 from trihedron.records.frame_declaration import (
     CHECKSUM_SIZES,
@@ -29,10 +29,7 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     Raises ``InputError`` when a key is wrong or missing; the message names the file and the key.
     """
     path = Path(path)
-    try:
-        table = parse_toml(read_text(path, "declaration of a frame"))
-    except DocumentError as error:
-        raise InputError(of_path(path, error)) from None
+    table = read_toml(path, "declaration of a frame")
     try:
         return _declaration(table, path.stem)
     except OverflowError:

@@ -12,7 +12,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Item
 
-from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.documents import read_text
 from trihedron.errors import InputError
 from trihedron.files.output import write_whole
 
@@ -72,10 +72,9 @@ def improved_scenario(
     ValueError
         When the file is not TOML.
     """
+    text = read_text(path, "scenario file")
     try:
-        document = tomlkit.parse(_under_own_head(read_text(path, "scenario file"), os.path.basename(path)))
-    except DocumentError as error:
-        raise InputError(of_path(path, error)) from None
+        document = tomlkit.parse(_under_own_head(text, os.path.basename(path)))
     except (TOMLKitError, RecursionError) as error:
         raise InputError(f"{path}: this is not a TOML file: {error}") from None
     for name, values in tables.items():

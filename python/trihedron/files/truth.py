@@ -7,14 +7,12 @@ import json
 import os
 from dataclasses import asdict
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from trihedron.errors import InputError
 from trihedron.files.output import OutputError, write_whole
-from trihedron.records.truth import TrueSegment, Truth
+from trihedron.records.truth import Truth
 
 _ARRAYS = (
     "accelerometer_time_s",
@@ -63,26 +61,3 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, header=np.array(text), **arrays)
         write_whole(target, buffer.getvalue(), overwrite=overwrite)
-
-
-def read_truth(path: str | os.PathLike[str]) -> Truth:
-    """Read a truth file that :func:`write_truth` wrote as ``.npz``.
-
-    Raises ``InputError`` when the file is not such a file.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            header = json.loads(str(archive["header"]))
-            arrays = {name: archive[name] for name in _ARRAYS if name in archive.files}
-    except (KeyError, ValueError) as error:
-        raise InputError(f"{path}: this is not a truth file written as .npz ({error})") from None
-    segments = tuple(TrueSegment(**{**entry, "axis": tuple(entry["axis"])}) for entry in header.pop("segments"))
-    effects = {name: MappingProxyType(values) for name, values in header.pop("effects").items()}
-    noise = {
-        name: MappingProxyType({term: tuple(values) for term, values in terms.items()})
-        for name, terms in header.pop("noise").items()
-    }
-    values: dict[str, Any] = {name: np.array(header.pop(name)) for name in _MATRICES}
-    values |= header
-    values |= arrays
-    return Truth(segments=segments, effects=MappingProxyType(effects), noise=MappingProxyType(noise), **values)

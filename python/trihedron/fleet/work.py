@@ -52,7 +52,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
         raise InputError(f"{path}: this is {kind}, not a file.")
-    recording = reading.read(path, device=device, **stated)
+    recording = reading.read(path, instance=device, **stated)
     diagnosis = None
     if options.get("diagnose", True):
         found = diagnosing.diagnose(recording, **place)

@@ -15,8 +15,7 @@ import numpy.typing as npt
 from numpy.lib import format as npy_format
 
 from trihedron.errors import InputError
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line, from_os_error
+from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
 from trihedron.read.memory import check_memory, check_unpacked
 from trihedron.read.table import Table
 
@@ -81,7 +80,7 @@ def header(stream: Any, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]
     return shape, bool(by_columns), dtype
 
 
-def read_npz(path: Path, device: int | None) -> Table:
+def read_npz(path: Path, instance: str | None) -> Table:
     """Named arrays: one per column, or a block ``counts`` (n, k) or (n, units, k), ``t_s``, ``fs_hz``."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
@@ -95,7 +94,7 @@ def read_npz(path: Path, device: int | None) -> Table:
         raise ReadError(
             f"{path}: this .npz file is damaged or contains Python objects ({first_line(error)})."
         ) from None
-    return _from_arrays(path, arrays, device)
+    return _from_arrays(path, arrays, instance)
 
 
 def _check_members(path: Path, archive: Any) -> None:
@@ -109,19 +108,19 @@ def _check_members(path: Path, archive: Any) -> None:
     check_unpacked(path, packed, unpacked)
 
 
-def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: int | None) -> npt.NDArray[np.generic]:
-    n_units = block.shape[1]
-    if device is None:
+def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], chosen: str | None) -> npt.NDArray[np.generic]:
+    devices = [str(k + 1) for k in range(block.shape[1])]
+    if chosen is None:
         raise ReadError(
-            f"{path}: array '{name}' contains {n_units} devices (shape {block.shape}); "
-            f"choose one with --device, 1 to {n_units}."
+            f"{path}: array '{name}' contains {len(devices)} devices (shape {block.shape}); "
+            f"choose one with --instance, 1 to {len(devices)}."
         )
-    if not 1 <= device <= n_units:
-        raise ReadError(f"{path}: there is no device {device}; array '{name}' contains devices 1 to {n_units}.")
-    return block[:, device - 1, :]
+    if chosen not in devices:
+        raise ReadError(f"{path}: there is no instance {chosen}; array '{name}' contains devices 1 to {len(devices)}.")
+    return block[:, devices.index(chosen), :]
 
 
-def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | None) -> Table:
+def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], instance: str | None) -> Table:
     names: list[str] = []
     columns: list[npt.NDArray[Any]] = []
     metadata: dict[str, str] = {}
@@ -130,7 +129,7 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
         flat |= {key: array[key] for key in array.dtype.names} if array.dtype.names else {name: array}
     lengths = [a.shape[0] for a in flat.values() if a.ndim >= 1]
     n_rows = max([n for n in lengths if n > 12] or lengths, default=0)
-    used_device = False
+    is_chosen = False
     for name, given in flat.items():
         array = given
         if array.dtype.kind not in "iufb":
@@ -141,8 +140,8 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
             metadata[name] = " ".join(f"{value:.12g}" for value in np.ravel(array)[:64].astype(float))
             continue
         if array.ndim == 3:
-            array = _pick_device(path, name, array, device)
-            used_device = True
+            array = _pick_device(path, name, array, instance)
+            is_chosen = True
         if array.ndim > 2:
             raise ReadError(f"{path}: array '{name}' has {array.ndim} dimensions; save rows x columns.")
         if array.ndim == 1:
@@ -154,11 +153,10 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | 
         # Columns of a block have no names: their order is recognised as in a text log without a header.
         names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
         columns += list(array.T)
-    if device is not None and not used_device:
-        raise ReadError(f"{path}: a device was given, but the file contains one device only; leave --device out.")
     if not columns:
         raise ReadError(
             f"{path}: there is no numeric array of rows in this file (it contains {', '.join(arrays) or 'nothing'})."
         )
     numbers = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in columns)
-    return Table(path, tuple(names) if any(names) else None, numbers, file_sha256(path), metadata)
+    named = tuple(names) if any(names) else None
+    return Table(path, named, numbers, file_sha256(path), metadata, is_chosen=is_chosen)

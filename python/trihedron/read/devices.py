@@ -99,9 +99,8 @@ _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magn
 
 @dataclass(frozen=True)
 class Choice:
-    """The user's choice among several logs in a file: device of an archive (from 1), topic or member, instance."""
+    """The user's choice among several logs in a file: topic or member, instance."""
 
-    device: int | None = None
     topic: str | None = None
     instance: str | None = None
 

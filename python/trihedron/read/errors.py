@@ -1,7 +1,8 @@
-"""Errors of files that cannot be read, each one sentence, and checks of a file before reading."""
+"""Errors of files that cannot be read, each one sentence; checks of a file before reading, and its hash."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import tempfile
@@ -114,3 +115,15 @@ def check_readable(path: Path) -> int:
     if status.st_size == 0:
         raise ReadError(f"{path}: the file is empty; record again or copy it again.")
     return status.st_size
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of the bytes of a file, hexadecimal."""
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as stream:
+            while block := stream.read(1 << 22):
+                digest.update(block)
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    return digest.hexdigest()

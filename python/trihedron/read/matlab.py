@@ -14,8 +14,7 @@ from typing import Any
 
 from trihedron.read.columns import columns_or_none, sensor_of_file_name
 from trihedron.read.devices import Choice
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line
+from trihedron.read.errors import ReadError, file_sha256, first_line
 from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table

@@ -8,8 +8,7 @@ import numpy as np
 import polars as pl
 
 from trihedron.arrays import FloatArray
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, errors_of_polars, reject_after_fork
+from trihedron.read.errors import ReadError, errors_of_polars, file_sha256, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode

@@ -53,7 +53,6 @@ def read_recording(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
     time_unit: str | None = None,
-    device: int | None = None,
     topic: str | None = None,
     instance: int | str | None = None,
     progress: Progress | None = None,
@@ -67,7 +66,7 @@ def read_recording(
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and 0 < rate_hz < 1e7):
         raise ReadError(f"the rate must be a positive number of samples per second, got {rate_hz}.")
-    choice = Choice(device, topic, None if instance is None else str(instance))
+    choice = Choice(topic, None if instance is None else str(instance))
     options = Options(columns, rate_hz, time_unit, choice, progress)
     if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
         raise ReadError("give one log, or one file per sensor (--accel FILE --gyro FILE).")

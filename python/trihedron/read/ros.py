@@ -11,8 +11,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line
+from trihedron.read.errors import ReadError, file_sha256, first_line
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding
 from trihedron.records.progress import Progress

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -34,27 +35,22 @@ class Judged:
     confirms_clock: bool = False
 
 
-def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
-    """The acceleration unit that a user's text names."""
-    key = text.value if isinstance(text, AccelerationUnit) else known_unit("accelerometer", text)
-    try:
-        return AccelerationUnit(key.replace("raw", "counts"))
-    except ValueError:
-        raise ReadError(
-            f"'{text}' is not an acceleration unit known here; state one with --accel-unit: "
-            f"{', '.join(unit.value for unit in AccelerationUnit)} (counts: of any size)."
-        ) from None
+_UNITS = {
+    AccelerationUnit: ("accelerometer", "an acceleration unit", "--accel-unit"),
+    RateUnit: ("gyroscope", "an angular rate unit", "--gyro-unit"),
+}
+Unit = TypeVar("Unit", AccelerationUnit, RateUnit)
 
 
-def parse_rate_unit(text: str | RateUnit) -> RateUnit:
-    """The rate unit that a user's text names."""
-    key = text.value if isinstance(text, RateUnit) else known_unit("gyroscope", text)
+def parse_unit(kind: type[Unit], text: str | Unit) -> Unit:
+    """The unit of ``kind`` that a user's text names."""
+    sensor, what, option = _UNITS[kind]
     try:
-        return RateUnit(key.replace("raw", "counts"))
+        return text if isinstance(text, kind) else kind(known_unit(sensor, text).replace("raw", "counts"))
     except ValueError:
         raise ReadError(
-            f"'{text}' is not an angular rate unit known here; state one with --gyro-unit: "
-            f"{', '.join(unit.value for unit in RateUnit)} (counts: of any size)."
+            f"'{text}' is not {what} known here; state one with {option}: "
+            f"{', '.join(unit.value for unit in kind)} (counts: of any size)."
         ) from None
 
 
@@ -76,7 +72,7 @@ def judge_accelerometer(
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
-        unit = parse_acceleration_unit(given if given is not None else named)
+        unit = parse_unit(AccelerationUnit, given if given is not None else named)
         against = _contradiction_accelerometer(unit, norm, is_given=given is not None)
         return Judged(unit, _stated("accelerometer", unit, against, is_given=given is not None))
     if whole and not _is_near(norm, 1.0):
@@ -147,7 +143,7 @@ def judge_gyroscope(
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
-        unit = parse_rate_unit(given if given is not None else named)
+        unit = parse_unit(RateUnit, given if given is not None else named)
         against = None
         if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
             against = Finding.of(
@@ -209,7 +205,7 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
     From pose to pose the means of an accelerometer change and those of a gyro do not; in a single pose the ratio of
     gravity to the accelerometer's noise is far higher than that of the gyro's bias to its noise.
     """
-    windows = look_at_pair(first, second, rate_hz)
+    windows = look({"first": first, "second": second}, rate_hz)
     if windows is None:
         return None, "short"
     change, level = [], []
@@ -224,8 +220,3 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
     if max(level) > 5.0 * min(level):
         return level[0] > level[1], "level"
     return None, "alike"
-
-
-def look_at_pair(first: FloatArray, second: FloatArray, rate_hz: float) -> Windows | None:
-    """Windows of two triads whose sensors are not known yet."""
-    return look({"first": first, "second": second}, rate_hz)

@@ -16,24 +16,18 @@ from trihedron.records.progress import Progress
 
 _CSV = "export it as CSV or Parquet"
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
-    (b"%PDF", "a PDF document", "ask for the numbers as CSV"),
     (b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it with `zstd -d` first"),
     (b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),
     (b"Rar!", "a RAR archive", "unpack it first"),
-    (b"\x89PNG", "a picture", "name the log itself"),
-    (b"\xff\xd8\xff", "a picture", "name the log itself"),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls)", "save the sheet as CSV"),
     (b"H Product:Blackbox", "a Betaflight or INAV blackbox log", "decode it with `blackbox_decode` and read the CSV"),
     (b"\xfa\xff", "an Xsens MT binary log (.mtb)", "export it as text in MT Manager"),
     (b"\xb5b", "a u-blox binary log", "convert its ESF messages to CSV"),
     (b"MD\xfc\x03", "an Axivity .cwa log", "export it as CSV in OmGui"),
-    (b"\x7fELF", "a program", "name the log itself"),
     (b"\xaaD\x12", "a NovAtel binary log", "convert RAWIMU to ASCII with NovAtel Convert"),
     (b"\xaaD\x13", "a NovAtel binary log", "convert RAWIMUS to ASCII with NovAtel Convert"),
     (b"DEVC\0", "a GoPro GPMF stream", "write its ACCL and GYRO as CSV with gopro-telemetry"),
     (b"HDF", "an HDF4 file", "convert it to HDF5 or CSV"),
-    (b"ply\n", "a point cloud", "name the log of the IMU"),
-    (b"bplist00", "a property list", "export the log as CSV"),
 )
 
 
@@ -103,8 +97,6 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
         return read_zip(path, choice, progress)
-    if choice.device is not None:
-        raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
     # The library for tables is large, and arrays do not need it.
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet

@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from trihedron.read.columns import columns_or_none
 from trihedron.read.devices import Choice
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line
+from trihedron.read.errors import ReadError, file_sha256, first_line
 from trihedron.read.matlab import read_objects
 from trihedron.read.memory import columns_table
 from trihedron.read.ros import Stream, choice_note, missing_package, pick

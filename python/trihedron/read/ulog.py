@@ -20,8 +20,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import AXES
 from trihedron.read.devices import Choice
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line
+from trihedron.read.errors import ReadError, file_sha256, first_line
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table

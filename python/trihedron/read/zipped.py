@@ -10,8 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError, first_line, from_os_error
+from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
 from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -37,9 +36,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
         with zipfile.ZipFile(path) as archive:
             names = [info.filename for info in archive.infolist() if not info.is_dir()]
             if not names or any(name.endswith(".npy") for name in names):
-                return (read_npz(path, choice.device),)
-            if choice.device is not None:
-                raise ReadError(f"{path}: a device was given, but this is not an .npz archive; leave --device out.")
+                return (read_npz(path, choice.instance),)
             _reject_containers(path, names)
             members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
             picked = _chosen(path, members, choice.topic) or _by_name(members)
@@ -69,10 +66,8 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
 def _reject_containers(path: Path, names: list[str]) -> None:
     known = {
         "xl/workbook.xml": ("an Excel workbook (.xlsx)", "save the sheet as CSV"),
-        "word/document.xml": ("a Word document", "name the log itself"),
         "content.xml": ("an OpenDocument file", "save the sheet as CSV"),
         "log.bin": ("an ActiGraph .gt3x archive", "export its IMU as CSV in ActiLife"),
-        "AndroidManifest.xml": ("an Android program", "name the log itself"),
     }
     for member, (kind, remedy) in known.items():
         if member in names:

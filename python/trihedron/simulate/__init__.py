@@ -1,7 +1,7 @@
 """Simulation of an IMU: motion, sensor mechanism, noise, ADC. It produces the same records as reading a log."""
 
 from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
-from trihedron.simulate.diagnosed import diagnosed_sizes, with_diagnosed_effects
+from trihedron.simulate.diagnosed import diagnosed_sizes
 from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
 from trihedron.simulate.gyroscope import Gyroscope, SenseMode
 from trihedron.simulate.motion.steps import Disturb, Motion, MoveTo, Oscillate, Pose, Replay, Turn, Vibrate
@@ -75,6 +75,5 @@ __all__ = [
     "table_turns",
     "twin_motion",
     "twin_scenario",
-    "with_diagnosed_effects",
     "with_effect",
 ]

@@ -5,22 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from trihedron.simulate.effects import EFFECTS, with_effect
+from trihedron.simulate.effects import EFFECTS
 from trihedron.simulate.effects.found import LENGTH, NotSimulatedError, Size, nothing
-from trihedron.simulate.scenario import Scenario
-
-
-def with_diagnosed_effects(
-    scenario: Scenario, effects: Sequence[Mapping[str, Any]]
-) -> tuple[Scenario, tuple[str, ...], dict[str, str]]:
-    """The scenario with the accepted effects of a diagnosis (``effects`` of its JSON).
-
-    Returns the scenario, the ids of the effects added, and the reason of exclusion for every other id.
-    """
-    sizes, left_out = diagnosed_sizes(effects)
-    for effect_id, size in sizes:
-        scenario = with_effect(scenario, effect_id, **size)
-    return scenario, tuple(dict.fromkeys(effect_id for effect_id, _ in sizes)), left_out
 
 
 def diagnosed_sizes(

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from trihedron.documents import DocumentError, of_path, parse_toml, read_text
+from trihedron.documents import read_toml
 from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
@@ -42,10 +42,7 @@ def read_scenario(path: str | Path) -> Scenario:
     table and key.
     """
     path = Path(path)
-    try:
-        table = parse_toml(read_text(path, "scenario file"))
-    except DocumentError as error:
-        raise InputError(of_path(path, error)) from None
+    table = read_toml(path, "scenario file")
     try:
         return scenario_from_table(table, path.stem)
     except (TypeError, OverflowError, LookupError):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import CHECKSUM_OF, FramedDecoder
+from trihedron.capture.protocols.framing import CHECKSUM_OF, Frame, FramedDecoder
 from trihedron.errors import InputError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 

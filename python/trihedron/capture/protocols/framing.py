@@ -1,15 +1,14 @@
-"""Frames with a sync and a length, found in a stream with lost, doubled and corrupt bytes."""
+"""Decoders: bytes in, frames out, corrupt and skipped bytes counted; frames by sync and length, or by line."""
 
 from __future__ import annotations
 
 import binascii
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import xor
-
-from trihedron.capture.protocols.contract import Frame
+from typing import NamedTuple
 
 Checksum = Callable[[bytes], int]
 
@@ -69,12 +68,42 @@ LONGEST_LINE = 4096
 """Bytes without a line feed after which they are discarded."""
 
 
-class FramedDecoder(ABC):
-    """Finds ``sync``, checks length and content of the frame, and continues one byte later if there is no frame.
+class Frame(NamedTuple):
+    """One frame as sent.
 
-    A short checksum matches by chance (once in 256 for a sum of bytes) for a frame that lost a byte and took the first
-    one of the next frame. A frame that is not followed by a sync, or by the end of the received bytes, is therefore
-    accepted only if no complete frame begins inside it.
+    ``counter`` counts frames and ``ticks`` is the device's clock, where the protocol has them (raw, wrapping);
+    ``values`` are the numbers of its columns, ``text`` the same numbers as written to the log, digit for digit.
+    """
+
+    counter: int | None
+    ticks: int | None
+    values: tuple[float, ...]
+    text: str
+
+
+_PRINTED = frozenset("0123456789+-.eE \tnaNinfINF")
+
+
+def printed_numbers(texts: Sequence[str]) -> list[float] | None:
+    """Numbers as a board prints them; ``None`` where one is not a number, or contains characters that only Python
+    accepts in a number, such as form feeds and underscores from flipped bits.
+    """
+    if not all(map(_PRINTED.issuperset, texts)):
+        return None
+    try:
+        return list(map(float, texts))
+    except ValueError:
+        return None
+
+
+class Decoder(ABC):
+    """Converts bytes, in pieces of any size, to complete frames.
+
+    ``columns`` names the values; it is empty until they are known. ``counter_modulus`` and ``clock_modulus`` are the
+    values at which counter and clock wrap (0: they do not), ``tick_s`` is one tick of the clock in seconds (0: no
+    clock). ``learned`` names the attributes that the first frames determine, and that a decoder of the same device
+    takes over after a reconnection. ``corrupt`` counts pieces that look like the beginning of a frame but are none;
+    ``skipped_bytes`` counts bytes outside frames.
     """
 
     name = ""
@@ -83,14 +112,35 @@ class FramedDecoder(ABC):
     clock_modulus = 0
     tick_s = 0.0
     learned: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self.corrupt = 0
+        self.skipped_bytes = 0
+
+    @abstractmethod
+    def feed(self, data: bytes) -> list[Frame]:
+        """Frames that are complete with these bytes."""
+
+    @abstractmethod
+    def finish(self) -> list[Frame]:
+        """Frames in the remaining bytes, at the end of the stream."""
+
+
+class FramedDecoder(Decoder):
+    """Finds ``sync``, checks length and content of the frame, and continues one byte later if there is no frame.
+
+    A short checksum matches by chance (once in 256 for a sum of bytes) for a frame that lost a byte and took the first
+    one of the next frame. A frame that is not followed by a sync, or by the end of the received bytes, is therefore
+    accepted only if no complete frame begins inside it.
+    """
+
     length = 0
     """Length of every frame in bytes, where it is constant."""
 
     def __init__(self, sync: bytes) -> None:
+        super().__init__()
         self._sync = sync
-        self._buffer = bytearray()
-        self.corrupt = 0
-        self.skipped_bytes = 0
 
     def length_at(self, data: bytearray, at: int) -> int:
         """Length of the frame whose sync is at ``at``; ``MORE``; or 0 where its header is invalid."""
@@ -190,19 +240,8 @@ def _begun(buffer: bytearray, sync: bytes, at: int) -> int:
     return 0
 
 
-class LineFedDecoder(ABC):
+class LineFedDecoder(Decoder):
     """One message per line, with at most one frame in each; a subclass decodes the line."""
-
-    columns: tuple[str, ...] = ()
-    clock_modulus = 0
-    counter_modulus = 0
-    tick_s = 0.0
-    learned: tuple[str, ...] = ()
-
-    def __init__(self) -> None:
-        self.corrupt = 0
-        self.skipped_bytes = 0
-        self._buffer = bytearray()
 
     @abstractmethod
     def frame_of(self, line: bytes) -> Frame | None:

@@ -7,8 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from trihedron.capture.protocols.contract import Frame, printed_numbers
-from trihedron.capture.protocols.framing import LineFedDecoder
+from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import MORE, FramedDecoder
+from trihedron.capture.protocols.framing import MORE, Frame, FramedDecoder
 
 _SYNC = b"\xfa\xff\x36"
 _EXTENDED = 0xFF

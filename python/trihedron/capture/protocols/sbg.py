@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, FramedDecoder
+from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, Frame, FramedDecoder
 
 _HEAD, _TAIL, _END = 6, 3, 0x33
 _LONGEST = 4086

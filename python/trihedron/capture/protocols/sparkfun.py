@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame, printed_numbers
-from trihedron.capture.protocols.framing import FramedDecoder, LineFedDecoder
+from trihedron.capture.protocols.framing import Frame, FramedDecoder, LineFedDecoder, printed_numbers
 from trihedron.capture.protocols.lines import LineColumns, LinesDecoder
 
 _FRAME = struct.Struct(">x7Hx")

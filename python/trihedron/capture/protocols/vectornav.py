@@ -10,8 +10,7 @@ import binascii
 from functools import reduce
 from operator import xor
 
-from trihedron.capture.protocols.contract import Frame, printed_numbers
-from trihedron.capture.protocols.framing import LineFedDecoder
+from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
 
 _BEFORE = {b"VNIMU": 0, b"VNMAR": 0, b"VNCMV": 0, b"VNYMR": 3, b"VNQMR": 4}
 """Kinds of lines, and the number of attitude fields before the magnetometer's."""

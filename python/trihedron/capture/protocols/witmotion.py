@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import struct
 
-from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import FramedDecoder
+from trihedron.capture.protocols.framing import Frame, FramedDecoder
 
 _CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
 _LAST_KIND = 0x5F

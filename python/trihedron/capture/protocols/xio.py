@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 import struct
 
-from trihedron.capture.protocols.contract import Frame, printed_numbers
-from trihedron.capture.protocols.framing import LineFedDecoder
+from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
 
 _INERTIAL = 0x80 + ord("I")
 _BODY = struct.Struct("<xQ6f")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.documents import read_text
 from trihedron.errors import InputError
 from trihedron.files.calibration import FORMAT as OWN
 from trihedron.files.calibration import CalibrationFileError, read_calibration
@@ -40,7 +40,7 @@ def formats() -> dict[str, Format]:
 
 def targets() -> list[str]:
     """Names of the formats in which a calibration can be written."""
-    return [name for name, one in formats().items() if one.write is not None]
+    return list(formats())
 
 
 def needs(one: Format) -> list[str]:
@@ -48,7 +48,7 @@ def needs(one: Format) -> list[str]:
     identity = (np.eye(3), np.zeros(3))
     example = given("trihedron", {"accelerometer": identity, "gyroscope": identity})
     try:
-        one.write(example, ExportOptions())  # type: ignore[misc]
+        one.write(example, ExportOptions())
     except InputError as error:
         return list(dict.fromkeys(re.findall(r"--(?:noise|rate|current-parameters)", str(error))))
     return []
@@ -61,17 +61,12 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     that convention.
     """
     one = formats().get(target)
-    if one is None or one.write is None:
+    if one is None:
         raise InputError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
     made = one.write(require_plausible(calibration), options or ExportOptions())
     texts = {"": made} if isinstance(made, str) else made
     # The texts contain file names, which may contain control characters.
     return {ending: escaped(text) for ending, text in texts.items()}
-
-
-def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
-    """As :func:`export_files`, in one text; several files are joined one after the other."""
-    return "\n".join(export_files(calibration, target, options).values())
 
 
 def any_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -80,7 +75,7 @@ def any_calibration(path: str | os.PathLike[str]) -> Calibration:
     Raises ``InputError`` when the file is missing or its format is not supported.
     """
     path = Path(path)
-    text = _text(path)
+    text = read_text(path, "calibration file", CalibrationFileError)
     if f'"{OWN}"' in text:
         return read_calibration(path)
     try:
@@ -95,8 +90,8 @@ def is_calibration(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a calibration, and not a log."""
     path = Path(path)
     try:
-        text = _text(path)
-    except CalibrationFileError:
+        text = read_text(path, "calibration file")
+    except InputError:
         return False
     try:
         return f'"{OWN}"' in text or _recognised(text, path) is not None
@@ -109,20 +104,12 @@ LARGEST = 4_000_000
 """Characters, ten times those of a large calibration file; a longer file is a log."""
 
 
-def _text(path: Path) -> str:
-    try:
-        text = read_text(path, "calibration file")
-    except DocumentError as error:
-        raise CalibrationFileError(of_path(path, error)) from None
-    return text
-
-
 def _whole(text: str, path: Path, one: Format) -> str:
     """The text, joined with that of the other sensor's file where a format writes one file per sensor."""
     if one.pair is None or one.pair[0] not in path.name:
         return text
     beside = path.with_name(path.name.replace(*one.pair))
-    return f"{text}\f{_text(beside)}" if beside.is_file() else text
+    return f"{text}\f{read_text(beside, 'calibration file')}" if beside.is_file() else text
 
 
 def _recognised(text: str, path: Path) -> Calibration | None:

@@ -19,7 +19,6 @@ from trihedron.files.formats.autopilot import (
     held_by,
     moved_to,
     orientation,
-    parameters_in,
     said_of_misfit,
     triple,
 )
@@ -61,10 +60,7 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
 
 def from_ardupilot(text: str) -> Calibration | None:
     """The first IMU's parameters as a calibration of readings in the sensor's axes."""
-    parameters = parameters_in(text)
-    if not {"INS_ACCOFFS_X", "INS_ACCSCAL_X"} <= parameters.keys():
-        return None
-    return held_by(parameters, "ardupilot", correction_of)
+    return held_by(text, {"INS_ACCOFFS_X", "INS_ACCSCAL_X"}, "ardupilot", correction_of)
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:

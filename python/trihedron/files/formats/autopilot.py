@@ -201,9 +201,12 @@ def against_log(
 
 
 def held_by(
-    parameters: dict[str, float], autopilot: Autopilot, correction: Callable[[Onboard, str], AxisCorrection]
-) -> Calibration:
-    """The first IMU's parameters as a calibration of readings in the sensor's axes."""
+    text: str, needed: set[str], autopilot: Autopilot, correction: Callable[[Onboard, str], AxisCorrection]
+) -> Calibration | None:
+    """The first IMU's parameters as a calibration of readings in the sensor's axes; None without those needed."""
+    parameters = parameters_in(text)
+    if not needed <= parameters.keys():
+        return None
     board = Onboard(autopilot, 0, 0, "corrected", parameters)
     pairs = {}
     for name in ("accelerometer", "gyroscope"):

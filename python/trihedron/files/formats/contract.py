@@ -85,7 +85,7 @@ class Format:
     names that differ where each sensor has a file; their texts are read as one, separated by a form feed."""
 
     name: str
-    write: Callable[[Calibration, ExportOptions], str | dict[str, str]] | None
+    write: Callable[[Calibration, ExportOptions], str | dict[str, str]]
     read: Callable[[str], Calibration | None] | None = None
     in_si: bool = False
     pair: tuple[str, str] | None = None

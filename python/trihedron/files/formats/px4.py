@@ -20,7 +20,6 @@ from trihedron.files.formats.autopilot import (
     held_by,
     moved_to,
     orientation,
-    parameters_in,
     said_of_misfit,
     triple,
 )
@@ -67,10 +66,7 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
 
 def from_px4(text: str) -> Calibration | None:
     """The first IMU's parameters as a calibration of readings in the sensor's axes."""
-    parameters = parameters_in(text)
-    if not {"CAL_ACC0_XOFF", "CAL_ACC0_XSCALE"} <= parameters.keys():
-        return None
-    return held_by(parameters, "px4", correction_of)
+    return held_by(text, {"CAL_ACC0_XOFF", "CAL_ACC0_XSCALE"}, "px4", correction_of)
 
 
 def correction_of(board: Onboard, name: str) -> AxisCorrection:

@@ -13,8 +13,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.columns import columns_or_none
-from trihedron.read.digest import file_sha256
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, file_sha256
 from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table

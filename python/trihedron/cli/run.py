@@ -1,0 +1,172 @@
+"""What this run was asked: for the provenance of a report, and for its next step, a command that can be copied."""
+
+from __future__ import annotations
+
+import platform
+import re
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass, field, fields, replace
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from trihedron.records import Recording
+    from trihedron.report import Document
+
+_COMMAND = re.compile(r"`[^`]+`")
+_NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
+_OF_DIAGNOSE = ("--alpha",)
+_WITHOUT_VALUE = ("--full", "--force")
+_WITH_PLACE = ("calibrate", "diagnose", "noise")
+"""Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
+UNSTORED = "calibration.json"
+# Options that choose where results go and do not affect them.
+_NOT_OPTIONS = {
+    *("json", "report", "output", "force", "full", "csv", "plot", "updated", "improved"),
+    *("log", "accel", "gyro", "calibration", "result"),
+}
+
+
+@dataclass
+class _Run:
+    """Arguments as typed, options in effect, inputs with their hashes; log, place, reference and file of the next step,
+    and logs that were excluded."""
+
+    typed: tuple[str, ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    inputs: list[tuple[str, str]] = field(default_factory=list)
+    log: str = "LOG"
+    place: str = ""
+    beside: str = ""
+    file: str = ""
+    excluded: tuple[str, ...] = ()
+
+
+_run: ContextVar[_Run] = ContextVar("run")
+
+
+def begin(words: Sequence[str]) -> None:
+    """Start a run with these arguments."""
+    _run.set(_Run(tuple(words)))
+
+
+def _now() -> _Run:
+    return _run.get(_Run())
+
+
+def note_options(given: Mapping[str, Any]) -> None:
+    """Store the options of the command, including defaults."""
+    _now().options = {key: value for key, value in given.items() if key not in _NOT_OPTIONS}
+
+
+def note_input(recording: Recording) -> None:
+    """Store source and hash of a recording that was read."""
+    _now().inputs.append((recording.source, recording.sha256))
+
+
+def note_log(source: Any) -> None:
+    """Store the first log that was read, with the options that say how to read it."""
+    if _now().log == "LOG":
+        name_log(source)
+
+
+def name_log(source: Any) -> None:
+    """Store a log instead of the first."""
+    _now().log = shlex.join(_words(source))
+
+
+def note_place(source: Any) -> None:
+    """Store the place of the recording as typed."""
+    _now().place = shlex.join(_words(source))
+
+
+def note_reference(given: Any) -> None:
+    """Store the known motion beside the log, the first of several."""
+    first = given[0] if isinstance(given, (list, tuple)) and given else given
+    _now().beside = f"--reference {shlex.quote(str(first))}" if first else ""
+
+
+def note_file(path: Path | None) -> None:
+    """Store the calibration file that the next step uses."""
+    _now().file = "" if path is None else shlex.quote(str(path))
+
+
+def note_excluded(logs: Iterable[str], sources: Iterable[Any]) -> None:
+    """Store the logs, as typed, that were not used of several: the next step is without them."""
+    _now().excluded = tuple(logs)
+    used = [one for one in sources if str(one.log) not in _now().excluded]
+    if _now().excluded and used:
+        name_log(used[0])
+
+
+def _words(source: Any) -> list[str]:
+    """The fields of a group of options as arguments; the log, which has no flag, first."""
+    given = {f.name: getattr(source, f.name) for f in fields(source)}
+    first = [str(given.pop("log"))] if given.get("log") is not None else []
+    flags = [(f"--{name.replace('_', '-')}", _word(value)) for name, value in given.items() if value is not None]
+    return [*first, *(word for pair in flags for word in pair)]
+
+
+def _word(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def with_arguments(document: Document, stored_by: str = "...") -> Document:
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in its next step
+    replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
+    said = document.next_step
+    commands = " ".join(_COMMAND.findall(said))
+    if re.search(r"\bFILE\b", commands) and not _now().file:
+        said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
+    filled = _COMMAND.sub(lambda found: _filled(found[0]), said)
+    return document if filled == document.next_step else replace(document, next_step=filled)
+
+
+def _filled(command: str) -> str:
+    verb = command.strip("`").split(" ")[1]
+    more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
+    log = " ".join(filter(None, (_now().log, *more)))
+    given = [word for word in _now().typed if word not in _now().excluded]
+    same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
+    words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
+    return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
+
+
+def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:
+    """The command as typed, without its outputs."""
+    words, skip = [], False
+    for word in given:
+        name = word.partition("=")[0]
+        if not skip and name not in without:
+            words.append(word)
+        skip = not skip and name in without and name not in _WITHOUT_VALUE and "=" not in word
+    return shlex.join(["trihedron", *words]) if words else ""
+
+
+def with_provenance(document: Document) -> Document:
+    """The document with the provenance of this run."""
+    run = _now()
+    rows = [("command", shlex.join(["trihedron", *run.typed]))] if run.typed else []
+    rows.append(("date", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
+    # Imported here: slow, and not needed for text on the screen.
+    from importlib.metadata import version as installed
+
+    rows.append(("version", f"trihedron {installed('trihedron')}, Python {platform.python_version()}"))
+    rows += [("input", f"{source}, sha256 {sha256 or 'not computed'}") for source, sha256 in run.inputs]
+    options = [f"{key.replace('_', '-')} {_shown(value)}" for key, value in run.options.items() if _is_said(value)]
+    if options:
+        rows.append(("options", ", ".join(options)))
+    return replace(document, provenance=(*document.provenance, *rows))
+
+
+def _is_said(value: Any) -> bool:
+    return value not in (None, False, "", [], ())
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return " ".join(map(_shown, value))
+    return "yes" if value is True else str(value)
