@@ -293,6 +293,8 @@ CONVERSIONS = {
     "api/applying.py: float",
     "api/capturing.py: float",
     "api/reading.py: np.ma.asanyarray",
+    "api/streaming.py: note.read_text",
+    "api/streaming.py: json.loads",
     "api/asking.py: result_in_python",
     "api/asking.py: verb",
     "api/asking.py: item.item",
