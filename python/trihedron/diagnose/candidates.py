@@ -18,13 +18,11 @@ from trihedron.probability import chdtrc
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 RESCALED = (3.0, 0.3)
-"""Factors on the prior width at which the leading candidates are evaluated again, with noise strengths refitted."""
+"""Factors on the prior width at which candidates are evaluated again."""
 N_LEADERS = 3
 """Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted."""
 SHAPES_KEPT = 2
 """Shapes kept per effect, counted separately for those with a plausible and those with an implausible size."""
-N_RESIZED = 3
-"""Candidates whose prior width is tried at other values."""
 NEAR = 6.0
 """Difference of scores below which two explanations are named together: odds of twenty to one."""
 FAMILY = NEAR
@@ -73,12 +71,10 @@ def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list
     for k, one in zip(sized, model.with_added(list(sized.values())), strict=True):
         leading[k], asked[k] = sized[k], one
     plain = model.plain([one.strengths for one in asked])
-    best = _best_of_each(leading, asked, plain)
     # The screening at fixed noise strengths may have chosen a prior width that is too small or too large.
-    first = [one.term for one in best[:N_RESIZED]]
-    other = [replace(t, sizes=t.sizes * scale) for t in first for scale in RESCALED]
-    found = _best_of_each([*leading, *other], [*asked, *(model.with_added(other) if other else [])], plain)
-    return found, missing
+    terms = [replace(term, sizes=term.sizes * scale) for scale in (1.0, *RESCALED) for term in leading]
+    under = [one.with_prior(t.sizes, t.sizes * s) for s in RESCALED for t, one in zip(leading, asked, strict=True)]
+    return _best_of_each(terms, [*asked, *under], plain), missing
 
 
 def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float) -> list[Tried]:

@@ -60,6 +60,18 @@ class AddedTerms:
     value: FloatArray
     covariance: FloatArray
 
+    def with_prior(self, known: FloatArray, other: FloatArray) -> AddedTerms:
+        """The result under prior σ ``other`` (k,) in place of ``known`` (k,), at the same strengths (eq. 11.21)."""
+        precision = np.linalg.inv(self.covariance)
+        changed = precision + np.diag(other**-2.0 - known**-2.0)
+        covariance = np.linalg.inv(changed)
+        shift = precision @ self.value
+        value = covariance @ shift
+        volume = np.linalg.slogdet(changed)[1] - np.linalg.slogdet(precision)[1] + 2.0 * np.log(other / known).sum()
+        return AddedTerms(
+            self.log_evidence + 0.5 * float(shift @ (value - self.value) - volume), self.strengths, value, covariance
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class AtStrengths:
