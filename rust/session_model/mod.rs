@@ -160,7 +160,8 @@ pub struct Strengths {
     pub scatter: [f64; N_SCATTER],
     /// Departure of a bias from the line between its poses, during a move, in units of its scatter.
     pub between: [f64; 2],
-    /// Factors, at least 1, on the standard errors of gravity after moves and of the velocity over them.
+    /// Factors on the standard errors of gravity after moves and of the velocity over them; below 1 on the part of them
+    /// that the samples do not resolve.
     pub excess: [f64; 2],
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::chain::{Layout, Rows};
 use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, carry};
 use super::response::{
-    Response, Sums, effect_columns, loosened, respond, sums, widen, wrt_lost_time,
+    Response, Sums, effect_columns, loosened, respond, sums, widened, wrt_lost_time,
 };
 use super::rows::{Domain, Group, Kind};
 use super::{Distortion, LOWER, N_MODEL, N_SCATTER, Session, State, Strengths, tangent_plane};
@@ -74,8 +74,7 @@ impl Passed {
     /// Covariance of the residuals: noise of the samples, and biases that depart from the line between their poses.
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
-        let mut out = self.response.covariance;
-        widen(&mut out, strengths.excess);
+        let mut out = widened(&self.response, strengths.excess);
         if let Some(loose) = &self.loose {
             for (s, loose) in loose.iter().enumerate() {
                 out += loose * (strengths.scatter[s] * strengths.between[s.min(1)]).powi(2);

@@ -17,6 +17,8 @@ pub struct Response {
     pub by_force: Vec<Matrix3<f64>>,
     /// Covariance of the residuals from noise of the samples, not widened.
     pub covariance: MoveCovariance,
+    /// Covariance by what is estimated beside it: motion faster than the samples, slow noise, rounding.
+    pub unresolved: MoveCovariance,
     /// `g Tᵀ C` at the end.
     pub lever: Matrix2x3<f64>,
 }
@@ -90,11 +92,12 @@ pub fn respond(
             velocity.ger(var, &jump, &jump, 1.0);
         }
     }
-    add_white(one, move_model, noise, &by_rate, &by_force, &mut covariance);
+    let [white, unresolved] = of_samples(one, move_model, noise, &by_rate, &by_force);
     Response {
         by_rate,
         by_force,
-        covariance,
+        covariance: covariance + white,
+        unresolved,
         lever,
     }
 }
@@ -121,13 +124,20 @@ pub fn wrt_lost_time(
     (0..one.n_samples()).map(derivative).collect()
 }
 
-/// Widens gravity and velocity, each by its own factor; their covariance stays as noise makes it. If it were widened
-/// too, a velocity without weight would determine parameters of the gyro through the correlation.
-pub(super) fn widen(covariance: &mut MoveCovariance, excess: [f64; 2]) {
-    let mut gravity = covariance.fixed_view_mut::<2, 2>(0, 0);
-    gravity *= excess[0] * excess[0];
-    let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-    velocity *= excess[1] * excess[1];
+/// Covariance of a move's residuals with gravity and velocity widened, each by its own factor; their covariance stays as
+/// noise makes it. If it were widened too, a velocity without weight would determine parameters of the gyro through the
+/// correlation. A factor below one is of what the samples do not resolve: their own noise is measured.
+pub(super) fn widened(response: &Response, excess: [f64; 2]) -> MoveCovariance {
+    let less = excess.map(|factor| factor.min(1.0));
+    let of_row = |row: usize| less[usize::from(row > 1)];
+    let scaled = MoveCovariance::from_fn(|i, j| of_row(i) * of_row(j));
+    let mut out = response.covariance + response.unresolved.component_mul(&scaled);
+    let more = excess.map(|factor| factor.max(1.0).powi(2));
+    let mut gravity = out.fixed_view_mut::<2, 2>(0, 0);
+    gravity *= more[0];
+    let mut velocity = out.fixed_view_mut::<3, 3>(2, 2);
+    velocity *= more[1];
+    out
 }
 
 /// `M [v]×`.
@@ -151,42 +161,46 @@ fn add_square<const N: usize>(
     }
 }
 
-fn add_white(
+/// Covariance by white noise of the samples, and by what they do not resolve, which has no known direction: equal variance
+/// on all axes.
+fn of_samples(
     one: &Move,
     move_model: &MoveModel<'_>,
     noise: &MoveNoise,
     by_rate: &[SMatrix<f64, N_MOVE, 3>],
     by_force: &[Matrix3<f64>],
-    covariance: &mut MoveCovariance,
-) {
-    let diagonal = |density: &Vector3<f64>| density.component_mul(density) / one.step_s;
-    let spread = |scale: &Matrix3<f64>, density: &Vector3<f64>, fast: &Vector3<f64>| {
-        let white = scale * Matrix3::from_diagonal(&diagonal(density)) * scale.transpose();
-        // Motion faster than the samples has no known direction: equal variance on all axes.
-        let extra = (scale.component_mul(scale) * fast).mean() / (one.duration_s * one.step_s);
-        white + Matrix3::identity() * extra
+) -> [MoveCovariance; 2] {
+    let white = |scale: &Matrix3<f64>, density: &Vector3<f64>| {
+        let variance = density.component_mul(density) / one.step_s;
+        scale * Matrix3::from_diagonal(&variance) * scale.transpose()
     };
-    let rate = spread(
-        &move_model.rate_scale,
-        &noise.rate_density,
-        &one.unresolved[1],
-    );
-    let force = spread(
-        &move_model.force_scale,
-        &noise.force_density,
-        &one.unresolved[0],
-    );
-    let mut of_velocity = Matrix3::zeros();
-    let mut of_all = MoveCovariance::zeros();
-    for (r, f) in by_rate.iter().zip(by_force) {
-        add_square(r, &rate, &mut of_all);
-        add_square(f, &force, &mut of_velocity);
-    }
-    of_all.fill_upper_triangle_with_lower_triangle();
-    of_velocity.fill_upper_triangle_with_lower_triangle();
-    *covariance += of_all;
-    let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-    velocity += of_velocity;
+    let fast = |scale: &Matrix3<f64>, variance: &Vector3<f64>| {
+        let mean = (scale.component_mul(scale) * variance).mean();
+        Matrix3::identity() * (mean / (one.duration_s * one.step_s))
+    };
+    let (of_rate, of_force) = (&move_model.rate_scale, &move_model.force_scale);
+    let passed = |rate: Matrix3<f64>, force: Matrix3<f64>| {
+        let mut out = MoveCovariance::zeros();
+        let mut of_velocity = Matrix3::zeros();
+        for (r, f) in by_rate.iter().zip(by_force) {
+            add_square(r, &rate, &mut out);
+            add_square(f, &force, &mut of_velocity);
+        }
+        let mut velocity = out.fixed_view_mut::<3, 3>(2, 2);
+        velocity += of_velocity;
+        out.fill_upper_triangle_with_lower_triangle();
+        out
+    };
+    [
+        passed(
+            white(of_rate, &noise.rate_density),
+            white(of_force, &noise.force_density),
+        ),
+        passed(
+            fast(of_rate, &one.unresolved[1]),
+            fast(of_force, &one.unresolved[0]),
+        ),
+    ]
 }
 
 /// Derivatives of the residuals with respect to the parameters that act on the samples, `(5, k)` each.

@@ -32,13 +32,14 @@ const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
 ];
 type Point = [f64; N_STRENGTHS];
 /// Natural logarithms between which each kind is searched. No bound on noise is physical; these end the search: a walk
-/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off.
+/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a hundredth of what
+/// the samples do not resolve.
 const CORNER: (f64, f64) = (-1.6, 8.5);
 const SCATTER: (f64, f64) = (-6.9, 9.2);
 /// A jump at an unknown instant departs from the line by √(1/12) of a jump of √2 (0.4), one at either end of the move
 /// by √2/2 (0.7), a third bias by √(3/2): no departure is larger.
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
-const EXCESS: (f64, f64) = (0.0, 9.2);
+const EXCESS: (f64, f64) = (-4.6, 9.2);
 /// Rows with this excess have no weight, and keep none: a search leaves it as given.
 const NO_WEIGHT: f64 = 6.9;
 /// Scatter, or excess of moves, at which a search from nothing begins: near nothing the evidence is flat.
@@ -248,7 +249,8 @@ impl<'a> Search<'a> {
 
     /// A step either way, doubled while it gains; otherwise the maximum of a parabola.
     fn along(&mut self, direction: &Range<usize>, step: &mut f64) {
-        if self.is_nothing(direction) && !self.rises(direction) {
+        // Less excess than none is searched too.
+        if self.is_nothing(direction) && !self.rises(direction) && direction.start < EXCESS_AT {
             return;
         }
         let (here, i) = (self.x, direction.start);
