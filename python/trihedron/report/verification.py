@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -129,27 +128,31 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
         ]
     biases = [one for one in v.parameters if one.id == "gyro-bias"]
     if biases:
-        sigmas = [math.hypot(one.sigma_file, one.sigma_log) for one in biases]
-        changed = each_with_sigma([-one.difference for one in biases], sigmas, degrees_from_radians(1.0))
+        changed = each_with_sigma(
+            [-one.difference for one in biases], [one.sigma for one in biases], degrees_from_radians(1.0)
+        )
         changes = ", ".join(changed)
-        facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z) since the calibration"))
+        facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z), 1 σ with the drift between sessions"))
     return tuple(facts)
 
 
 def parameters_table(v: Verification) -> Table:
-    """Every parameter: file minus log, both uncertainties, and whether the log determines it."""
+    """Every parameter: log minus file, both uncertainties, and whether the log determines it."""
     rows = []
     for one in v.parameters:
         scale, unit = shown(one.unit)
         sigma = plain_number(scale * one.sigma_log, 2) if np.isfinite(one.sigma_log) else "unknown"
         stated = plain_number(scale * one.sigma_file, 2) if one.sigma_file > 0.0 else "not stated"
-        differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
-        times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
+        differs = plain_number(-scale * one.difference, 3) if np.isfinite(one.difference) else ""
+        times = plain_number(-one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
         judged = times if one.is_judged else "not judged by this log"
         rows.append((label_of(one.id, one.name), unit, differs, sigma, stated, judged))
-    head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
+    head = ("parameter", "unit", "log − file", "σ of the log", "σ of the file", "in σ")
     return Table(
-        head, tuple(rows), f"Parameters that do not depend on the frame, against this log's own calibration; {TRIAD}"
+        head,
+        tuple(rows),
+        "Parameters that do not depend on the frame, against this log's own calibration; "
+        f"σ of a bias includes its drift between sessions; {TRIAD}",
     )
 
 

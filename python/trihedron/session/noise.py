@@ -46,6 +46,9 @@ START_STRENGTHS = strengths_of_all(8.0 * NOISE_CORNER_S)
 """Start of the search for strengths."""
 NOISE_DOF = 100.0
 """Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
+DRIFT_DOF = 10.0
+"""The same for biases: their variance between sessions is estimated from one or two sessions and scatters by 70 %
+(28 simulated sessions of 20 to 32 poses), as a variance with 4 degrees of freedom per session does."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
 """Bounds of a part whose noise is that of its samples."""
 

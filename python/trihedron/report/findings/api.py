@@ -50,10 +50,12 @@ _CALIBRATE = {
 _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "", WARNING): Words(
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
-        "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:ids first 8}.",
+        "both uncertainties and the bias drift seen in this log allow (log − file, {times_sigma:.1f} σ first): "
+        "{parameters:each}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
         "each.",
+        lines={"parameters": "{v0:ids} {v1:±}"},
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
