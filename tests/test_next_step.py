@@ -126,8 +126,13 @@ def test_an_error_beyond_noise_is_in_the_verdict_with_the_value_of_its_headline(
 @pytest.mark.parametrize(
     ("code", "severity", "said"),
     [
-        (FindingCode.WEAKLY_OBSERVABLE, Severity.SERIOUS, "Add poses."),
-        (FindingCode.WEAKLY_OBSERVABLE, Severity.WARNING, "Add poses. Then: store it."),
+        (FindingCode.COLUMNS_ASSUMED, Severity.SERIOUS, "Add poses."),
+        (FindingCode.COLUMNS_ASSUMED, Severity.WARNING, "Add poses. Then: store it."),
+        (
+            FindingCode.WEAKLY_OBSERVABLE,
+            Severity.WARNING,
+            "Add poses. Record a new log with them, then: `... NEW_LOG`.",
+        ),
         (FindingCode.SPECTRUM_LOW_PASS, Severity.WARNING, "Store it."),
         (FindingCode.WEAKLY_OBSERVABLE, Severity.NOTE, "Store it."),
     ],
@@ -137,6 +142,15 @@ def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(
     document = Document("A title", "", "Usable.", severity is not Severity.SERIOUS, sections, next_step="Store it.")
     assert document.what_next == said
     assert document.level == {"serious": "bad", "warning": "usable", "note": "good"}[severity.value]
+
+
+def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command():
+    begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
+    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json`"
+    begin(("kalman", "--accel", "a.txt", "--gyro", "g.txt"))
+    begin_next_step()
+    note_log(LogSource(accel=Path("a.txt"), gyro=Path("g.txt")))
+    assert filled("`... NEW_LOG`") == "`trihedron kalman --accel NEW_ACCEL --gyro NEW_GYRO`"
 
 
 def test_several_logs_are_all_named_in_a_command_of_another_verb():

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
+_SHOWN = ("--json", "--report", "--full", "--force")
+_ON_A_NEW_LOG = "`... NEW_LOG`"
 _OF_DIAGNOSE = ("--alpha",)
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
@@ -86,17 +89,19 @@ def _word(value: Any) -> str:
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in its next step
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
     replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
     said = document.next_step
     commands = " ".join(_COMMAND.findall(said))
     if re.search(r"\bFILE\b", commands) and not _file.get():
         said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
-    filled = _COMMAND.sub(lambda found: _filled(found[0]), said)
+    filled = _COMMAND.sub(lambda found: _filled(found[0]), replace(document, next_step=said).what_next)
     return document if filled == document.next_step else replace(document, next_step=filled)
 
 
 def _filled(command: str) -> str:
+    if command == _ON_A_NEW_LOG:
+        return f"`{_on_a_new_log()}`" if typed.get() else command
     verb = command.strip("`").split(" ")[1]
     more = (_beside.get(), _place.get()) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_log.get(), *more)))
@@ -104,6 +109,16 @@ def _filled(command: str) -> str:
     same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
     words = {"LOG": log, "FILE": _file.get() or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
+
+
+def _on_a_new_log() -> str:
+    """The command as typed, with its output, on another log in place of the first."""
+    first, *options = shlex.split(_log.get())
+    new = {
+        word: f"NEW_{flag[2:].upper()}" for flag, word in pairwise((first, *options)) if flag in ("--accel", "--gyro")
+    }
+    new |= {} if first.startswith("--") else {first: "NEW_LOG"}
+    return shlex.join(new.get(word, word) for word in shlex.split(again(typed.get(), _SHOWN)))
 
 
 def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:
