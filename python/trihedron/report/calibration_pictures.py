@@ -112,12 +112,7 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
             blocks.append(Picture("time", caption, lambda: chart))
     if means is not None:
         if quality is not None and len(means) == len(quality.residual):
-            caption = (
-                "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
-                "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
-                "Drag to turn."
-            )
-            blocks.append(Picture("orientation", caption, partial(orientation_chart, calibration.accelerometer, means)))
+            blocks.append(orientation_picture(calibration.accelerometer, means, _unseen(quality)))
         caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
         caption += "not recorded; a number is a pose (the first of coinciding ones); triangles are the most useful "
         caption += "next poses, in that order."
@@ -131,11 +126,17 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
     return blocks
 
 
-def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
-    """Residual of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
-    assert sensor.quality is not None
-    force = means @ sensor.S.T + sensor.b
-    values = mm_s2(_unseen(sensor.quality))
+def orientation_picture(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Picture:
+    """Gravity errors (n,) at their directions of "up", by raw mean readings (n, 3)."""
+    caption = "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
+    caption += "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
+    caption += "Drag to turn."
+    return Picture("orientation", caption, partial(orientation_chart, sensor, means, error))
+
+
+def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Chart:
+    """Gravity error (n,) of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
+    force, values = means @ sensor.S.T + sensor.b, mm_s2(error)
     limit = float(np.nanmax(np.abs(values), initial=0.0))
     tips = [
         f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"

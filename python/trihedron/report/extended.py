@@ -13,6 +13,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
+from trihedron.report.calibration_pictures import orientation_picture
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
 from trihedron.report.document import Document, Headline, Picture, Section
@@ -30,12 +31,13 @@ def calibration_result_report(result: CalibrationResult) -> Document:
     """The report of a calibration, with the sections on its reference and on its effects where it has them."""
     document = calibration_report(result.calibration, result.segments, result.recording)
     document = beside_reference(document, result.reference, 1)
-    return document if result.diagnosis is None else _with_effects(document, result.diagnosis)
+    return document if result.diagnosis is None else _with_effects(document, result, result.diagnosis)
 
 
-def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
+def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diagnosis) -> Document:
     """The report with the residuals without and with the effects as its lead, and every effect after the result."""
-    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *effect_pictures(diagnosis)))
+    pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
+    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
     return replace(
         document,
         sections=(document.sections[0], effects, *document.sections[1:]),
@@ -44,14 +46,27 @@ def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
     )
 
 
+def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
+    """Gravity error with the effects by orientation."""
+    means = result.segments.accelerometer_mean
+    for one in diagnosis.residuals:
+        if one.domain == FIRST and means is not None:
+            # A disturbed pose has several rows, each with its name.
+            of = [int(name.split()[1]) - 1 for name in one.names_after]
+            return [orientation_picture(result.accelerometer, means[of], one.after[:, 0])]
+    return []
+
+
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """Cross-validated errors with the effects."""
-    last = next((stage for stage in diagnosis.stages if stage.stage == "effects"), None)
+    """Cross-validated errors with the effects, beside those without."""
+    stages = {stage.stage: {one.domain: one for one in stage.domains} for stage in diagnosis.stages}
     found = []
-    for one in () if last is None else last.domains:
+    for one in stages.get("effects", {}).values():
         if one.domain in PREDICTED:
             factor, unit = shown(one.unit)
-            beside = "rms, cross-validated, with the effects"
+            without = stages["parameters"][one.domain].rms
+            worse = "smaller" if without < one.rms else "larger"
+            beside = f"rms, cross-validated, with the effects; {worse} without: {plain_number(factor * without)} {unit}"
             found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 

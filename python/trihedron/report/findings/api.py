@@ -147,6 +147,7 @@ _MODELLED = "The linear model alone does not reproduce this recording: {statemen
 _TAKES_OFF = (
     "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
 )
+_RAISED = {"raised": " (cross-validated, {v0:ids} grows from {v1:quantity} to {v2:quantity} rms with them)"}
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
@@ -166,15 +167,17 @@ _DIAGNOSE = {
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
-        "S and b were fitted together with {effects:ids}.",
+        "S and b were fitted together with {effects:ids}{raised:run}.",
         _MODELLED,
         _TAKES_OFF,
+        lines=_RAISED,
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
+        "S and b were fitted together with {effects:ids}{raised:run}; unexplained: {left:ids}.",
         _MODELLED,
         _TAKES_OFF,
+        lines=_RAISED,
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.PROTOCOL_DIFFERS, "", NOTE): Words(
