@@ -76,7 +76,7 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
         return
     yield Finding.of(
         FindingCode.CALIBRATION_SHIFT,
-        parameters=[(f"{one.id}-{one.name}", (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
+        parameters=[(one.label, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
         n_parameters=len(shifted),
         n_judged=len(judged),
         times_sigma=abs(shifted[0].times_sigma),
