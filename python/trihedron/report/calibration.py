@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
-from trihedron.records.published import AFTER_MOVES, AT_REST
+from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of, calibrated_sensors
 from trihedron.report.calibration_charts import correlations, strong_correlations
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
@@ -27,10 +28,12 @@ from trihedron.report.numbers import (
     engineering_exponent,
     how_many,
     in_mm_s2,
+    listed,
     one_of,
     plain_number,
     power_of_ten,
     unit_in_print,
+    with_unit,
 )
 from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
@@ -75,21 +78,10 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     held: list[Headline] = []
     in_sample: list[Headline] = []
-    quality = calibration.accelerometer.quality
-    if quality is not None:
-        is_held = quality.held_out_rms is not None
-        rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
-        beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
-        what, value = "gravity error in static poses", plain_number(mm_s2_from_m_s2(rms))
-        (held if is_held else in_sample).append(Headline(what, value, "mm/s²", beside))
-    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
-    angles = [] if moved is None else angles_of(moved)
-    if moved is not None and angles:
-        is_held = len(angles) > 1
-        kind, floor = _kind(moved, is_held=is_held), plain_number(move_floor(moved))
-        beside = f"rms, {kind}, {AFTER_MOVES}; noise alone {floor}°"
-        value = plain_number(angles[-1][1])
-        (held if is_held else in_sample).append(Headline("tilt error after a rotation", value, "°", beside))
+    for error in _errors(calibration):
+        beside = f"rms, {_kind(error.quality, is_held=error.is_held)}, {error.by}; noise alone "
+        beside += with_unit(plain_number(error.floor), error.unit)
+        (held if error.is_held else in_sample).append(Headline(error.what, plain_number(error.rms), error.unit, beside))
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibrated_sensors(calibration):
@@ -101,14 +93,46 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     return [*held, *uncertain, *in_sample]
 
 
+class _Error(NamedTuple):
+    """A cross-validated error, or one in sample where there is none: rms, and rms by noise alone, in ``unit``."""
+
+    what: str
+    rms: float
+    floor: float
+    unit: str
+    by: str
+    quality: FitQuality
+    is_held: bool
+
+
+def _errors(calibration: Calibration) -> list[_Error]:
+    """Gravity error in static poses, and tilt error after a rotation."""
+    out = []
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
+        both, is_held = (mm_s2_from_m_s2(rms), mm_s2_from_m_s2(quality.floor)), quality.held_out_rms is not None
+        out.append(_Error("gravity error in static poses", *both, "mm/s²", AT_REST, quality, is_held))
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    angles = [] if moved is None else angles_of(moved)
+    if moved is not None and angles:
+        both, is_held = (angles[-1][1], move_floor(moved)), len(angles) > 1
+        out.append(_Error("tilt error after a rotation", *both, "°", AFTER_MOVES, moved, is_held))
+    return out
+
+
 def _kind(quality: FitQuality, *, is_held: bool) -> str:
-    return "cross-validated" if is_held else f"in sample only ({how_many(quality.dof, 'degree')} of freedom)"
+    return HELD_OUT if is_held else f"{IN_SAMPLE} only ({how_many(quality.dof, 'degree')} of freedom)"
 
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    times = [f.numbers["times_noise"] for f in calibration.findings if "times_noise" in f.numbers]
-    above = f": gravity error in static poses {plain_number(times[0], 2)} times the noise" if times else ""
+    times = [
+        f"{e.what} {plain_number(e.rms / e.floor, 2)} times the noise"
+        for e in _errors(calibration)
+        if e.is_held and e.floor > 0.0
+    ]
+    above = f": {listed(times)} ({HELD_OUT})" if times else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
     return " ".join([said, *effects])
