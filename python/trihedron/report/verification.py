@@ -218,9 +218,8 @@ def verification_chart(verification: Verification) -> Chart:
                 for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
             ),
         ),
-        height_px=180,
     )
-    return Chart((norm, moves))
+    return Chart((norm, moves), columns=2)
 
 
 def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:
