@@ -33,22 +33,20 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
-    caption = "Norm of gravity minus its true value in every pose, against 3 σ of noise alone"
+    caption = "Norm of gravity minus its true value in every pose"
     if _is_held(quality):
-        caption += (
-            f"; circles: {HELD_OUT}, predicted by a fit without that pose, ± 1 σ. Outside the shade, with a long "
-        )
-        caption += "bar: the other poses hardly determine it; with a short one: more than noise."
+        caption += f"; circles: {HELD_OUT}, by a fit without that pose, ± 1 σ. Outside the shade with a long bar: the "
+        caption += "other poses hardly determine it; with a short one: more than noise."
     else:
         caption += f". {IN_SAMPLE.capitalize()} only, {how_many(quality.dof, 'degree')} of freedom: such errors are "
         caption += "small for wrong S and b too, and prove nothing."
     lines = pose_lines(segments)
-    caption += " Dashed upright: a pose that was disturbed or moved, and counts less." if lines else ""
+    caption += " Dashed upright: disturbed or moved, counts less." if lines else ""
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
         chart = partial(_lead_chart, calibration, means, lines)
-        caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
+        caption += f" Right: its size before calibration ({before_words(calibration)}) and after."
     return Picture("residuals", caption, chart)
 
 

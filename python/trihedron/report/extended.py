@@ -90,7 +90,7 @@ def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> C
         drawn = residuals_chart(diagnosis, one).panels
         for panel, values in zip(drawn, (one.before, one.after), strict=True):
             assert isinstance(panel, Panel)
-            title = f"{panel.title}, in sample: {plain_number(factor * _rms(values))} {unit} rms"
+            title = f"{panel.title}: {plain_number(factor * _rms(values))} {unit} rms"
             panels.append(replace(panel, title=title))
     return Chart(tuple(panels), columns=2, is_linked=True)
 

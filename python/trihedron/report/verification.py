@@ -97,7 +97,18 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
     limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
     is_farther = v.angle_chi2_per_dof > v.norm_chi2_per_dof
     is_tilt = "limit_deg" in limits[0] if limits else bool(above_noise(v)) and is_farther
-    return tuple(out[:: -1 if is_tilt else 1])
+    return (*out[:: -1 if is_tilt else 1], *_bias_headline(v))
+
+
+def _bias_headline(v: Verification) -> tuple[Headline, ...]:
+    """The change of the gyro's bias along the axis where it is largest in its σ."""
+    biases = [one for one in v.parameters if one.id == "gyro-bias" and np.isfinite(one.times_sigma)]
+    if not biases:
+        return ()
+    moved, factor = max(biases, key=lambda one: abs(one.times_sigma)), degrees_from_radians(1.0)
+    beside = f"{moved.name.upper()}, log − file; 1 σ with the drift between sessions "
+    beside += f"{plain_number(factor * moved.sigma, 2)}°/s"
+    return (Headline("gyro bias change", plain_number(-factor * moved.difference, 2), "°/s", beside),)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
