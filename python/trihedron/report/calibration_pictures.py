@@ -46,7 +46,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
         chart = partial(_lead_chart, calibration, means, lines)
-        caption += f" Right: its size before calibration ({before_words(calibration)}) and after."
+        caption += f" Second panel: its size before calibration ({before_words(calibration)}) and after."
     return Picture("residuals", caption, chart)
 
 

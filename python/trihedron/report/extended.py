@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
+from trihedron.records.published import HELD_OUT
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.calibration_pictures import orientation_picture
@@ -18,7 +19,7 @@ from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
 from trihedron.report.document import Document, Headline, Picture, Section
 from trihedron.report.names import MEANING, ids_in_print
-from trihedron.report.numbers import listed, plain_number, shown
+from trihedron.report.numbers import listed, plain_number, shown, with_unit
 from trihedron.report.reference import beside_reference
 
 FIRST = "static-accel"
@@ -66,7 +67,8 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
             factor, unit = shown(one.unit)
             without = stages["parameters"][one.domain].rms
             worse = "smaller" if without < one.rms else "larger"
-            beside = f"rms, cross-validated, with the effects; {worse} without: {plain_number(factor * without)} {unit}"
+            beside = f"rms, {HELD_OUT}, with the effects; {worse} without: "
+            beside += with_unit(plain_number(factor * without), unit)
             found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 
