@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
-from trihedron.records.published import HELD_OUT
+from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.calibration_pictures import orientation_picture
@@ -92,7 +92,7 @@ def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> C
         drawn = residuals_chart(diagnosis, one).panels
         for panel, values in zip(drawn, (one.before, one.after), strict=True):
             assert isinstance(panel, Panel)
-            title = f"{panel.title}: {plain_number(factor * _rms(values))} {unit} rms"
+            title = f"{panel.title}, {IN_SAMPLE}: {plain_number(factor * _rms(values))} {unit} rms"
             panels.append(replace(panel, title=title))
     return Chart(tuple(panels), columns=2, is_linked=True)
 
