@@ -167,6 +167,17 @@ def test_a_model_that_agrees_is_kept_and_a_log_by_itself_is_calibrated():
     assert "trihedron calibrate LOG" in next_step_in_words(found)
 
 
+def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
+    weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
+    effect = SimpleNamespace(id="disturbed-pose", confounded_with=(), model={"applies_to_other_recordings": False})
+    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,))
+    assert "--extended" not in next_step_in_words(found)
+    effect.model = {"applies_to_other_recordings": True}
+    assert "--extended" in next_step_in_words(found)
+    found.calibration = SimpleNamespace(findings=(weak,))
+    assert next_step_in_words(found).startswith("Add poses.")
+
+
 def test_a_calibration_file_that_is_printed_again_is_not_stored_again(capsys):
     path = made_once() / "c.json"
     assert main(["report", str(path)]) in (0, 2)
