@@ -120,23 +120,21 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
     )
 
 
-_JUDGED_BY: Mapping[FindingCode, frozenset[Domain]] = MappingProxyType(
+_OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[FindingCode]] = MappingProxyType(
     {
-        FindingCode.RESIDUAL_ABOVE_NOISE: frozenset({"static-accel", "moves"}),
-        FindingCode.HELD_OUT_WORSE: frozenset({"static-accel", "moves"}),
-        FindingCode.NONLINEAR_RESIDUAL: frozenset({"static-accel"}),
-        FindingCode.GYRO_G_SENSITIVITY: frozenset({"static-gyro"}),
-        FindingCode.GYRO_BIAS_DRIFT: frozenset({"static-gyro"}),
-        FindingCode.LOSSES_POSSIBLE: frozenset({"moves", "dynamics"}),
+        "static-accel": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.NONLINEAR_RESIDUAL}),
+        "static-gyro": frozenset({FindingCode.GYRO_G_SENSITIVITY, FindingCode.GYRO_BIAS_DRIFT}),
+        "moves": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE, FindingCode.LOSSES_POSSIBLE}),
+        "dynamics": frozenset({FindingCode.LOSSES_POSSIBLE}),
     }
 )
-"""Findings about the residuals of the linear fit, and the domains in which they show."""
+"""Findings about the residuals of the linear fit, by the domain in which they show."""
 
 
 def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
     """Findings without those about residuals of the linear fit in domains that agree with noise by the effects."""
-    left = {d.domain for d in diagnosis.remaining if d.disagrees}
-    gone = {code for code, domains in _JUDGED_BY.items() if not domains & left}
+    left = [_OF_THE_LINEAR_FIT.get(d.domain, frozenset()) for d in diagnosis.remaining if d.disagrees]
+    gone = frozenset().union(*_OF_THE_LINEAR_FIT.values()).difference(*left)
     return tuple(f for f in base.findings if f.code not in gone)
 
 

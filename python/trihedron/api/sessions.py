@@ -14,7 +14,6 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import ALPHA, combine
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.sessions.drift import bias_drift
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Frame, Recording, SensorCalibration
@@ -24,6 +23,7 @@ from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
+from trihedron.session.noise import bias_drift
 
 BYS: tuple[By, ...] = get_args(By)
 HEATING_DEGC = 1.0

@@ -9,13 +9,12 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray
-from trihedron.estimate.sessions.drift import bias_drift
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import in_frame
-from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
+from trihedron.session.noise import DRIFT_DOF, NOISE_DOF, bias_drift
 from trihedron.units import acceleration_to_si, rate_to_si
 
 FALSE_ALARM = 1e-3
@@ -76,7 +75,7 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
         return
     yield Finding.of(
         FindingCode.CALIBRATION_SHIFT,
-        parameters=[(one.label, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
+        parameters=[(one.id + "-" + one.name, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
         n_parameters=len(shifted),
         n_judged=len(judged),
         times_sigma=abs(shifted[0].times_sigma),

@@ -31,11 +31,6 @@ class JudgedParameter:
     is_judged: bool
 
     @property
-    def label(self) -> str:
-        """``gyro-bias-y``."""
-        return f"{self.id}-{self.name}"
-
-    @property
     def sigma(self) -> float:
         """Standard uncertainty of the difference."""
         return float(np.hypot(self.sigma_file, self.sigma_log))

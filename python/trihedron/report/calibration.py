@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ
+from trihedron.arrays import AXES, TINY, XYZ
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of, calibrated_sensors
@@ -33,7 +32,6 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
     unit_in_print,
-    with_unit,
 )
 from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
@@ -76,12 +74,8 @@ def calibration_report(
 
 def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
-    held: list[Headline] = []
-    in_sample: list[Headline] = []
-    for error in _errors(calibration):
-        beside = f"rms, {_kind(error.quality, is_held=error.is_held)}, {error.by}; noise alone "
-        beside += with_unit(plain_number(error.floor), error.unit)
-        (held if error.is_held else in_sample).append(Headline(error.what, plain_number(error.rms), error.unit, beside))
+    errors = _errors(calibration)
+    held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibrated_sensors(calibration):
@@ -93,31 +87,24 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     return [*held, *uncertain, *in_sample]
 
 
-class _Error(NamedTuple):
-    """A cross-validated error, or one in sample where there is none: rms, and rms by noise alone, in ``unit``."""
-
-    what: str
-    rms: float
-    floor: float
-    unit: str
-    by: str
-    quality: FitQuality
-    is_held: bool
-
-
-def _errors(calibration: Calibration) -> list[_Error]:
-    """Gravity error in static poses, and tilt error after a rotation."""
+def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
+    """Gravity and tilt error, how many times the noise alone they are, and whether they are cross-validated."""
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:
+        is_held = quality.held_out_rms is not None
         rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
-        both, is_held = (mm_s2_from_m_s2(rms), mm_s2_from_m_s2(quality.floor)), quality.held_out_rms is not None
-        out.append(_Error("gravity error in static poses", *both, "mm/s²", AT_REST, quality, is_held))
+        beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
+        value = plain_number(mm_s2_from_m_s2(rms))
+        line = Headline("gravity error in static poses", value, "mm/s²", beside)
+        out.append((line, rms / max(quality.floor, TINY), is_held))
     moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
     angles = [] if moved is None else angles_of(moved)
     if moved is not None and angles:
-        both, is_held = (angles[-1][1], move_floor(moved)), len(angles) > 1
-        out.append(_Error("tilt error after a rotation", *both, "°", AFTER_MOVES, moved, is_held))
+        is_held, floor, rms = len(angles) > 1, move_floor(moved), angles[-1][1]
+        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}; noise alone {plain_number(floor)}°"
+        line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
+        out.append((line, rms / max(floor, TINY), is_held))
     return out
 
 
@@ -127,11 +114,8 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    times = [
-        f"{e.what} {plain_number(e.rms / e.floor, 2)} times the noise"
-        for e in _errors(calibration)
-        if e.is_held and e.floor > 0.0
-    ]
+    errors = [(line.what, times) for line, times, is_held in _errors(calibration) if is_held]
+    times = [f"{what} {plain_number(times, 2)} times the noise" for what, times in errors if times < 1.0 / TINY]
     above = f": {listed(times)} ({HELD_OUT})" if times else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")

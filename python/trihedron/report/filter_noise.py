@@ -212,13 +212,8 @@ def _tested(one: SensorFilterNoise) -> Block:
         for c in one.consistency
     )  # fmt: skip
     head = (
-        "horizon [s]",
-        "stretches",
-        "NEES",
-        f"predicted [{unit}]",
-        f"actual [{unit}]",
-        "NEES, static",
-        f"static [{unit}]",
+        *("horizon [s]", "stretches", "NEES", f"predicted [{unit}]", f"actual [{unit}]"),
+        *("NEES, static", f"static [{unit}]"),
     )
     caption = f"{capital(what)}. NEES, its square over the predicted variance, is 3 where N and K are right"
     has_static = any(c.static_nees is not None for c in one.consistency)

@@ -55,7 +55,7 @@ _VERIFIED = {
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
         "each.",
-        lines={"parameters": "{v0:ids} {v1:±}"},
+        lines={"parameters": "{v0:ids} {v1:quantity}"},
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "

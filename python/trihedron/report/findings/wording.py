@@ -4,8 +4,7 @@ A placeholder is a name and, after the colon, the format of its value:
 
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
-``±``                    value, standard uncertainty and unit: ``0.0069 ± 0.0012 °/s``
-``quantity``             value and unit: ``1.41 mm/s²``
+``quantity``             value, its σ where known, and unit: ``1.41 mm/s²``, ``0.0069 ± 0.0012 °/s``
 ``all .2g °/s``          several numbers in one unit, which is printed once: ``0.1, 0.2 °/s``
 ``# pose``               ``1 pose``, ``3 poses``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; placeholders are allowed
@@ -101,12 +100,10 @@ def _in_words(value: Any, how: str, line: str) -> str:
         between = "" if how == "run" else how[4:] or ", "
         return between.join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
     if how == "quantity":
-        factor, printed = shown(value[1])
-        return with_unit(plain_number(factor * value[0]), printed)
-    if how == "±":
-        number, sigma, unit = value
+        number, *sigma, unit = value
         factor, printed = shown(unit)
-        return f"{with_sigma(factor * number, factor * sigma)} {printed}"
+        plain = [plain_number(factor * number)] if not sigma else [with_sigma(factor * number, factor * sigma[0])]
+        return with_unit(plain[0], printed)
     if how.startswith("all "):
         digits, _, unit = how[4:].partition(" ")
         alike = f"{digits} !{unit}" if unit else digits
