@@ -13,7 +13,7 @@ from trihedron.report.calibration_charts import residual_chart
 from trihedron.report.chart import Bars, Note, Panel, Scale
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
-from trihedron.report.diagnosis_overview_charts import EXPLAINED, FOLLOWS, strengths_picture, traces_chart
+from trihedron.report.diagnosis_overview_charts import EXPLAINED, strengths_picture, traces_chart
 from trihedron.report.drawn import _path
 from trihedron.report.effect_charts import rest_panels
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
@@ -172,13 +172,6 @@ def test_every_domain_is_a_bar_from_the_left_to_its_misfit_beside_the_limit_of_a
     bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
     np.testing.assert_array_equal(bars[EXPLAINED].x, [np.nan, 40.0, np.nan])
     np.testing.assert_array_equal(bars["with the effects"].x, [0.8, np.nan, 1.1])
-    # A relation shows in a domain whose χ² agrees: no bar inside the shade is said to disagree.
-    left = (replace(tests[0], disagrees=True, limit=None), *left[1:])
-    relation = SimpleNamespace(depends_on=("w_z",), held_out=SimpleNamespace(domain="static-accel"))
-    found = SimpleNamespace(**vars(found) | {"remaining": left, "effects": (1,), "relations": (relation,)})
-    (panel,) = strengths_picture(found).chart().panels
-    bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
-    np.testing.assert_array_equal(bars[FOLLOWS].x, [0.8, np.nan, np.nan])
 
 
 def test_the_error_that_fails_is_the_first_figure_of_a_verification():

@@ -13,7 +13,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.diagnosis_numbers import in_print
-from trihedron.report.diagnosis_words import NOT_JUDGED, follows, is_explained, judged_in_words
+from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
 from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
@@ -31,7 +31,6 @@ MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
 TWO_SIGMA = 2.0
 JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", NOT_JUDGED: "shade"}
-WITH, FOLLOWS = "with the effects", "with the effects, an empirical relation left"
 EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
@@ -71,7 +70,6 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
     pairs = [(d, after.get(d.domain)) for d in tests]
     with_them = np.array([math.nan if now is None else now.chi2_per_dof for _, now in pairs])
     explained = np.array([now is not None and is_explained(d, now) for d, now in pairs])
-    left = np.array([now is not None and bool(follows(diagnosis, now)) for _, now in pairs])
     limit = np.array([d.limit or math.nan for d in tests])
     seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
     low, high = float(seen.min()) / MARGIN, float(seen.max()) * MARGIN
@@ -83,8 +81,7 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
             (word, f"{word}:", colour, np.where([one == word for one in judged], before, math.nan), rows + apart, THICK)
             for word, colour in JUDGED.items()
         ),
-        (WITH, f"{WITH}:", "c1", np.where(explained | left, math.nan, with_them), rows - apart, THICK),
-        (FOLLOWS, f"{FOLLOWS}:", "c2", np.where(left, with_them, math.nan), rows - apart, THICK),
+        ("with the effects", "with the effects:", "c1", np.where(explained, math.nan, with_them), rows - apart, THICK),
         (EXPLAINED, f"{EXPLAINED}:", "c3", np.where(explained, with_them, math.nan), rows - apart, THICK),
     ]
     for name, words, colour, values, at, width in sides:
