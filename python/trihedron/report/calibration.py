@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import AXES, TINY, XYZ
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
-from trihedron.report.axes import Axes, axes_of, calibrated_sensors
+from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
 from trihedron.report.calibration_pictures import (
@@ -55,7 +55,7 @@ def calibration_report(
     figures = tuple(figure_blocks(calibration, segments, recording))
     if figures:
         sections.append(Section("Figures", figures))
-    axes = tuple(_axes_block(name, sensor) for name, sensor in calibrated_sensors(calibration))
+    axes = tuple(_axes_block(name, sensor) for name, sensor in calibration.sensors)
     sections += [Section("Axes", axes), Section("Uncertainty", tuple(_certainty(calibration)))]
     residuals = tuple(residual_tables(calibration, segments))
     if residuals:
@@ -78,7 +78,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         with suppress(ValueError):
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
             is_open = is_assumed and name == "accelerometer"
@@ -131,7 +131,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         rows = fit_in_words(name, sensor)
         if name == "accelerometer" and segments is not None:
             rows += _before_in_words(calibration, segments)
@@ -218,7 +218,7 @@ def next_pose(calibration: Calibration) -> str:
 
 def _certainty(calibration: Calibration) -> list[Block]:
     blocks: list[Block] = []
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         seen = sensor.observability
         if seen is None:
             continue

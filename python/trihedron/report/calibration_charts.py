@@ -11,7 +11,6 @@ import numpy as np
 from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
-from trihedron.report.axes import calibrated_sensors
 from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
 from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
@@ -165,7 +164,7 @@ def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]
 def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
     prefixes = {"accelerometer": "accel", "gyroscope": "gyro"}
-    names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibrated_sensors(calibration) for name in PARAMETER_NAMES]
+    names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibration.sensors for name in PARAMETER_NAMES]
     sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
