@@ -148,10 +148,6 @@ def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(
 def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command():
     begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json`"
-    begin(("kalman", "--accel", "a.txt", "--gyro", "g.txt"))
-    begin_next_step()
-    note_log(LogSource(accel=Path("a.txt"), gyro=Path("g.txt")))
-    assert filled("`... NEW_LOG`") == "`trihedron kalman --accel NEW_ACCEL --gyro NEW_GYRO`"
 
 
 def test_several_logs_are_all_named_in_a_command_of_another_verb():

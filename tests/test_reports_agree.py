@@ -98,9 +98,8 @@ def test_verify_and_diagnose_judge_the_bias_of_another_session_alike(shift_deg_s
     motions = (hand_session(n_poses=n, pose_s=3.0, move_s=2.5, first_pose_s=5.0) for n in (24, 18))
     scenarios = (replace(scenario_by_name("hand-session"), motion=motion) for motion in motions)
     first, second = (simulate(scenario, seed)[0] for scenario, seed in zip(scenarios, (3, 9), strict=True))
-    known = trihedron.calibrate(first, gravity_m_s2=9.80665).calibration
-    moved = replace(known.gyroscope, b=known.gyroscope.b + np.radians(shift_deg_s))
-    known = replace(known, gyroscope=moved)
+    own = trihedron.calibrate(first, gravity_m_s2=9.80665).calibration
+    known = replace(own, gyroscope=replace(own.gyroscope, b=own.gyroscope.b + np.radians(shift_deg_s)))
     shifts = [one for one in trihedron.verify(known, second).findings if one.code is FindingCode.CALIBRATION_SHIFT]
     against = trihedron.diagnose(second, calibration=known)
     assert bool(shifts) == any(one.significant for one in against.parameters if one.id == "gyro-bias")

@@ -113,10 +113,9 @@ def _filled(command: str) -> str:
 
 def _on_a_new_log() -> str:
     """The command as typed, with its output, on another log in place of the first."""
-    first, *options = shlex.split(_log.get())
-    new = {
-        word: f"NEW_{flag[2:].upper()}" for flag, word in pairwise((first, *options)) if flag in ("--accel", "--gyro")
-    }
+    first, *rest = shlex.split(_log.get())
+    after = dict(pairwise((first, *rest)))
+    new = {after.get("--accel"): "NEW_ACCEL", after.get("--gyro"): "NEW_GYRO"}
     new |= {} if first.startswith("--") else {first: "NEW_LOG"}
     return shlex.join(new.get(word, word) for word in shlex.split(again(typed.get(), _SHOWN)))
 

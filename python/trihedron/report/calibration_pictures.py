@@ -61,8 +61,8 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     marks: list[Mark] = [*lines]
     marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     worst = [f.numbers["worst_prediction_g"] for f in calibration.findings if "worst_prediction_g" in f.numbers]
-    far = [float(mm_s2(np.array(share * calibration.gravity_m_s2))) for share in worst[:1]]
-    marks += [Level(y=one, name="1 σ in the least certain orientation", colour="accent") for one in far]
+    far = mm_s2(calibration.gravity_m_s2 * np.array(worst[:1]))
+    marks += [Level(y=float(y), name="1 σ in the least certain orientation", colour="accent") for y in far]
     # Colours as in the residuals: one for in-sample, one for cross-validated.
     held = _is_held(quality)
     kinds = (

@@ -66,9 +66,7 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
         if one.domain in PREDICTED:
             factor, unit = shown(one.unit)
             without = stages["parameters"][one.domain].rms
-            worse = "smaller" if without < one.rms else "larger"
-            beside = f"rms, {HELD_OUT}, with the effects; {worse} without: "
-            beside += with_unit(plain_number(factor * without), unit)
+            beside = f"rms, {HELD_OUT}, with the effects; {with_unit(plain_number(factor * without), unit)} without"
             found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 
