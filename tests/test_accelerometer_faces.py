@@ -6,6 +6,7 @@ import pytest
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import other_form, other_form_jacobian
+from true_segments import codes
 
 G = 9.81
 S_A = np.array([[0.997, -0.015, -0.007], [0.009, 1.002, 0.002], [0.014, 0.002, 1.023]])
@@ -20,10 +21,6 @@ def face_readings(faces, sigma: float, seed: int, tilt_deg: float = 0.0) -> np.n
     up = up + np.radians(tilt_deg) * rng.standard_normal(up.shape)
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     return G * up @ S_A.T + B_A + sigma * rng.standard_normal(up.shape)
-
-
-def codes(findings):
-    return {finding.code for finding in findings}
 
 
 def test_exact_faces_give_the_exact_model_in_any_order_and_the_variances_of_the_formula():

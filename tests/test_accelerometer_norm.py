@@ -10,6 +10,7 @@ from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm, ellipsoid
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import distort
+from true_segments import codes
 
 G = 9.81744
 S_TRUE = np.array([[2.41e-3, 0.0, 0.0], [-8.6e-6, 2.43e-3, 0.0], [-2.2e-5, -5.2e-5, 2.41e-3]])
@@ -27,10 +28,6 @@ def cube_poses() -> np.ndarray:
 def readings(up: np.ndarray, seed: int, S: np.ndarray = S_TRUE, b: np.ndarray = B_TRUE) -> np.ndarray:
     rng = np.random.default_rng(seed)
     return distort(G * up, S, b) + SIGMA * rng.standard_normal((len(up), 3))
-
-
-def codes(findings):
-    return {finding.code for finding in findings}
 
 
 def test_six_faces_are_refused_and_the_missing_poses_named():

@@ -7,18 +7,19 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trihedron
+from trihedron.api.extending import _still_true
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
-from trihedron.records import FindingCode
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.document import Picture
 from trihedron.report.extended import calibration_result_report
 from trihedron.simulate import (
@@ -208,6 +209,15 @@ def test_a_bent_accelerometer_is_no_loss_of_samples_once_its_effect_is_found():
     assert trihedron.extend(bent).is_trustworthy
 
 
+def test_a_warning_of_the_linear_fit_is_gone_once_the_effects_explain_the_domain_it_is_about():
+    codes = (FindingCode.GYRO_G_SENSITIVITY, FindingCode.NONLINEAR_RESIDUAL, FindingCode.POSE_SETTLING)
+    base = SimpleNamespace(findings=tuple(Finding(code, Severity.WARNING, "Seen.", "", "") for code in codes))
+    for left, gone in {"dynamics": codes[:2], "static-gyro": codes[1:2], "static-accel": codes[:1]}.items():
+        remaining = (SimpleNamespace(domain=left, disagrees=True),)
+        kept = {one.code for one in _still_true(base, SimpleNamespace(remaining=remaining))}
+        assert kept == set(codes) - set(gone)
+
+
 def test_an_extended_calibration_shows_what_its_effects_change():
     recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
     document = calibration_result_report(trihedron.extend(trihedron.calibrate(recording, gravity_m_s2=9.80665)))
@@ -216,7 +226,7 @@ def test_an_extended_calibration_shows_what_its_effects_change():
     before, after = (float(panel.title.split()[-3]) for panel in (linear, extended))
     # What S and b leave of the quadratic is several times the noise.
     assert after < 0.5 * before
-    assert document.headlines[0].beside == "rms, cross-validated, with the effects"
+    assert document.headlines[0].beside.startswith("rms, cross-validated, with the effects; ")
     assert "accelerometer quadratic" in document.verdict
     drawn = [b.name for section in document.sections for b in section.blocks if isinstance(b, Picture)]
-    assert "effect-accel-quadratic" in drawn
+    assert {"effect-accel-quadratic", "orientation"} <= set(drawn)

@@ -35,7 +35,7 @@ def test_a_bias_that_switches_between_two_levels_follows_a_random_telegraph_sign
         recording, gravity = _with_gyro_bias(seed, _switching)
         found = trihedron.diagnose(recording, gravity_m_s2=gravity)
         assert found.verdict == "unexplained"
-        (relation,) = (one for one in found.relations if one.depends_on == ("random telegraph signal",))
+        (relation,) = (one for one in found.relations if one.depends_on == ("a random telegraph signal",))
         (height,) = relation.coefficients
         assert height.name.startswith("y")
         assert abs(height.value - 0.0003) < 0.00006  # poses in which it switches more than twice dilute it

@@ -9,7 +9,7 @@ from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose
-from true_segments import segments_from_truth
+from true_segments import codes, segments_from_truth, z_scores
 
 SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
 BIAS = (0.01, -0.02, 0.005)
@@ -35,15 +35,6 @@ def calibrated(recording, segments, truth, nominal=None, error=None, covariance=
         "given",
     )
     return calibrate_moves(recording, segments, given, truth.gravity_m_s2, nominal)
-
-
-def z_scores(found, truth):
-    error = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
-    return error / np.sqrt(np.diag(found.covariance))
-
-
-def codes(findings):
-    return {finding.code for finding in findings}
 
 
 @pytest.fixture(scope="module")

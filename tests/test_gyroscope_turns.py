@@ -11,7 +11,7 @@ from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.known_vectors import KnownVectors, fit_known
 from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
-from true_segments import segments_from_truth
+from true_segments import codes, segments_from_truth, z_scores
 
 SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
 BIAS = (0.01, -0.02, 0.005)
@@ -32,15 +32,6 @@ def session(seed=0, S=SCALE, b=BIAS, **motion):
     gyroscope = Gyroscope(S=S, b=b, noise=NoiseTerms(N=(2e-4,) * 3))
     recording, truth = simulate(Scenario(motion=table_turns(**motion), gyroscope=gyroscope), seed)
     return recording, truth, *turns_and_zeros(recording, truth)
-
-
-def z_scores(found, truth):
-    error = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
-    return error / np.sqrt(np.diag(found.covariance))
-
-
-def codes(findings):
-    return {finding.code for finding in findings}
 
 
 def with_wrong_turn(recording, turn, axis, error_rad):

@@ -8,6 +8,7 @@ import pytest
 
 import trihedron
 from trihedron.diagnose.session.observations import observe
+from trihedron.records import FindingCode
 from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
 from trihedron.report.axes import axes_of
@@ -16,7 +17,7 @@ from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.verification import verification_report
 from trihedron.segment import resegment
-from trihedron.simulate import hand_session
+from trihedron.simulate import hand_session, scenario_by_name, simulate
 from written_session import G, simulated, usual
 
 GRAVITY = float(G)
@@ -89,3 +90,18 @@ def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
         assert table.head[-1].startswith("reading without input, −S⁻¹ b [count")
     one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
     assert "without input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
+
+
+@pytest.mark.parametrize("shift_deg_s", [0.0, 0.1])
+def test_verify_and_diagnose_judge_the_bias_of_another_session_alike(shift_deg_s):
+    # The bias of this unit changes by 6 σ of both calibrations between these sessions: 1/f noise, and no fault.
+    motions = (hand_session(n_poses=n, pose_s=3.0, move_s=2.5, first_pose_s=5.0) for n in (24, 18))
+    scenarios = (replace(scenario_by_name("hand-session"), motion=motion) for motion in motions)
+    first, second = (simulate(scenario, seed)[0] for scenario, seed in zip(scenarios, (3, 9), strict=True))
+    own = trihedron.calibrate(first, gravity_m_s2=9.80665).calibration
+    known = replace(own, gyroscope=replace(own.gyroscope, b=own.gyroscope.b + np.radians(shift_deg_s)))
+    shifts = [one for one in trihedron.verify(known, second).findings if one.code is FindingCode.CALIBRATION_SHIFT]
+    against = trihedron.diagnose(second, calibration=known)
+    assert bool(shifts) == any(one.significant for one in against.parameters if one.id == "gyro-bias")
+    assert bool(shifts) == (shift_deg_s > 0.0)
+    assert all("°/s" in one.seen for one in shifts)

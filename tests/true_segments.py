@@ -43,3 +43,12 @@ def segments_from_truth(recording, truth, trim_s=0.05):
         time_mid_s=middle,
         duration_s=counts / recording.rate_hz,
     )
+
+
+def codes(findings):
+    return {finding.code for finding in findings}
+
+
+def z_scores(found, truth):
+    error = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
+    return error / np.sqrt(np.diag(found.covariance))

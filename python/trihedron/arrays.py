@@ -17,3 +17,8 @@ TINY = 1e-300
 """Least divisor, variance and probability: nothing measured is as small, and its inverse is finite."""
 XYZ = ("X", "Y", "Z")
 """The axes as printed in reports and on a silkscreen."""
+
+
+def rms_of(values: FloatArray) -> float:
+    """Root mean square of all values."""
+    return float(np.sqrt(np.mean(values**2)))

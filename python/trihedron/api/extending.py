@@ -13,7 +13,7 @@ from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import Diagnosis, StageDomain
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
@@ -71,21 +71,27 @@ CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 """Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
 
 
-def _spoilt(diagnosis: Diagnosis) -> Finding | None:
-    """A finding where the effects raise the cross-validated rms of a domain; None where none is raised."""
+def _raised(diagnosis: Diagnosis) -> list[tuple[StageDomain, StageDomain]]:
+    """Domains that an extension must predict whose cross-validated rms the effects raise: without and with them."""
     stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
     before, after = stages.get("parameters", {}), stages.get("effects", {})
-    for domain in CARRIED:
-        if domain in before and domain in after and after[domain].rms > MAY_RISE * before[domain].rms:
+    pairs = [(before[one], after[one]) for one in CARRIED if one in before and one in after]
+    return [(first, second) for first, second in pairs if second.rms > first.rms]
+
+
+def _spoilt(diagnosis: Diagnosis) -> Finding | None:
+    """A finding where the effects raise the cross-validated rms of a domain by more than chance; else None."""
+    for before, after in _raised(diagnosis):
+        if after.rms > MAY_RISE * before.rms:
             return Finding.of(
                 FindingCode.EFFECTS_MODELLED,
                 "stays-linear",
                 effects=[effect.id for effect in diagnosis.effects],
                 n_effects=len(diagnosis.effects),
-                domain=domain,
-                rms_before=before[domain].rms,
-                rms_after=after[domain].rms,
-                unit=before[domain].unit,
+                domain=before.domain,
+                rms_before=before.rms,
+                rms_after=after.rms,
+                unit=before.unit,
             )
     return None
 
@@ -114,21 +120,21 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
     )
 
 
-_OF_THE_LINEAR_FIT = (
-    FindingCode.RESIDUAL_ABOVE_NOISE,
-    FindingCode.HELD_OUT_WORSE,
-    FindingCode.NONLINEAR_RESIDUAL,
-    FindingCode.GYRO_G_SENSITIVITY,
-    FindingCode.GYRO_BIAS_DRIFT,
-    FindingCode.LOSSES_POSSIBLE,
+_OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[FindingCode]] = MappingProxyType(
+    {
+        "static-accel": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.NONLINEAR_RESIDUAL}),
+        "static-gyro": frozenset({FindingCode.GYRO_G_SENSITIVITY, FindingCode.GYRO_BIAS_DRIFT}),
+        "moves": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE, FindingCode.LOSSES_POSSIBLE}),
+        "dynamics": frozenset({FindingCode.LOSSES_POSSIBLE}),
+    }
 )
+"""Findings about the residuals of the linear fit, by the domain in which they show."""
 
 
 def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    """Findings without those about the linear fit's residuals, where the effects explain every domain; where they
-    explain the static poses alone, only the finding of nonlinear residuals is removed."""
-    left = {d.domain for d in diagnosis.remaining if d.disagrees}
-    gone = _OF_THE_LINEAR_FIT if not left else () if "static-accel" in left else (FindingCode.NONLINEAR_RESIDUAL,)
+    """Findings without those about residuals of the linear fit in domains that agree with noise by the effects."""
+    left = [_OF_THE_LINEAR_FIT.get(d.domain, frozenset()) for d in diagnosis.remaining if d.disagrees]
+    gone = frozenset().union(*_OF_THE_LINEAR_FIT.values()).difference(*left)
     return tuple(f for f in base.findings if f.code not in gone)
 
 
@@ -160,6 +166,7 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         "fitted-but-disagree" if left else "fitted",
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
+        raised=[(b.domain, (b.rms, b.unit), (a.rms, a.unit)) for b, a in _raised(diagnosis)],
         left=left,
         n_effects=len(diagnosis.effects),
         n_domains_left=len(left),

@@ -250,8 +250,11 @@ def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
         if not one.is_settled:
             out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
         if not one.N.is_limit and one.N.upper > one.N.lower * UNCERTAIN:
-            lower, upper = one.N.lower, one.N.upper
-            out.append(Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, sensor=one.sensor, lower=lower, upper=upper))
+            lower, upper, value = one.N.lower, one.N.upper, one.N.value
+            said = Finding.of(
+                FindingCode.FILTER_NOISE_UNCERTAIN, sensor=one.sensor, in_file=value, lower=lower, upper=upper
+            )
+            out.append(said)
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
         if one.reference is not None and one.reference.follows:

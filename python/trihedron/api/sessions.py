@@ -13,7 +13,6 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import ALPHA, combine
-from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
@@ -24,7 +23,7 @@ from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
-from trihedron.session.noise import between_sessions
+from trihedron.session.noise import bias_drift
 
 BYS: tuple[By, ...] = get_args(By)
 HEATING_DEGC = 1.0
@@ -177,7 +176,7 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         group,
         numbers_of(accel.S, accel.b, S_g, b_g, anchor),
         0.5 * (covariance + covariance.T),
-        _bias_drift(result, len(covariance)),
+        bias_drift(calibration, result.segments, len(covariance)),
         recording.start_epoch_s,
         temperature,
         (low, high),
@@ -197,28 +196,6 @@ def _excess(sensor: SensorCalibration) -> float:
     z = (quality.held_out / quality.held_out_sigma).ravel()
     z = z[np.isfinite(z)]
     return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2[1]) if len(z) > 3 else 1.0
-
-
-def _bias_drift(result: CalibrationResult, n: int) -> FloatArray:
-    """Variance (n,) of the bias change between two sessions like this one (eq. 9.3)."""
-    out = np.zeros(n)
-    accel, gyro, segments = result.accelerometer, result.gyroscope, result.segments
-    quality = accel.quality
-    if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
-        up = segments.accelerometer_mean @ accel.S.T + accel.b
-        up = up / np.linalg.norm(up, axis=1, keepdims=True)
-        if len(up) == len(quality.residual):
-            noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
-            out[:3] = between_sessions(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
-    if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
-        biases = segments.gyroscope_mean @ gyro.S.T
-        noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
-        is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
-        if is_seen.sum() > 3:
-            biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
-            each = [between_sessions(biases[:, k], noise[:, k]) for k in range(3)]
-            out[9:12] = np.mean(each)
-    return out
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
+_SHOWN = ("--json", "--report", "--full", "--force")
+_ON_A_NEW_LOG = "`... NEW_LOG`"
 _OF_DIAGNOSE = ("--alpha",)
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
@@ -115,17 +118,19 @@ def _word(value: Any) -> str:
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in its next step
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
     replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
     said = document.next_step
     commands = " ".join(_COMMAND.findall(said))
     if re.search(r"\bFILE\b", commands) and not _now().file:
         said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
-    filled = _COMMAND.sub(lambda found: _filled(found[0]), said)
+    filled = _COMMAND.sub(lambda found: _filled(found[0]), replace(document, next_step=said).what_next)
     return document if filled == document.next_step else replace(document, next_step=filled)
 
 
 def _filled(command: str) -> str:
+    if command == _ON_A_NEW_LOG:
+        return f"`{_on_a_new_log()}`" if _now().typed else command
     verb = command.strip("`").split(" ")[1]
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_now().log, *more)))
@@ -133,6 +138,15 @@ def _filled(command: str) -> str:
     same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
+
+
+def _on_a_new_log() -> str:
+    """The command as typed, with its output, on another log in place of the first."""
+    first, *rest = shlex.split(_now().log)
+    after = dict(pairwise((first, *rest)))
+    new = {after.get("--accel"): "NEW_ACCEL", after.get("--gyro"): "NEW_GYRO"}
+    new |= {} if first.startswith("--") else {first: "NEW_LOG"}
+    return shlex.join(new.get(word, word) for word in shlex.split(again(_now().typed, _SHOWN)))
 
 
 def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:

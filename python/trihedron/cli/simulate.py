@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from trihedron.cli.next_step import name_log
 from trihedron.cli.options import LogSource, ReadingOptions, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_report
 
@@ -128,6 +129,7 @@ def simulate(
         write_truth(known, truth, overwrite=force)
         say(f"truth: {truth}")
     if report is not None:
+        name_log(LogSource(log=output))
         from trihedron.files.truth import truth_document
         from trihedron.report.simulation import simulation_report
 

@@ -8,7 +8,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.verification import norm_error
@@ -82,7 +82,7 @@ def suspicions_of(
 
     def norm(S: FloatArray, b: FloatArray) -> float:
         sensor = replace(own.accelerometer, S=S, b=b)
-        return _rms(norm_error(sensor, means, zero, gravity_m_s2)[0])
+        return rms_of(norm_error(sensor, means, zero, gravity_m_s2)[0])
 
     accel = calibration.accelerometer
     misses = Misses(norm, norm(own.accelerometer.S, own.accelerometer.b))
@@ -97,20 +97,16 @@ def suspicions_of(
     rates = segments.gyroscope_mean
 
     def tilt_deg(accel: Calibration, S: FloatArray) -> float:
-        return _rms(carried_by(accel, S, measured, segments).angle_deg[~measured.is_lost])
+        return rms_of(carried_by(accel, S, measured, segments).angle_deg[~measured.is_lost])
 
     of_gyro = gyroscope_suspicion(
         gyro.S,
         gyro.b,
         own_gyro.S,
         Misses(lambda S, _: tilt_deg(base, S), tilt_deg(own, own_gyro.S)),
-        Misses(lambda S, b: _rms(rates @ S.T + b), _rms(rates @ own_gyro.S.T + own_gyro.b)),
+        Misses(lambda S, b: rms_of(rates @ S.T + b), rms_of(rates @ own_gyro.S.T + own_gyro.b)),
     )
     return (*out, of_gyro) if of_gyro is not None else tuple(out)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 # Single mistakes that are tried: sign of a bias, direction (correct or distort), unit, axes, gravity.

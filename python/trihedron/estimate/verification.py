@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
@@ -122,7 +122,7 @@ def _worse_than_none(
         with_it = replace(calibration, gyroscope=gyroscope)
         pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments).angle_deg)
     return [
-        Finding.of(FindingCode.WORSE_THAN_UNCALIBRATED, f"verify-{case}", rms=_rms(with_it), rms_without=_rms(bare))
+        Finding.of(FindingCode.WORSE_THAN_UNCALIBRATED, f"verify-{case}", rms=rms_of(with_it), rms_without=rms_of(bare))
         for case, (with_it, bare) in pairs.items()
         if _is_larger(with_it, bare)
     ]
@@ -136,7 +136,7 @@ def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> Ite
     if gyroscope is None or len(rest) < 2:
         return
     sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2)))
-    shift = _rms(np.mean(rest, axis=0))
+    shift = rms_of(np.mean(rest, axis=0))
     if shift <= FAR_BEYOND * sigma:
         return
     times = shift / sigma if sigma > 0.0 else float("inf")
@@ -152,10 +152,6 @@ def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
         return False
     limit = float(probability.stdtrit(n - 1, 1.0 - FALSE_ALARM))
     return bool(more.mean() > limit * more.std(ddof=1) / np.sqrt(n))
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _variance(sigma: FloatArray | None, n: int) -> FloatArray:

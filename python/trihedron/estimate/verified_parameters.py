@@ -14,19 +14,23 @@ from trihedron.records import Calibration, Finding, FindingCode, Recording, Segm
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import in_frame
+from trihedron.session.noise import DRIFT_DOF, NOISE_DOF, bias_drift
 from trihedron.units import acceleration_to_si, rate_to_si
 
 FALSE_ALARM = 1e-3
 """Probability that any parameter of a valid calibration is reported as shifted."""
 TOO_VAGUE = 10.0
 """A parameter is not judged where the log's uncertainty of it exceeds this many times the stated one."""
+LISTED = 8
+"""Most parameters that a finding lists."""
 
 
 def judge_parameters(known: Calibration, own: Calibration | None, segments: Segments) -> tuple[JudgedParameter, ...]:
     """Differences (file less log) of parameters that do not depend on the frame, with both standard uncertainties.
 
     ``own`` is the calibration of the log itself, ``None`` where the log does not determine one: only the gyro bias is
-    then judged, always by the mean of the poses. A covariance from several sessions includes their repeatability.
+    then judged, always by the mean of the poses. The log's uncertainty of a bias includes twice its drift between
+    sessions (eq. 9.3), as in ``diagnose``: the file does not contain that of its own session.
     """
     numbers, sigma, anchor = _numbers(known)
     n = len(numbers)
@@ -38,6 +42,8 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
         other[:9], other_sigma[:9], _ = _numbers(alone, Anchor(anchor.signs, None))
     if n > 9 and known.gyroscope is not None and segments.gyroscope_mean is not None:
         other[9:12], other_sigma[9:12] = _resting(known.gyroscope, segments.gyroscope_mean)
+    drift = bias_drift(known if own is None else own, segments, n)
+    other_sigma = np.sqrt(other_sigma**2 + 2.0 * drift)
     out = []
     for k, parameter in enumerate(PARAMETERS[:n]):
         vague = not np.isfinite(other[k]) or not np.isfinite(other_sigma[k])
@@ -61,21 +67,19 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
     judged = [one for one in parameters if one.is_judged]
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
         return
-    limit = -float(probability.ndtri(0.5 * FALSE_ALARM / len(judged)))
-    shifted = sorted((one for one in judged if abs(one.times_sigma) > limit), key=lambda one: -abs(one.times_sigma))
+    chance = 1.0 - 0.5 * FALSE_ALARM / len(judged)
+    limits = [probability.stdtrit(DRIFT_DOF if one.id.endswith("bias") else NOISE_DOF, chance) for one in judged]
+    beyond = [one for one, limit in zip(judged, limits, strict=True) if abs(one.times_sigma) > limit]
+    shifted = sorted(beyond, key=lambda one: -abs(one.times_sigma))
     if not shifted:
         return
     yield Finding.of(
         FindingCode.CALIBRATION_SHIFT,
-        parameters=[_label(one) for one in shifted],
+        parameters=[(one.id + "-" + one.name, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
         n_parameters=len(shifted),
         n_judged=len(judged),
         times_sigma=abs(shifted[0].times_sigma),
     )
-
-
-def _label(one: JudgedParameter) -> str:
-    return f"{one.id}-{one.name}"
 
 
 def uncalibrated(known: Calibration, own: Calibration | None, recording: Recording) -> Calibration:

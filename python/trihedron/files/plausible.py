@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.errors import InputError
-from trihedron.records import Calibration, SensorCalibration
+from trihedron.records import Calibration
 
 LARGEST_CONDITION = 100.0
 """Largest condition number of S with unit columns: two axes 0.6 degrees apart. A larger one is a mistake."""
@@ -26,7 +26,7 @@ def require_plausible(calibration: Calibration) -> Calibration:
     Raises ``InputError`` when S is (nearly) singular, a scale is wrong by the factor of a unit, a number is larger
     than any sensor's, or a covariance is invalid (a negative variance, correlations beyond one).
     """
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))
         if not largest < LARGEST_NUMBER:
             raise InputError(f"the {name} contains {largest:.3g} among S and b: the file is damaged; calibrate again.")
@@ -51,14 +51,8 @@ def require_plausible(calibration: Calibration) -> Calibration:
 
 def has_one_handedness(calibration: Calibration) -> bool:
     """Whether both triads are right-handed or both left-handed; one part rarely mixes them."""
-    signs = {bool(np.linalg.det(sensor.S) > 0.0) for _, sensor in named_sensors(calibration)}
+    signs = {bool(np.linalg.det(sensor.S) > 0.0) for _, sensor in calibration.sensors}
     return len(signs) < 2
-
-
-def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
-    """Name and calibration of each sensor that is calibrated."""
-    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
-    return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
 def _require_covariance(name: str, covariance: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:

@@ -211,6 +211,12 @@ class Calibration(Presented):
         """True without a serious finding."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
+    @property
+    def sensors(self) -> list[tuple[str, SensorCalibration]]:
+        """Names and parameters of the sensors that were calibrated."""
+        pairs = (("accelerometer", self.accelerometer), ("gyroscope", self.gyroscope))
+        return [(name, sensor) for name, sensor in pairs if sensor is not None]
+
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
         trusted = "" if self.is_trustworthy else ", NOT TO BE TRUSTED"

@@ -11,6 +11,9 @@ from trihedron.records.calibration import Calibration, FitQuality
 AT_REST = "one bias for the session"
 AFTER_MOVES = "bias refitted per pose"
 """The bias used with the saved S for the tilt error after rotations, in words."""
+IN_SAMPLE, HELD_OUT, BY_FILTER = "in sample", "cross-validated", "by the filter"
+"""Labels of errors in every report: of the poses that were fitted, of each pose by a fit without it, and of poses by
+the last parameters of the filter that ran through them."""
 
 
 def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -17,8 +17,9 @@ class JudgedParameter:
     """One parameter of a calibration compared with the log's own estimate: ``difference`` is file minus log.
 
     ``id`` and ``name`` as in :data:`trihedron.records.sessions.PARAMETERS`; ``sigma_file`` is the stated standard
-    uncertainty (0 where none is stated), ``sigma_log`` that of the log. ``is_judged`` is false where the log does not
-    determine the parameter, or with a much larger uncertainty than the file states.
+    uncertainty (0 where none is stated), ``sigma_log`` that of the log, for a bias with the drift between sessions.
+    ``is_judged`` is false where the log does not determine the parameter, or with a much larger uncertainty than the
+    file states.
     """
 
     id: str
@@ -30,10 +31,14 @@ class JudgedParameter:
     is_judged: bool
 
     @property
+    def sigma(self) -> float:
+        """Standard uncertainty of the difference."""
+        return float(np.hypot(self.sigma_file, self.sigma_log))
+
+    @property
     def times_sigma(self) -> float:
         """The difference in its standard uncertainty."""
-        sigma = float(np.hypot(self.sigma_file, self.sigma_log))
-        return self.difference / sigma if sigma > 0.0 else float(np.copysign(np.inf, self.difference))
+        return self.difference / self.sigma if self.sigma > 0.0 else float(np.copysign(np.inf, self.difference))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,19 +11,13 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.records import Calibration, SensorCalibration
+from trihedron.records import SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 BIAS = "the reading without input (sign opposite to b)"
 """Definition of a bias in every report; b has the opposite sign, as it is added by the calibration."""
 TRIAD = "triad alignment is the rotation of the gyro's axes against the accelerometer's"
 """Definition of the parameter ``triad-alignment`` in every report."""
-
-
-def calibrated_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
-    """Names and parameters of the sensors that were calibrated."""
-    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
-    return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ from contextlib import suppress
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ
+from trihedron.arrays import AXES, TINY, XYZ
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
-from trihedron.records.published import AFTER_MOVES, AT_REST
-from trihedron.report.axes import Axes, axes_of, calibrated_sensors
+from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
+from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
 from trihedron.report.calibration_pictures import (
@@ -27,6 +27,7 @@ from trihedron.report.numbers import (
     engineering_exponent,
     how_many,
     in_mm_s2,
+    listed,
     one_of,
     plain_number,
     power_of_ten,
@@ -54,7 +55,7 @@ def calibration_report(
     figures = tuple(figure_blocks(calibration, segments, recording))
     if figures:
         sections.append(Section("Figures", figures))
-    axes = tuple(_axes_block(name, sensor) for name, sensor in calibrated_sensors(calibration))
+    axes = tuple(_axes_block(name, sensor) for name, sensor in calibration.sensors)
     sections += [Section("Axes", axes), Section("Uncertainty", tuple(_certainty(calibration)))]
     residuals = tuple(residual_tables(calibration, segments))
     if residuals:
@@ -73,26 +74,11 @@ def calibration_report(
 
 def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
-    held: list[Headline] = []
-    in_sample: list[Headline] = []
-    quality = calibration.accelerometer.quality
-    if quality is not None:
-        is_held = quality.held_out_rms is not None
-        rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
-        beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
-        what, value = "gravity error in static poses", plain_number(mm_s2_from_m_s2(rms))
-        (held if is_held else in_sample).append(Headline(what, value, "mm/s²", beside))
-    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
-    angles = [] if moved is None else angles_of(moved)
-    if moved is not None and angles:
-        is_held = len(angles) > 1
-        kind, floor = _kind(moved, is_held=is_held), plain_number(move_floor(moved))
-        beside = f"rms, {kind}, {AFTER_MOVES}; noise alone {floor}°"
-        value = plain_number(angles[-1][1])
-        (held if is_held else in_sample).append(Headline("tilt error after a rotation", value, "°", beside))
+    errors = _errors(calibration)
+    held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         with suppress(ValueError):
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
             is_open = is_assumed and name == "accelerometer"
@@ -101,14 +87,36 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     return [*held, *uncertain, *in_sample]
 
 
+def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
+    """Gravity and tilt error, how many times the noise alone they are, and whether they are cross-validated."""
+    out = []
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        is_held = quality.held_out_rms is not None
+        rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
+        beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
+        value = plain_number(mm_s2_from_m_s2(rms))
+        line = Headline("gravity error in static poses", value, "mm/s²", beside)
+        out.append((line, rms / max(quality.floor, TINY), is_held))
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    angles = [] if moved is None else angles_of(moved)
+    if moved is not None and angles:
+        is_held, floor, rms = len(angles) > 1, move_floor(moved), angles[-1][1]
+        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}; noise alone {plain_number(floor)}°"
+        line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
+        out.append((line, rms / max(floor, TINY), is_held))
+    return out
+
+
 def _kind(quality: FitQuality, *, is_held: bool) -> str:
-    return "cross-validated" if is_held else f"in sample only ({how_many(quality.dof, 'degree')} of freedom)"
+    return HELD_OUT if is_held else f"{IN_SAMPLE} only ({how_many(quality.dof, 'degree')} of freedom)"
 
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    times = [f.numbers["times_noise"] for f in calibration.findings if "times_noise" in f.numbers]
-    above = f": gravity error in static poses {plain_number(times[0], 2)} times the noise" if times else ""
+    errors = [(line.what, times) for line, times, is_held in _errors(calibration) if is_held]
+    times = [f"{what} {plain_number(times, 2)} times the noise" for what, times in errors if times < 1.0 / TINY]
+    above = f": {listed(times)} ({HELD_OUT})" if times else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
     return " ".join([said, *effects])
@@ -123,7 +131,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         rows = fit_in_words(name, sensor)
         if name == "accelerometer" and segments is not None:
             rows += _before_in_words(calibration, segments)
@@ -210,7 +218,7 @@ def next_pose(calibration: Calibration) -> str:
 
 def _certainty(calibration: Calibration) -> list[Block]:
     blocks: list[Block] = []
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         seen = sensor.observability
         if seen is None:
             continue

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, BoolArray, FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
-from trihedron.report.axes import calibrated_sensors
+from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
 from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
@@ -20,7 +20,6 @@ STRONG = 0.5
 """Correlation above which a pair of parameters is listed."""
 LIMIT_SIGMAS = 3.0
 """Limit of a residual in standard errors; chance exceeds it once in 370."""
-IN_SAMPLE, HELD = "in sample", "cross-validated (predicted by a fit without it)"
 MARK = 0.12
 """Diameter of a pose\'s mark; the horizon has radius 1."""
 MOST_NUMBERED = 60
@@ -44,7 +43,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, line
             said(f"cross-validated, {name}", v, "mm/s²", None if held_sigma is None else s)
             for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
         ]
-        marks.append(Points(pose + 0.17, held, tips, held_sigma, HELD, "accent", True))
+        marks.append(Points(pose + 0.17, held, tips, held_sigma, HELD_OUT, "accent", True))
         top = _highest(held, held_sigma, residual, limit)
     tips = [said(name, v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, tips, None, IN_SAMPLE, "c1"))
@@ -89,14 +88,12 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     held = quality.held_out_angle_deg
     width, shift = (0.7, 0.0) if held is None else (0.38, 0.2)
     inside = np.where(is_out, np.nan, quality.angle_deg)
-    marks.append(Bars(move - shift, inside, width, tips, "in sample", "c1"))
+    marks.append(Bars(move - shift, inside, width, tips, IN_SAMPLE, "c1"))
     if np.any(is_out):
         marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, tips, "excluded", "soft"))
     if held is not None:
         held_labels = [said(f"cross-validated, {w}", v, "°") for w, v in zip(names, held, strict=True)]
-        marks.append(
-            Bars(move + shift, np.where(is_out, np.nan, held), width, held_labels, "cross-validated", "accent")
-        )
+        marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, held_labels, HELD_OUT, "accent"))
     noise_labels = [said(f"noise alone, {w}", v, "° rms") for w, v in zip(names, noise, strict=True)]
     marks.append(Points(move, noise, noise_labels, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
@@ -167,7 +164,7 @@ def strong_correlations(calibration: Calibration) -> list[tuple[str, str, float]
 def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
     prefixes = {"accelerometer": "accel", "gyroscope": "gyro"}
-    names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibrated_sensors(calibration) for name in PARAMETER_NAMES]
+    names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibration.sensors for name in PARAMETER_NAMES]
     sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])

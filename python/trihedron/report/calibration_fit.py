@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
-from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
+from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE, counted_moves
 from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
 from trihedron.report.document import Block, Table
@@ -50,11 +50,11 @@ def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
 
 def _norm_words(quality: FitQuality) -> str:
     n = how_many(len(quality.residual), "pose")
-    parts = [f"{in_mm_s2(quality.rms)} rms in sample ({n})"]
+    parts = [f"{in_mm_s2(quality.rms)} rms {IN_SAMPLE} ({n})"]
     if quality.dof <= 0:
         parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
-        parts.insert(0, f"{in_mm_s2(quality.held_out_rms)} rms cross-validated (held out)")
+        parts.insert(0, f"{in_mm_s2(quality.held_out_rms)} rms {HELD_OUT}")
     parts.append(f"noise alone {in_mm_s2(quality.floor)}")
     return "; ".join(parts)
 
@@ -65,9 +65,9 @@ def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
         return []
     counted = counted_moves(quality)
     held = quality.held_out_angle_deg
-    pairs = [("in sample", quality.angle_deg)]
+    pairs = [(IN_SAMPLE, quality.angle_deg)]
     if held is not None and np.any(np.isfinite(held[counted])):
-        pairs.append(("cross-validated (held out)", held))
+        pairs.append((HELD_OUT, held))
     out = []
     for label, angles in pairs:
         known = angles[counted & np.isfinite(angles)]
@@ -150,7 +150,7 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
         row += [state_of(segments.poses[k])] if is_disturbed and segments is not None else []
         rows.append(tuple(row))
     known = ("mid [s]", "length [s]", "up (body frame)") if is_known else ()
-    head = ("pose", *known, "residual [mm/s²]", "cross-validated [mm/s²]", *(("not static",) if is_disturbed else ()))
+    head = ("pose", *known, "in sample [mm/s²]", "cross-validated [mm/s²]", *(("not static",) if is_disturbed else ()))
     return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
 
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.calibration_charts import (
-    HELD,
-    IN_SAMPLE,
     LIMIT_SIGMAS,
     correlations,
     mm_s2,
@@ -22,7 +21,7 @@ from trihedron.report.calibration_fit import direction
 from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
-from trihedron.report.numbers import plain_number
+from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
@@ -34,15 +33,20 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
-    caption = "Norm of gravity minus its true value in every pose, against 3 σ of noise alone"
+    caption = "Norm of gravity minus its true value in every pose"
     if _is_held(quality):
-        caption += "; circles: cross-validated, predicted by a fit without that pose, ± 1 σ"
-    caption += "."
+        caption += f"; circles: {HELD_OUT}, by a fit without that pose, ± 1 σ. Outside the shade with a long bar: the "
+        caption += "other poses hardly determine it; with a short one: more than noise."
+    else:
+        caption += f". {IN_SAMPLE.capitalize()} only, {how_many(quality.dof, 'degree')} of freedom: such errors are "
+        caption += "small for wrong S and b too, and prove nothing."
+    lines = pose_lines(segments)
+    caption += " Dashed upright: disturbed or moved, counts less." if lines else ""
     means = None if segments is None else segments.accelerometer_mean
     chart = partial(residual_chart, quality)
     if means is not None and len(means) == len(quality.residual):
-        chart = partial(_lead_chart, calibration, means, pose_lines(segments))
-        caption += f" Beside it the error's size before calibration ({before_words(calibration)}) and after."
+        chart = partial(_lead_chart, calibration, means, lines)
+        caption += f" Second panel: its size before calibration ({before_words(calibration)}) and after."
     return Picture("residuals", caption, chart)
 
 
@@ -56,9 +60,15 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
     marks: list[Mark] = [*lines]
     marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
+    worst = [f.numbers["worst_prediction_g"] for f in calibration.findings if "worst_prediction_g" in f.numbers]
+    far = mm_s2(calibration.gravity_m_s2 * np.array(worst[:1]))
+    marks += [Level(y=float(y), name="1 σ in the least certain orientation", colour="accent") for y in far]
     # Colours as in the residuals: one for in-sample, one for cross-validated.
     held = _is_held(quality)
-    kinds = ((before, "before calibration", "soft"), (after, HELD if held else IN_SAMPLE, "accent" if held else "c1"))
+    kinds = (
+        (before, "before calibration", "soft"),
+        (after, HELD_OUT if held else IN_SAMPLE, "accent" if held else "c1"),
+    )
     for values, name, colour in kinds:
         tips = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
         size = np.where(values == 0.0, np.nan, np.abs(values))
@@ -66,7 +76,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
-    sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms{'' if held else ' in sample'}")
+    sizes = Panel(x, y, tuple(marks), title=f"{rms[0]} → {rms[1]} mm/s² rms, {HELD_OUT if held else IN_SAMPLE}")
     return Chart((*residual_chart(quality, lines=lines).panels, sizes), columns=2)
 
 
@@ -112,30 +122,31 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
             blocks.append(Picture("time", caption, lambda: chart))
     if means is not None:
         if quality is not None and len(means) == len(quality.residual):
-            caption = (
-                "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
-                "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
-                "Drag to turn."
-            )
-            blocks.append(Picture("orientation", caption, partial(orientation_chart, calibration.accelerometer, means)))
+            blocks.append(orientation_picture(calibration.accelerometer, means, _unseen(quality)))
         caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
         caption += "not recorded; a number is a pose (the first of coinciding ones); triangles are the most useful "
         caption += "next poses, in that order."
         blocks.append(Picture("poses", caption, partial(sphere_chart, calibration.accelerometer, means)))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
-        caption = "Tilt error after every rotation, in sample and cross-validated (held out)."
+        caption = f"Tilt error after every rotation, {IN_SAMPLE} and {HELD_OUT}."
         blocks.append(Picture("moves", caption, partial(move_chart, gyroscope.quality, segments)))
     if segments is not None and recording is not None:
         blocks.append(signals_picture(recording, segments))
     return blocks
 
 
-def orientation_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
-    """Residual of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
-    assert sensor.quality is not None
-    force = means @ sensor.S.T + sensor.b
-    values = mm_s2(_unseen(sensor.quality))
+def orientation_picture(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Picture:
+    """Gravity errors (n,) at their directions of "up", by raw mean readings (n, 3)."""
+    caption = "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
+    caption += "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
+    caption += "Drag to turn."
+    return Picture("orientation", caption, partial(orientation_chart, sensor, means, error))
+
+
+def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Chart:
+    """Gravity error (n,) of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
+    force, values = means @ sensor.S.T + sensor.b, mm_s2(error)
     limit = float(np.nanmax(np.abs(values), initial=0.0))
     tips = [
         f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments
-from trihedron.report.axes import axes_of, calibrated_sensors
+from trihedron.report.axes import axes_of
 from trihedron.report.calibration import next_pose
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
@@ -59,7 +59,7 @@ def _headlines(segments: Segments, calibration: Calibration | None) -> list[Head
 def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]:
     """Standard uncertainty of scale, bias and angles, on the worst axis of each sensor."""
     cells = {"accelerometer": (NONE, NONE, NONE), "gyroscope": (NONE, NONE, NONE)}
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         try:
             axes = axes_of(sensor)
         except ValueError:

@@ -25,6 +25,7 @@ from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_pi
 from trihedron.report.diagnosis_words import (
     NOT_JUDGED,
     differing_headline,
+    follows,
     headlines_of,
     is_explained,
     judged_in_words,
@@ -158,7 +159,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     ]  # fmt: skip
     if diagnosis.effects:
         head = (*head[:2], "with the effects", *head[2:], "rms with them", "χ²/dof with them")
-        with_them = [_after(d, after.get(d.domain)) for d in diagnosis.domains]
+        with_them = [_after(diagnosis, d, after.get(d.domain)) for d in diagnosis.domains]
         rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
     caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
@@ -178,11 +179,12 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _after(before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
+def _after(diagnosis: Diagnosis, before: DomainTest, test: DomainTest | None) -> tuple[str, str, str]:
     """Judgement, rms and χ²/dof of a domain with the effects."""
     if test is None:
         return "–", "–", "–"
     judged = "explained" if is_explained(before, test) else "disagrees" if test.disagrees else "agrees"
+    judged = follows(diagnosis, test) or judged
     return judged, rms_in_words(test), plain_number(test.chi2_per_dof)
 
 
@@ -254,7 +256,7 @@ def _remaining(diagnosis: Diagnosis) -> str:
         beside = "beside the relation below" if diagnosis.relations else "in this recording"
         return f"Nothing detectable {beside}."
     said = [
-        f"{MEANING[d.domain]}: χ²/dof {plain_number(d.chi2_per_dof)}"
+        f"{MEANING[d.domain]}{(which := follows(diagnosis, d)) and ' ' + which}: χ²/dof {plain_number(d.chi2_per_dof)}"
         + (f", {place}" if (place := where_in_words(d)) else "")
         for d in left
     ]

@@ -63,7 +63,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(map(_row, differing))
     sentences = [*_remarks(differing), *differing_noise(diagnosis)]
     if not rows and not sentences:
-        return (Paragraph("None of the given parameters differs."),)
+        return (Paragraph("None of the given parameters differs beyond both uncertainties and bias drift."),)
     blocks: list[Block] = []
     if rows:
         blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; {_DEFINED}"))

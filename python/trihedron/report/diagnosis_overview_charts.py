@@ -55,6 +55,8 @@ def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
         caption += "; inside the shade the domain agrees (a healthy recording leaves one of them in "
         caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
         caption += "pose, line or time"
+    if any(d.domain == "parameters" for d in diagnosis.domains):
+        caption += "; parameters allow for both uncertainties and the bias drift between sessions"
     return Picture("strengths", f"{caption}.", partial(_strengths_chart, diagnosis))
 
 

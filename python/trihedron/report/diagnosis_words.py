@@ -9,10 +9,9 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
-from trihedron.report.document import Headline, Level
+from trihedron.report.document import Headline, Level, action_in_words
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print
 from trihedron.report.numbers import (
-    capital,
     engineering_exponent,
     listed,
     plain_number,
@@ -47,7 +46,8 @@ OF_SAMPLES = ("within-static", "timing", "rate")
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and its reasons in one sentence."""
     off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
-    left: list[str] = [MEANING[d.domain] for d in diagnosis.remaining if d.disagrees]
+    ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
+    left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
     missing = _named(diagnosis, "recording")
     if diagnosis.verdict == "consistent":
@@ -57,7 +57,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
-        return _unexplained(diagnosis, (left or off) if missing else off, missing)
+        return _unexplained(diagnosis, (list(ends) or off) if missing else off, missing)
     if diagnosis.verdict == "not-testable":
         tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
@@ -68,7 +68,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
     surplus = _named(diagnosis, "model")
-    tail = f"; {listed(left)} still {_disagree(left)}." if left else "; nothing else disagrees."
+    still = [f"{listed(left)} still {_disagree(left)}"] if left else []
+    still += [f"{name} still {followed} (empirical relation)" for name, followed in ends.items() if followed]
+    tail = "".join(f"; {one}" for one in still) or "; nothing else disagrees"
     said = []
     if missing:
         said.append(f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing from the model")
@@ -76,7 +78,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
         said.append(f"parameters differ ({listed(numbers)})")
-    return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
+    return f"MISSING PHYSICS: {'; '.join(said)}{tail}."
 
 
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
@@ -106,12 +108,13 @@ def _disagree(subjects: list[str]) -> str:
 
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
+    use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
+    serious = own_serious(diagnosis)
+    if serious is not None and diagnosis.verdict != "not-testable":
+        return _dependent(diagnosis) or action_in_words(serious)
     if diagnosis.verdict == "consistent":
-        use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
-        if diagnosis.parameters:
-            use = f"Keep using {model or 'the model'}: it agrees with this log."
-        serious = own_serious(diagnosis)
-        return _dependent(diagnosis) or (use if serious is None else capital(serious.action))
+        keep = f"Keep using {model or 'the model'}: it agrees with this log."
+        return _dependent(diagnosis) or (keep if diagnosis.parameters else use)
     if diagnosis.verdict == "not-testable":
         record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
         return f"{record}; the noise of this log: `trihedron allan LOG`."
@@ -134,6 +137,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         steps.append(f"{begun} {first} from {others}: {rivals.separating_experiment}.")
     if steps:
         return " ".join(steps)
+    if not any(effect.model.get("applies_to_other_recordings") for effect in diagnosis.effects):
+        return f"No effect is stored: each belongs to this session. {use}"
     return "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
 
 
@@ -192,6 +197,15 @@ def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
     """Whether a domain agrees; in a log of too few poses χ² of poses is searched for effects, not judged."""
     is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
     return "disagrees" if test.disagrees else NOT_JUDGED if is_open else "agrees"
+
+
+def follows(diagnosis: Diagnosis, after: DomainTest) -> str:
+    """What a domain follows by an empirical relation where χ² itself agrees with noise; else empty."""
+    if not after.disagrees or after.limit is not None or after.domain in OF_SAMPLES:
+        return ""
+    alike = [one for one in diagnosis.relations if one.held_out and one.held_out.domain == after.domain]
+    names = dict.fromkeys(name for one in alike for name in one.depends_on)
+    return f"follows {listed(list(names))}" if names else ""
 
 
 def is_explained(before: DomainTest, after: DomainTest) -> bool:

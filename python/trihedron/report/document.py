@@ -37,6 +37,14 @@ CONSEQUENCE = (
     FindingCode.GYRO_G_SENSITIVITY,
 )
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
+IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
+"""Findings about motion that the log lacks: a result of this log remains without it."""
+
+
+def action_in_words(finding: Finding) -> str:
+    """The action of a finding; where it adds motion, with the same command on a new log."""
+    new = " Record a new log with them, then: `... NEW_LOG`." if finding.code in IN_A_NEW_LOG else ""
+    return finding.action[:1].upper() + finding.action[1:] + new
 
 
 @dataclass(frozen=True)
@@ -155,12 +163,13 @@ class Document:
 
     @property
     def what_next(self) -> str:
-        """The action of a serious finding; that of a warning about the whole result before ``next_step``."""
+        """The action of a serious finding, or one in a new log; that of a warning about the whole result before
+        ``next_step``."""
         first, then = self.foremost, self.next_step
-        if first is None or not first.action or first.action[1:] == then[1:]:
+        if first is None or not first.action or then[1:].startswith(first.action[1:]):
             return then
-        action = first.action[:1].upper() + first.action[1:]
-        if first.severity is Severity.SERIOUS:
+        action = action_in_words(first)
+        if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:
             return action
         if first.code not in CONSEQUENCE:
             return then

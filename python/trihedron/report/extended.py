@@ -11,13 +11,15 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
+from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report
+from trihedron.report.calibration_pictures import orientation_picture
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
 from trihedron.report.document import Document, Headline, Picture, Section
 from trihedron.report.names import MEANING, ids_in_print
-from trihedron.report.numbers import listed, plain_number, shown
+from trihedron.report.numbers import listed, plain_number, shown, with_unit
 from trihedron.report.reference import beside_reference
 
 FIRST = "static-accel"
@@ -30,12 +32,13 @@ def calibration_result_report(result: CalibrationResult) -> Document:
     """The report of a calibration, with the sections on its reference and on its effects where it has them."""
     document = calibration_report(result.calibration, result.segments, result.recording)
     document = beside_reference(document, result.reference, 1)
-    return document if result.diagnosis is None else _with_effects(document, result.diagnosis)
+    return document if result.diagnosis is None else _with_effects(document, result, result.diagnosis)
 
 
-def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
+def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diagnosis) -> Document:
     """The report with the residuals without and with the effects as its lead, and every effect after the result."""
-    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *effect_pictures(diagnosis)))
+    pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
+    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
     return replace(
         document,
         sections=(document.sections[0], effects, *document.sections[1:]),
@@ -44,14 +47,26 @@ def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
     )
 
 
+def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
+    """Gravity error with the effects by orientation."""
+    means = result.segments.accelerometer_mean
+    for one in diagnosis.residuals:
+        if one.domain == FIRST and means is not None:
+            # A disturbed pose has several rows, each with its name.
+            of = [int(name.split()[1]) - 1 for name in one.names_after]
+            return [orientation_picture(result.accelerometer, means[of], one.after[:, 0])]
+    return []
+
+
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """Cross-validated errors with the effects."""
-    last = next((stage for stage in diagnosis.stages if stage.stage == "effects"), None)
+    """Cross-validated errors with the effects, beside those without."""
+    stages = {stage.stage: {one.domain: one for one in stage.domains} for stage in diagnosis.stages}
     found = []
-    for one in () if last is None else last.domains:
+    for one in stages.get("effects", {}).values():
         if one.domain in PREDICTED:
             factor, unit = shown(one.unit)
-            beside = "rms, cross-validated, with the effects"
+            without = stages["parameters"][one.domain].rms
+            beside = f"rms, {HELD_OUT}, with the effects; {with_unit(plain_number(factor * without), unit)} without"
             found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 
@@ -75,7 +90,7 @@ def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> C
         drawn = residuals_chart(diagnosis, one).panels
         for panel, values in zip(drawn, (one.before, one.after), strict=True):
             assert isinstance(panel, Panel)
-            title = f"{panel.title}, in sample: {plain_number(factor * _rms(values))} {unit} rms"
+            title = f"{panel.title}, {IN_SAMPLE}: {plain_number(factor * _rms(values))} {unit} rms"
             panels.append(replace(panel, title=title))
     return Chart(tuple(panels), columns=2, is_linked=True)
 

@@ -114,7 +114,9 @@ def values_table(found: FilterNoise) -> Table:
             for axis, n in zip(XYZ, one.axes_N, strict=False)
         ]
     head = ("", "for the filter", "95 % interval", "static", "factor")
-    return Table(head, tuple(rows), "White density N, random walk K")
+    caption = "White density N, random walk K; the files of --to hold the column 'for the filter'"
+    by_axis = ", N by axis where their format has one" if any(one.axes_N for one in found.sensors) else ""
+    return Table(head, tuple(rows), caption + by_axis)
 
 
 def _number(one: Bounded) -> str:
@@ -174,16 +176,15 @@ def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
 def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
     horizons = sorted({share.horizon_s for share in one.shares})
     by = {(share.cause, share.horizon_s): share.share for share in one.shares}
-    rows = tuple(
-        (words, *(_percent(by[cause, h]) for h in horizons))  # type: ignore[index]
-        for cause, (words, _) in CAUSE_WORDS.items()
-        if (cause, horizons[0]) in by
-    )
+    ranked = _ranked(one)
+    rows = tuple((CAUSE_WORDS[s.cause][0], *(_percent(by[s.cause, h]) for h in horizons)) for s in ranked)
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
     # Measures that reduce the three largest shares.
-    named = (CAUSE_WORDS[share.cause] for share in _ranked(one)[:3])
+    named = (CAUSE_WORDS[share.cause] for share in ranked[:3])
     advice = Facts(tuple((f"less {cause}", action) for cause, action in named))
-    return Table(head, rows, "Shares of the mean square error, 95 % intervals"), advice
+    caption = f"Shares of the mean square error with 95 % intervals, the largest over {ranked[0].horizon_s:g} s first; "
+    caption += "each is estimated by itself: they need not add up to 100 %"
+    return Table(head, rows, caption), advice
 
 
 def _percent(one: Bounded) -> str:
@@ -192,9 +193,11 @@ def _percent(one: Bounded) -> str:
 
 
 def _ranked(one: SensorFilterNoise) -> list[Share]:
-    """Shares at ten seconds (or the nearest horizon), the largest first."""
+    """Shares at ten seconds (or the nearest horizon), the largest first, upper limits last."""
     near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
-    return sorted((s for s in one.shares if s.horizon_s == near), key=lambda s: -s.share.value)
+    return sorted(
+        (s for s in one.shares if s.horizon_s == near), key=lambda s: (s.share.is_limit, -s.share.filter_value)
+    )
 
 
 def _tested(one: SensorFilterNoise) -> Block:
@@ -209,13 +212,8 @@ def _tested(one: SensorFilterNoise) -> Block:
         for c in one.consistency
     )  # fmt: skip
     head = (
-        "horizon [s]",
-        "stretches",
-        "NEES",
-        f"predicted [{unit}]",
-        f"actual [{unit}]",
-        "NEES, static",
-        f"static [{unit}]",
+        *("horizon [s]", "stretches", "NEES", f"predicted [{unit}]", f"actual [{unit}]"),
+        *("NEES, static", f"static [{unit}]"),
     )
     caption = f"{capital(what)}. NEES, its square over the predicted variance, is 3 where N and K are right"
     has_static = any(c.static_nees is not None for c in one.consistency)

@@ -24,7 +24,6 @@ from trihedron.records import (
 )
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.sessions import SessionsModel, Spread
-from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import logged_sensors
 from trihedron.report.noise_units import PER_UNIT
 
@@ -82,7 +81,7 @@ def segments_columns(segments: Segments) -> Columns:
 def calibration_columns(calibration: Calibration) -> Columns:
     """A row per parameter of each sensor: value, standard error, unit."""
     rows = []
-    for name, sensor in calibrated_sensors(calibration):
+    for name, sensor in calibration.sensors:
         values = (*sensor.S.ravel(), *sensor.b)
         sigmas = (*sensor.sigma_S.ravel(), *sensor.sigma_b)
         for parameter, value, sigma in zip(PARAMETER_NAMES, values, sigmas, strict=True):

@@ -17,6 +17,7 @@ from trihedron.records import (
     KalmanCalibration,
     NormKalmanCalibration,
 )
+from trihedron.records.published import BY_FILTER
 from trihedron.report.calibration import FRAMES, parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -27,7 +28,7 @@ from trihedron.report.kalman_charts import (
     norm_convergence_chart,
     residual_chart,
 )
-from trihedron.report.numbers import each_with_sigma, how_many, plain_number, unit_in_print
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
 CLOSE = 0.01
@@ -79,7 +80,7 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
     return [
         Headline(f"innovation² / predicted variance (NIS){of}", plain_number(worst.nis_mean), "", beside),
-        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, in sample"),
+        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, {BY_FILTER}"),
     ]
 
 
@@ -163,7 +164,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
 
 def _residual_words(residual: FloatArray) -> str:
     rms, worst = float(np.sqrt(np.mean(residual**2))), float(np.max(np.abs(residual)))
-    return f"{plain_number(mm_s2_from_m_s2(rms))} mm/s² rms, {plain_number(mm_s2_from_m_s2(worst))} mm/s² at worst"
+    return f"{in_mm_s2(rms)} rms, {in_mm_s2(worst)} at worst, {BY_FILTER}"
 
 
 def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:

@@ -9,7 +9,6 @@ from trihedron.files.calibration import calibration_document, plain
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
 from trihedron.records.sessions import Session, SessionsModel
-from trihedron.report.axes import calibrated_sensors
 from trihedron.report.channels import channels_record
 from trihedron.sanitise import escaped_json
 
@@ -112,7 +111,7 @@ def check_record(
     """The audit, and the uncertainties to expect."""
     expected = {
         name: {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
-        for name, sensor in (() if calibration is None else calibrated_sensors(calibration))
+        for name, sensor in (() if calibration is None else calibration.sensors)
     }
     return {
         **segments_record(segments, recording),

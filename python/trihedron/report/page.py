@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
+from trihedron.report.findings import beyond_headline
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import how_many
 from trihedron.sanitise import escaped, one_line
@@ -78,11 +79,8 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
     others = [(f.severity.value, opening(_ASIDE.sub("", f.seen))) for f in graver[:MOST_OTHERS]]
     others += [("", f"{len(graver) - MOST_OTHERS} more")] if len(graver) > MOST_OTHERS else []
     listing = (any(isinstance(block, FindingList) for block in section.blocks) for section in document.sections)
-    clause = opening(first.seen)
-    rest = first.seen[len(clause) :].lstrip(" .;")
-    seen = rest[:1].upper() + rest[1:] if clause.lower() in document.verdict.lower() else first.seen
-    is_said = document.what_next[1:].startswith(first.action[1:])
-    foremost = seen if is_said else f"{seen} → {first.action}"
+    new = beyond_headline(first, document, "")
+    foremost = f"{new.seen} → {new.action}" if new.action else new.seen
     return unbroken(foremost), others, f"s{list(listing).index(True) + 1}"
 
 

@@ -41,7 +41,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
         lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
         if recording is None
         else signals_picture(recording, segments),
-        next_step="Are poses missing, or moves among them? If not: `trihedron calibrate LOG -o calibration.json`.",
+        next_step="Is every pose found? Then: `trihedron calibrate LOG --latitude DEG -o calibration.json`.",
     )
 
 

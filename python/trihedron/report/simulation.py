@@ -40,7 +40,8 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
-        next_step="Calibrate the log (`trihedron calibrate FILE`) and compare with the truth (--truth FILE keeps it).",
+        next_step=f"Calibrate the log: `trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g} -o "
+        "calibration.json`; compare with the truth (--truth FILE keeps it).",
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import BoolArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
-from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Panel, Points, Scale
+from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import label_of
-from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -27,6 +26,7 @@ _ABOVE_NOISE = {
 USES = "`trihedron apply FILE LOG -o corrected.csv`, `trihedron export FILE --to c -o calibration.h`"
 """What a calibration is for, in the next steps of reports."""
 ALLOWED = "3 σ of noise and calibration uncertainty"
+WITH_DRIFT = "X, Y, Z, ± 1 σ with the drift between sessions"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
@@ -79,77 +79,76 @@ def use_in_words(v: Verification, what: str) -> str:
     return above[0].action if above else use
 
 
-def _expected(size: str, chi2_per_dof: float) -> str:
-    """The expected size by noise and the calibration's uncertainty, and χ²/dof, which decides."""
-    return f"expected {size}, χ²/dof {plain_number(chi2_per_dof, 2)}"
+def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
+    """Gravity error in static poses and tilt error after rotations: name, rms, its unit, over how many, the expected
+    rms with χ²/dof, the worst."""
+    k, of = int(np.argmax(np.abs(v.norm_error))), how_many(len(v.norm_error), "pose")
+    expected, worst = float(np.sqrt(np.mean(v.norm_sigma**2))), f"{in_mm_s2(float(v.norm_error[k]))} in pose {k + 1}"
+    allowed = f"{in_mm_s2(expected)}, χ²/dof {plain_number(v.norm_chi2_per_dof, 2)}"
+    rms = plain_number(mm_s2_from_m_s2(v.norm_rms))
+    out = [("gravity error in static poses", rms, "mm/s²", of, allowed, worst)]
+    if len(v.angle_deg):
+        k, of = int(np.argmax(v.angle_deg)), how_many(len(v.angle_deg), "move")
+        without = ", ".join(str(one + 1) for one in v.moves_left_out)
+        worst = f"{plain_number(float(v.angle_deg[k]))}° in move {v.moves[k] + 1}"
+        worst += f"; without move {without}, where the gyro was at its limit" if without else ""
+        allowed = f"{plain_number(v.angle_expected_deg)}°, χ²/dof {plain_number(v.angle_chi2_per_dof, 2)}"
+        out.append(("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", of, allowed, worst))
+    return out
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
     """Gravity and tilt error with their expected size, the one that fails first: by its limit, else the farther above
-    noise and uncertainty."""
-    expected = _expected(in_mm_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))), v.norm_chi2_per_dof)
-    norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
-    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; {expected}"
-    out = [Headline("gravity error in static poses", norm, "mm/s²", beside)]
-    if len(v.angle_deg):
-        expected = _expected(f"{plain_number(v.angle_expected_deg)}°", v.angle_chi2_per_dof)
-        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; {expected}"
-        out.append(Headline("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", beside))
+    noise and uncertainty; then the change of the gyro's bias."""
+    errors = _errors(v)
+    out = [
+        Headline(what, rms, unit, f"rms over {of}; expected {allowed}") for what, rms, unit, of, allowed, _ in errors
+    ]
     limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
     is_farther = v.angle_chi2_per_dof > v.norm_chi2_per_dof
     is_tilt = "limit_deg" in limits[0] if limits else bool(above_noise(v)) and is_farther
-    return tuple(out[:: -1 if is_tilt else 1])
+    moved = [
+        Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)
+        for changes in _bias_changes(v)
+    ]
+    return (*out[:: -1 if is_tilt else 1], *moved)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
     """Gravity and tilt errors with their expected size, and the change of the gyro's bias."""
-    worst = int(np.argmax(np.abs(v.norm_error)))
-    expected = float(np.sqrt(np.mean(v.norm_sigma**2)))
-    allowed = "rms from noise and calibration uncertainty, χ²/dof"
-    facts = [
-        ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
-        (
-            "gravity error in static poses",
-            f"{in_mm_s2(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
-            f"{in_mm_s2(float(v.norm_error[worst]))} in pose {worst + 1}",
-        ),
-        ("  expected", f"{in_mm_s2(expected)} {allowed} {plain_number(v.norm_chi2_per_dof, 2)}"),
-    ]
-    if len(v.angle_deg):
-        worst = int(np.argmax(v.angle_deg))
-        without = ", ".join(str(k + 1) for k in v.moves_left_out)
-        without = f"; without move {without}, where the gyro was at its limit" if without else ""
-        facts += [
-            (
-                "tilt error after a rotation",
-                f"{plain_number(v.angle_rms_deg)}° rms over {how_many(len(v.angle_deg), 'move')}, worst "
-                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst] + 1}{without}",
-            ),
-            ("  expected", f"{plain_number(v.angle_expected_deg)}° {allowed} {plain_number(v.angle_chi2_per_dof, 2)}"),
-        ]
-    biases = [one for one in v.parameters if one.id == "gyro-bias"]
-    if biases:
-        sigmas = [math.hypot(one.sigma_file, one.sigma_log) for one in biases]
-        changed = each_with_sigma([-one.difference for one in biases], sigmas, degrees_from_radians(1.0))
-        changes = ", ".join(changed)
-        facts.append(("gyro bias", f"changed by {changes} °/s (X, Y, Z) since the calibration"))
+    facts = [("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}")]
+    for what, rms, unit, of, allowed, worst in _errors(v):
+        facts.append((what, f"{with_unit(rms, unit)} rms over {of}, worst {worst}"))
+        facts.append(("  expected", f"{allowed}, from noise and calibration uncertainty"))
+    facts += [("gyro bias", f"changed by {changes} °/s, {WITH_DRIFT}") for changes in _bias_changes(v)]
     return tuple(facts)
 
 
+def _bias_changes(v: Verification) -> list[str]:
+    """Log minus file of the gyro's bias along X, Y, Z; empty without a gyro."""
+    biases = [one for one in v.parameters if one.id == "gyro-bias"]
+    differences, sigmas = [-one.difference for one in biases], [one.sigma for one in biases]
+    changed = each_with_sigma(differences, sigmas, degrees_from_radians(1.0))
+    return [", ".join(changed)] if changed else []
+
+
 def parameters_table(v: Verification) -> Table:
-    """Every parameter: file minus log, both uncertainties, and whether the log determines it."""
+    """Every parameter: log minus file, both uncertainties, and whether the log determines it."""
     rows = []
     for one in v.parameters:
         scale, unit = shown(one.unit)
         sigma = plain_number(scale * one.sigma_log, 2) if np.isfinite(one.sigma_log) else "unknown"
         stated = plain_number(scale * one.sigma_file, 2) if one.sigma_file > 0.0 else "not stated"
-        differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
-        times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
+        differs = plain_number(-scale * one.difference, 3) if np.isfinite(one.difference) else ""
+        times = plain_number(-one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
         judged = times if one.is_judged else "not judged by this log"
         rows.append((label_of(one.id, one.name), unit, differs, sigma, stated, judged))
-    head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
+    head = ("parameter", "unit", "log − file", "σ of the log", "σ of the file", "in σ")
     return Table(
-        head, tuple(rows), f"Parameters that do not depend on the frame, against this log's own calibration; {TRIAD}"
+        head,
+        tuple(rows),
+        "Parameters that do not depend on the frame, against this log's own calibration; "
+        f"σ of a bias includes its drift between sessions; {TRIAD}",
     )
 
 
@@ -179,45 +178,31 @@ def _tables(v: Verification, segments: Segments | None) -> list[Block]:
 def verification_chart(verification: Verification) -> Chart:
     """Gravity error of every pose and tilt error after every move, with their expected size."""
     v = verification
-    pose = np.arange(1, len(v.norm_error) + 1, dtype=np.float64)
-    error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
-    edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
-    limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
-    tips = [
-        said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
-        for k, (e, s) in enumerate(zip(error, sigma, strict=True), start=1)
-    ]
-    norm = Panel(
-        Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True),
-        Scale("|f| − |g|  [mm/s²]", "mm/s²"),
-        (
-            Band(edge, -limit, limit, ALLOWED),
-            Level(y=0.0),
-            *(
-                Points(pose[part], error[part], [tips[i] for i in np.flatnonzero(part)], None, name, colour)
-                for part, name, colour in _parted(np.abs(error) > LIMIT_SIGMAS * sigma)
-            ),
-        ),
-    )
-    if not len(v.angle_deg):
-        return Chart((norm,))
-    move = (v.moves + 1).astype(np.float64)
-    tips = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
-    edge = np.column_stack([move - 0.5, move + 0.5]).ravel()
-    limit = np.repeat(LIMIT_RMS * v.angle_sigma_deg, 2)
-    moves = Panel(
-        Scale("move", limits=(0.3, move[-1] + 0.7), whole=True),
-        Scale("tilt error  [°]", "°", includes=(0.0,)),
-        (
-            Band(edge, 0.0 * limit, limit, ALLOWED),
-            *(
-                Bars(move[part], v.angle_deg[part], 0.7, [tips[i] for i in np.flatnonzero(part)], name, colour)
-                for part, name, colour in _parted(v.angle_deg > LIMIT_RMS * v.angle_sigma_deg)
-            ),
-        ),
-        height_px=180,
-    )
-    return Chart((norm, moves))
+    pose, error, sigma = np.arange(1.0, len(v.norm_error) + 1.0), mm_s2(v.norm_error), mm_s2(v.norm_sigma)
+    pairs = enumerate(zip(error, sigma, strict=True), start=1)
+    tips = [said(f"pose {k}", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−")) for k, (e, s) in pairs]
+    limit = LIMIT_SIGMAS * sigma
+    panels = [_panel(("pose", pose), Scale("|f| − |g|  [mm/s²]", "mm/s²"), (error, -limit, limit), tips)]
+    if len(v.angle_deg):
+        limit, scale = LIMIT_RMS * v.angle_sigma_deg, Scale("tilt error  [°]", "°", includes=(0.0,))
+        tips = [said(f"move {k + 1}", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+        panels.append(
+            _panel(("move", v.moves.astype(np.float64) + 1.0), scale, (v.angle_deg, 0.0 * limit, limit), tips)
+        )
+    return Chart(tuple(panels), columns=2)
+
+
+def _panel(at: tuple[str, FloatArray], y: Scale, values: tuple[FloatArray, ...], tips: list[str]) -> Panel:
+    """Errors at places ``at`` (dots; bars from 0 where they have no sign) with their lower and upper limits, those
+    beyond in another colour."""
+    (name, x), (error, low, high) = at, values
+    edge, is_signed = np.column_stack([x - 0.5, x + 0.5]).ravel(), bool(np.any(low))
+    marks: list[Mark] = [Band(edge, np.repeat(low, 2), np.repeat(high, 2), ALLOWED), Level(y=0.0)]
+    for part, words, colour in _parted((error < low) | (error > high)):
+        named = [tip for tip, is_in in zip(tips, part, strict=True) if is_in]
+        bars = Bars(x[part], error[part], 0.7, named, words, colour)
+        marks.append(Points(x[part], error[part], named, None, words, colour) if is_signed else bars)
+    return Panel(Scale(name, limits=(0.3, float(x[-1]) + 0.7), whole=True), y, tuple(marks))
 
 
 def _parted(is_beyond: BoolArray) -> list[tuple[BoolArray, str, Colour]]:

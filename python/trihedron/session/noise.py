@@ -12,6 +12,7 @@ from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
+from trihedron.records.calibration import Calibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.aliasing import unresolved_variance
@@ -46,6 +47,9 @@ START_STRENGTHS = strengths_of_all(8.0 * NOISE_CORNER_S)
 """Start of the search for strengths."""
 NOISE_DOF = 100.0
 """Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
+DRIFT_DOF = 10.0
+"""The same for biases: their variance between sessions is estimated from one or two sessions and scatters by 70 %
+(28 simulated sessions of 20 to 32 poses), as a variance with 4 degrees of freedom per session does."""
 PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
 """Bounds of a part whose noise is that of its samples."""
 
@@ -264,3 +268,25 @@ def between_sessions(away: FloatArray, noise: FloatArray, alike: FloatArray | fl
     shared = float((away[1:] * away[:-1] * weight).sum() / max((weight**2).sum(), TINY)) + float(np.mean(away**2)) / n
     shared = min(max(shared, 0.0), total)
     return 2.0 * shared + (total - shared) / n
+
+
+def bias_drift(calibration: Calibration, segments: Segments, n: int) -> FloatArray:
+    """Variance (n,) of the bias change between two sessions like the calibrated one (eq. 9.3), 0 for other parameters,
+    in the order of :data:`trihedron.records.sessions.PARAMETERS`."""
+    out = np.zeros(n)
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    quality = accel.quality
+    if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
+        up = segments.accelerometer_mean @ accel.S.T + accel.b
+        up = up / np.linalg.norm(up, axis=1, keepdims=True)
+        if len(up) == len(quality.residual):
+            noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
+            out[:3] = between_sessions(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
+    if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
+        biases = segments.gyroscope_mean @ gyro.S.T
+        noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
+        is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
+        if is_seen.sum() > 3:
+            biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
+            out[9:12] = np.mean([between_sessions(biases[:, k], noise[:, k]) for k in range(3)])
+    return out

@@ -17,6 +17,7 @@ from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector,
 from trihedron.probability import chdtri, fdtrc
 from trihedron.records.diagnosis import ParameterDifference
 from trihedron.records.words import words
+from trihedron.session.noise import DRIFT_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
@@ -24,9 +25,6 @@ Sensor = Literal["accelerometer", "gyroscope", "both"]
 SPREAD_DOF = 100.0
 """Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
 false-alarm rate of 72 simulated pairs; with 60 or 200 the 1 % point moves by 2 %."""
-DRIFT_DOF = 10.0
-"""The same for biases: their variance between sessions is estimated from one or two sessions and scatters by 70 %
-(28 simulated sessions of 20 to 32 poses), as a variance with 4 degrees of freedom per session does."""
 RANGE_TOLERANCE = 0.05
 """A ratio of sensitivities within 5 % of a power of two on all axes is another range setting: parts do not vary by a
 factor of 1.9, and ranges are powers of two."""

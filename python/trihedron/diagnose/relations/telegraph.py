@@ -73,7 +73,7 @@ def telegraphs(context: Context) -> list[Telegraph]:
             levels = _levels(context, number, axis, inside[number][axis])
             if levels is not None:
                 state = context.between_poses(levels.state - levels.state.mean())
-                signal = Signal(sensor, TELEGRAPH, ("random telegraph signal",), state[:, None], ("1",))
+                signal = Signal(sensor, TELEGRAPH, ("a random telegraph signal",), state[:, None], ("1",))
                 out.append(Telegraph(signal, axis, 2.0 * (levels.gain - float(np.log(3 * len(sensors))))))
     return out
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import fdtrc
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import f_upper
 from trihedron.records.domains import Domain, DomainTest, Where
@@ -151,16 +151,12 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         return np.asarray(np.linalg.solve(white, r[rows].reshape(len(white), -1, 1))[:, :, 0])
 
     error = errors((STATIC_ACCEL,), fitted.accel_white)
-    out = {STATIC_ACCEL: _rms(np.einsum("ni,ni->n", error, state.up))}
+    out = {STATIC_ACCEL: rms_of(np.einsum("ni,ni->n", error, state.up))}
     if fitted.gyro_white is not None:
-        out[STATIC_GYRO] = _rms(errors((STATIC_GYRO,), fitted.gyro_white))
+        out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), fitted.gyro_white))
     if fitted.obs.n_moves:
         # Of a move, in order: gravity after it (2), velocity over it (3).
         error = errors((MOVES, DYNAMICS), fitted.core.whitening())
         out[MOVES] = float(np.degrees(np.sqrt(np.mean((error[:, :2] ** 2).sum(axis=1) / state.gravity**2))))
-        out[DYNAMICS] = _rms(error[:, 2:])
+        out[DYNAMICS] = rms_of(error[:, 2:])
     return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import InputError
-from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness, named_sensors
+from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.thermal_model import parameters_at
 from trihedron.units import (
@@ -97,7 +97,7 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
     Raises ``InputError`` when it is for counts and the LSB is not given.
     """
     made = {}
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         if name == "accelerometer":
             unit, lsb = acceleration_to_si(AccelerationUnit(sensor.raw_unit)), options.accel_lsb
             lsb_to_si, said = acceleration_lsb_to_si, "--accel-lsb '0.061 mg'"
@@ -121,7 +121,7 @@ def _rescaled(sensor: SensorCalibration, unit: float) -> SensorCalibration:
 
 def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ()) -> list[str]:
     """Comments at the head of a file: source, equation, units, trust, and effects it lacks, except those ``held``."""
-    sensors = [sensor for _, sensor in named_sensors(calibration)]
+    sensors = [sensor for _, sensor in calibration.sensors]
     rows = [
         f"Calibration of {calibration.recording_source or 'an unnamed recording'}, written by trihedron.",
         equation,
@@ -207,7 +207,7 @@ def _through_sessions(calibration: Calibration, name: str, range_degc: tuple[flo
 def lost_temperature(calibration: Calibration) -> list[str]:
     """Sentences, with sizes, on the temperature dependence that a file of constants cannot represent."""
     said = []
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         thermal = thermal_of(calibration, name)
         if thermal is None or thermal.range_degc is None:
             continue

@@ -6,7 +6,6 @@ import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number, of_si_readings, row
 from trihedron.files.formats.noise_keys import limits, required
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
 
@@ -17,7 +16,7 @@ def to_gtsam(calibration: Calibration, options: ExportOptions) -> str:
     lines = [f"# {line}" for line in heading(known, "true = S @ raw + b; preintegrate what is true.")]
     lines += [f"# {limit}" for limit in limits(options)]
     lines += ["import numpy as np", ""]
-    for name, sensor in named_sensors(known):
+    for name, sensor in known.sensors:
         lines += [f"S_{name.upper()} = np.array([{', '.join(f'[{row(r)}]' for r in sensor.S)}])"]
         lines += [f"B_{name.upper()} = np.array([{row(sensor.b)}])"]
     lines += ["", "", "def preintegration_params():"]

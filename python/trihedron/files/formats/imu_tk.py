@@ -10,7 +10,6 @@ import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
 from trihedron.files.formats.matrices import upper_frame
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
 
@@ -21,7 +20,7 @@ def to_imu_tk(calibration: Calibration, _options: ExportOptions) -> dict[str, st
     said += ["T of the accelerometer is upper triangular here, so both sensors are turned by this rotation:"]
     said += [row(r) for r in rotation]
     out: dict[str, str] = {}
-    for (name, _), (_, S, b) in zip(named_sensors(calibration), turned, strict=True):
+    for (name, _), (_, S, b) in zip(calibration.sensors, turned, strict=True):
         scale = np.diag(S)
         bias = -np.linalg.solve(S, b)
         lines = [*(" ".join(map(repr, map(float, r))) for r in S / scale), ""]

@@ -13,7 +13,6 @@ import numpy as np
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading
 from trihedron.files.formats.kalibr import g_sensitivity
 from trihedron.files.formats.parsing import array_of, json_of
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
 from trihedron.units import degrees_from_radians
@@ -25,7 +24,7 @@ _WORDS = {"dps": "deg/s", "a.u.": "counts", "": "counts"}
 def to_imucal(calibration: Calibration, _options: ExportOptions) -> str:
     """JSON of ``FerrarisCalibrationInfo``: K is the length of the rows of ``S⁻¹``, R their directions."""
     out: dict[str, object] = {"cal_type": "Ferraris"}
-    for (name, sensor), letter in zip(named_sensors(calibration), "ag", strict=False):
+    for (name, sensor), letter in zip(calibration.sensors, "ag", strict=False):
         forward, b = other_form(sensor.S, sensor.b)
         if name == "gyroscope":
             G = g_sensitivity(calibration)

@@ -13,7 +13,6 @@ from trihedron.errors import InputError
 from trihedron.files.formats.autopilot import AxisCorrection, Composed, composed
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number
 from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal, size_of_bias
-from trihedron.files.plausible import named_sensors
 from trihedron.probability import NORMAL_95
 from trihedron.records import Calibration
 from trihedron.units import acceleration_lsb_to_si, rate_lsb_to_si
@@ -37,7 +36,7 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
     own, sensors = composed(calibration, options, "INAV", lambda _: AxisCorrection(np.zeros(3), np.ones(3), np.eye(3)))
     lines = [f"# {line}" for line in heading(own, "corrected = (reading - acczero) * accgain / 4096, in counts.")]
     lines += [f"# {line}" for line in lost_to_a_diagonal(own)]
-    for name, sensor in named_sensors(own):
+    for name, sensor in own.sensors:
         count = _size_of_a_count(name, options)
         half = np.full(3, 0.5 * count)
         if half[0] > NORMAL_95 * float(sensor.sigma_b.max()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.files.plausible import ROUNDING, named_sensors
+from trihedron.files.plausible import ROUNDING
 from trihedron.probability import NORMAL_95
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
@@ -38,7 +38,7 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
     """The misalignment that a model of scales and biases alone cannot represent."""
     said = []
     u, _, vt = np.linalg.svd(_unit_columns(calibration.accelerometer))
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         # The rotation of the accelerometer's triad as a whole is a choice of frame and is removed.
         unit = (u @ vt).T @ _unit_columns(sensor)
         off = np.abs(unit - np.diag(np.diag(unit)))
@@ -70,7 +70,7 @@ def lost_gyro_scale(gyro: SensorCalibration, target: str) -> list[str]:
 def lost_without_intrinsics(calibration: Calibration) -> list[str]:
     """The correction that the user of a file without S and b must apply."""
     sizes = []
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         if has_matrix(sensor):
             share = float(np.linalg.norm(sensor.S - np.eye(3), 2))
             sizes.append(

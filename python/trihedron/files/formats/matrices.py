@@ -6,7 +6,6 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.files.formats.contract import ExportOptions, of_si_readings
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import in_frame, other_form
 
@@ -42,7 +41,7 @@ def upper_frame(calibration: Calibration) -> tuple[FloatArray, list[tuple[Sensor
     q, r = np.linalg.qr(calibration.accelerometer.S)
     # The diagonal keeps its signs: a left-handed triad is not corrected by a reflection of the body frame.
     rotation = (q * (np.sign(np.diag(r)) * np.sign(np.diag(calibration.accelerometer.S)))).T
-    turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for _, sensor in named_sensors(calibration)]
+    turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for _, sensor in calibration.sensors]
     # Rounding errors below the diagonal are set to 0, as the target expects.
     turned[0] = (turned[0][0], np.triu(turned[0][1]), turned[0][2])
     return rotation, turned

@@ -8,7 +8,6 @@ import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
 from trihedron.files.formats.parsing import numbers_in
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
 
@@ -17,7 +16,7 @@ def to_pyins(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays for ``pyins.inertial_sensor.Parameters``."""
     equation = "x_out = T x + b: true to measured, the inverse of the direct form."
     lines = [*(f"# {line}" for line in heading(calibration, equation)), "import numpy as np"]
-    for (_, sensor), name in zip(named_sensors(calibration), ("accel", "gyro"), strict=False):
+    for (_, sensor), name in zip(calibration.sensors, ("accel", "gyro"), strict=False):
         T, b = other_form(sensor.S, sensor.b)
         lines += [
             f"{name}_transform = np.array([{', '.join(f'[{row(r)}]' for r in T)}])",

@@ -12,7 +12,6 @@ import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, of_si_readings
 from trihedron.files.formats.parsing import array_of, json_of
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
 
@@ -24,7 +23,7 @@ def to_realsense(calibration: Calibration, options: ExportOptions) -> str:
             "scale_and_alignment": [float(v) for v in sensor.S.T.ravel()],
             "bias": [float(v) + 0.0 for v in -sensor.b],
         }
-        for name, sensor in named_sensors(known)
+        for name, sensor in known.sensors
     }
     said = heading(known, "corrected = transpose(M) raw - bias, M = scale_and_alignment row by row, SI.")
     return json.dumps({"imus": [imu], "written_by_trihedron": said}, indent=2) + "\n"

@@ -11,7 +11,6 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number, of_si_readings, row
 from trihedron.files.formats.losses import has_bias, has_matrix, lost_to_a_diagonal, size_of_bias
 from trihedron.files.formats.noise_keys import Figures, required
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
@@ -25,7 +24,7 @@ def distortion(
     Raises ``InputError`` when noise or rate are not given.
     """
     known = of_si_readings(calibration, target, options)
-    pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
+    pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in known.sensors}
     pairs.setdefault("gyroscope", (np.eye(3), np.zeros(3)))
     return known, pairs, required(known, options, target)
 
@@ -41,7 +40,7 @@ def said_of(
 ) -> list[str]:
     """Heading of a simulator's file, with what its model cannot represent and the size of that for this unit."""
     lines = heading(calibration, equation)
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         A, b = other_form(sensor.S, sensor.b)
         if not holds_matrix and has_matrix(sensor):
             share = 100.0 * float(np.linalg.norm(A - np.eye(3), 2))

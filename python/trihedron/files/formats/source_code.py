@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, row
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
 
@@ -18,7 +17,7 @@ def to_c(calibration: Calibration, _options: ExportOptions) -> str:
     lines += ["#ifndef TRIHEDRON_CALIBRATION_H", "#define TRIHEDRON_CALIBRATION_H", ""]
     lines += ["typedef struct { double S[3][3]; double b[3]; } trihedron_sensor;"]
     lines += ["typedef struct { float S[3][3]; float b[3]; } trihedron_sensor_f;", ""]
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         lines.append(f"/* {name}: {sensor.raw_unit} to {sensor.si_unit} */")
         for kind, suffix, end in (("trihedron_sensor", "", ""), ("trihedron_sensor_f", "_f", "f")):
             rows = ",\n     ".join("{" + ", ".join(f"{v!r}{end}" for v in _floats(r)) + "}" for r in sensor.S)
@@ -60,7 +59,7 @@ def to_python(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays and a function for NumPy."""
     lines = [f"# {line}" for line in heading(calibration, "true = S @ raw + b, raw to true.")]
     lines += ["", "import numpy as np", ""]
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         rows = ",\n    ".join(f"[{row(r)}]" for r in sensor.S)
         upper = name.upper()
         lines += [
@@ -79,7 +78,7 @@ def to_rust(calibration: Calibration, _options: ExportOptions) -> str:
     lines = [f"// {line}" for line in heading(calibration, "true = S * raw + b, raw to true, row by row.")]
     lines += ["", "/// Linear model of one sensor: `true = S raw + b`.", "#[derive(Clone, Copy, Debug)]"]
     lines += ["pub struct Sensor {", "    pub s: [[f64; 3]; 3],", "    pub b: [f64; 3],", "}", ""]
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         rows = ", ".join(f"[{row(r)}]" for r in sensor.S)
         lines += [
             f"/// {sensor.raw_unit} to {sensor.si_unit}.",

@@ -8,7 +8,6 @@ import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
 from trihedron.files.formats.parsing import numbers_in
-from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
@@ -20,7 +19,7 @@ def to_xio(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays in C for Fusion's functions."""
     equation = "corrected = misalignment * (sensitivity o (raw - offset)): raw to g and deg/s, as Fusion expects."
     lines = [f"// {line}" for line in heading(calibration, equation)]
-    for name, sensor in named_sensors(calibration):
+    for name, sensor in calibration.sensors:
         S = sensor.S / _TO_SI[name]
         scale = np.diag(S)
         rows = ", ".join(row(r) for r in S / scale)

@@ -50,10 +50,12 @@ _CALIBRATE = {
 _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "", WARNING): Words(
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
-        "both uncertainties allow (largest difference first, {times_sigma:.1f} σ): {parameters:ids first 8}.",
+        "both uncertainties and the bias drift seen in this log allow (log − file, {times_sigma:.1f} σ first): "
+        "{parameters:each}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
         "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
         "each.",
+        lines={"parameters": "{v0:ids} {v1:quantity}"},
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
@@ -145,6 +147,7 @@ _MODELLED = "The linear model alone does not reproduce this recording: {statemen
 _TAKES_OFF = (
     "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
 )
+_RAISED = {"raised": " (cross-validated, {v0:ids} grows from {v1:quantity} to {v2:quantity} rms with them)"}
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
@@ -164,15 +167,17 @@ _DIAGNOSE = {
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
-        "S and b were fitted together with {effects:ids}.",
+        "S and b were fitted together with {effects:ids}{raised:run}.",
         _MODELLED,
         _TAKES_OFF,
+        lines=_RAISED,
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
+        "S and b were fitted together with {effects:ids}{raised:run}; unexplained: {left:ids}.",
         _MODELLED,
         _TAKES_OFF,
+        lines=_RAISED,
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.PROTOCOL_DIFFERS, "", NOTE): Words(

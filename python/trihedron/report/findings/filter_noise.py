@@ -43,11 +43,11 @@ ENTRIES = {
         "and estimate N and K from that.",
     ),
     (Code.FILTER_NOISE_UNCERTAIN, "", WARNING): Words(
-        "N of the {sensor} is uncertain: between {lower:.2g} and {upper:.2g} (95 % interval), and a filter is too sure "
+        "N of the {sensor} is uncertain: between {lower:.3g} and {upper:.3g} (95 % interval), and a filter is too sure "
         "with the one and too cautious with the other.",
         "The reference's own error, or a residual calibration error, is larger than the sensor's noise.",
-        "Use the upper end in a filter that must not be too sure; give a static log of the unit (--static STATIC), a "
-        "better reference or a longer log.",
+        "The file holds N {in_file:.3g}; write {upper:.3g} in its place for a filter that must not be too sure; give a "
+        "static log of the unit (--static STATIC), a better reference or a longer log.",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",

@@ -49,14 +49,14 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
 
 
-def beyond_headline(finding: Finding, document: Document) -> Finding:
+def beyond_headline(finding: Finding, document: Document, above: str = "Stated above. ") -> Finding:
     """What verdict and next action of the document have not stated of a finding; unchanged where they do not."""
     if finding is not document.foremost:
         return finding
     clause = opening(finding.seen)
     rest = finding.seen[len(clause) :].lstrip(" .;")
     is_stated = clause.lower() in document.verdict.lower()
-    seen = f"Stated above. {rest[:1].upper()}{rest[1:]}".rstrip() if is_stated else finding.seen
+    seen = f"{above}{capital(rest)}".rstrip() if is_stated else finding.seen
     is_next = document.what_next[1:].startswith(finding.action[1:])
     return replace(finding, seen=seen, action="" if is_next else finding.action)
 

@@ -68,7 +68,7 @@ _MOVES = {
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
         "g-sensitivity of the gyro.",
-        "Run trihedron diagnose for the extended model.",
+        "Calibrate with --extended, which fits it together with S and b.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),

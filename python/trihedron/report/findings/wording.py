@@ -4,6 +4,7 @@ A placeholder is a name and, after the colon, the format of its value:
 
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
+``quantity``             value, its σ where known, and unit: ``1.41 mm/s²``, ``0.0069 ± 0.0012 °/s``
 ``all .2g °/s``          several numbers in one unit, which is printed once: ``0.1, 0.2 °/s``
 ``# pose``               ``1 pose``, ``3 poses``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; placeholders are allowed
@@ -33,7 +34,7 @@ from typing import Any
 
 from trihedron.arrays import XYZ
 from trihedron.report.names import axis_in_print, id_in_print
-from trihedron.report.numbers import MINUS, listed, unit_in_print
+from trihedron.report.numbers import MINUS, listed, plain_number, shown, unit_in_print, with_sigma, with_unit
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
 UNITS: Mapping[str, Callable[[float], float]] = {
@@ -98,6 +99,11 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how == "run" or how.startswith("each"):
         between = "" if how == "run" else how[4:] or ", "
         return between.join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
+    if how == "quantity":
+        number, *sigma, unit = value
+        factor, printed = shown(unit)
+        plain = [plain_number(factor * number)] if not sigma else [with_sigma(factor * number, factor * sigma[0])]
+        return with_unit(plain[0], printed)
     if how.startswith("all "):
         digits, _, unit = how[4:].partition(" ")
         alike = f"{digits} !{unit}" if unit else digits
