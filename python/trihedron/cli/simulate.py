@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from trihedron.cli.next_step import name_log
 from trihedron.cli.options import LogSource, ReadingOptions, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_report
+from trihedron.cli.run import name_log
 
 if TYPE_CHECKING:
     from trihedron.records import Recording, Truth
