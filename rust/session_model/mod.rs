@@ -25,6 +25,7 @@ pub mod predict;
 pub mod response;
 mod rest_rows;
 pub mod rows;
+mod sample_noise;
 pub mod session_bias;
 pub mod state;
 pub mod strength_search;
@@ -160,8 +161,8 @@ pub struct Strengths {
     pub scatter: [f64; N_SCATTER],
     /// Departure of a bias from the line between its poses, during a move, in units of its scatter.
     pub between: [f64; 2],
-    /// Factors on the standard errors of gravity after moves and of the velocity over them; below 1 on the part of them
-    /// that the samples do not resolve.
+    /// Factors on the standard errors of gravity after moves and of the velocity over them; below 1 on the part of
+    /// motion faster than the samples.
     pub excess: [f64; 2],
 }
 

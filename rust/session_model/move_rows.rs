@@ -7,10 +7,9 @@ use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
 use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, carry};
-use super::response::{
-    Response, Sums, effect_columns, loosened, respond, sums, widened, wrt_lost_time,
-};
+use super::response::{Response, Sums, effect_columns, loosened, respond, sums, wrt_lost_time};
 use super::rows::{Domain, Group, Kind};
+use super::sample_noise::widened;
 use super::{Distortion, LOWER, N_MODEL, N_SCATTER, Session, State, Strengths, tangent_plane};
 use crate::error::{Error, Result};
 

@@ -37,8 +37,9 @@ pub struct Move {
     pub duration_s: f64,
     /// Mean step, s.
     pub step_s: f64,
-    /// Variance of the integrals of force and rate from motion faster than the samples, (raw unit · s)².
-    pub unresolved: [Vector3<f64>; 2],
+    /// Variance of the integrals of force and rate, (raw unit · s)², from motion faster than the samples; then from
+    /// rounding, slow noise and poses that turn at their ends.
+    pub unresolved: [Vector3<f64>; 4],
     /// Steps over lost samples.
     pub gaps: Vec<Gap>,
     /// Index of its first sample among the points of all moves.
@@ -54,7 +55,7 @@ impl Move {
         rate: Vec<Vector3<f64>>,
         force: Vec<Vector3<f64>>,
         anchors_s: [f64; 2],
-        unresolved: [Vector3<f64>; 2],
+        unresolved: [Vector3<f64>; 4],
         first_point: usize,
     ) -> Self {
         let n = time_s.len();

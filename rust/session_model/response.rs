@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, SVector, Vector3};
 use super::N_SCATTER;
 use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveModel, MoveNoise, N_MOVE};
+use super::sample_noise::of_samples;
 use crate::rotation::skew;
 
 /// Derivatives of the five residuals by rate and force at each sample.
@@ -15,9 +16,9 @@ pub struct Response {
     pub by_rate: Vec<SMatrix<f64, N_MOVE, 3>>,
     /// `(3, 3)` per sample: only the velocity depends on the force.
     pub by_force: Vec<Matrix3<f64>>,
-    /// Covariance of the residuals from noise of the samples, not widened.
+    /// Covariance of the residuals from noise that is measured, not widened.
     pub covariance: MoveCovariance,
-    /// Covariance by what is estimated beside it: motion faster than the samples, slow noise, rounding.
+    /// Covariance by motion faster than the samples, extrapolated from their spectrum.
     pub unresolved: MoveCovariance,
     /// `g Tᵀ C` at the end.
     pub lever: Matrix2x3<f64>,
@@ -124,83 +125,10 @@ pub fn wrt_lost_time(
     (0..one.n_samples()).map(derivative).collect()
 }
 
-/// Covariance of a move's residuals with gravity and velocity widened, each by its own factor; their covariance stays as
-/// noise makes it. If it were widened too, a velocity without weight would determine parameters of the gyro through the
-/// correlation. A factor below one is of what the samples do not resolve: their own noise is measured.
-pub(super) fn widened(response: &Response, excess: [f64; 2]) -> MoveCovariance {
-    let less = excess.map(|factor| factor.min(1.0));
-    let of_row = |row: usize| less[usize::from(row > 1)];
-    let scaled = MoveCovariance::from_fn(|i, j| of_row(i) * of_row(j));
-    let mut out = response.covariance + response.unresolved.component_mul(&scaled);
-    let more = excess.map(|factor| factor.max(1.0).powi(2));
-    let mut gravity = out.fixed_view_mut::<2, 2>(0, 0);
-    gravity *= more[0];
-    let mut velocity = out.fixed_view_mut::<3, 3>(2, 2);
-    velocity *= more[1];
-    out
-}
-
 /// `M [v]×`.
 fn times_skew(m: &SMatrix<f64, N_MOVE, 3>, v: &Vector3<f64>) -> SMatrix<f64, N_MOVE, 3> {
     let (x, y, z) = (m.column(0), m.column(1), m.column(2));
     SMatrix::from_columns(&[y * v.z - z * v.y, z * v.x - x * v.z, x * v.y - y * v.x])
-}
-
-/// Adds the lower triangle of `R C Rᵀ`.
-fn add_square<const N: usize>(
-    r: &SMatrix<f64, N, 3>,
-    covariance: &Matrix3<f64>,
-    out: &mut SMatrix<f64, N, N>,
-) {
-    let half = r * covariance;
-    for j in 0..N {
-        for i in j..N {
-            out[(i, j)] +=
-                half[(i, 0)] * r[(j, 0)] + half[(i, 1)] * r[(j, 1)] + half[(i, 2)] * r[(j, 2)];
-        }
-    }
-}
-
-/// Covariance by white noise of the samples, and by what they do not resolve, which has no known direction: equal variance
-/// on all axes.
-fn of_samples(
-    one: &Move,
-    move_model: &MoveModel<'_>,
-    noise: &MoveNoise,
-    by_rate: &[SMatrix<f64, N_MOVE, 3>],
-    by_force: &[Matrix3<f64>],
-) -> [MoveCovariance; 2] {
-    let white = |scale: &Matrix3<f64>, density: &Vector3<f64>| {
-        let variance = density.component_mul(density) / one.step_s;
-        scale * Matrix3::from_diagonal(&variance) * scale.transpose()
-    };
-    let fast = |scale: &Matrix3<f64>, variance: &Vector3<f64>| {
-        let mean = (scale.component_mul(scale) * variance).mean();
-        Matrix3::identity() * (mean / (one.duration_s * one.step_s))
-    };
-    let (of_rate, of_force) = (&move_model.rate_scale, &move_model.force_scale);
-    let passed = |rate: Matrix3<f64>, force: Matrix3<f64>| {
-        let mut out = MoveCovariance::zeros();
-        let mut of_velocity = Matrix3::zeros();
-        for (r, f) in by_rate.iter().zip(by_force) {
-            add_square(r, &rate, &mut out);
-            add_square(f, &force, &mut of_velocity);
-        }
-        let mut velocity = out.fixed_view_mut::<3, 3>(2, 2);
-        velocity += of_velocity;
-        out.fill_upper_triangle_with_lower_triangle();
-        out
-    };
-    [
-        passed(
-            white(of_rate, &noise.rate_density),
-            white(of_force, &noise.force_density),
-        ),
-        passed(
-            fast(of_rate, &one.unresolved[1]),
-            fast(of_force, &one.unresolved[0]),
-        ),
-    ]
 }
 
 /// Derivatives of the residuals with respect to the parameters that act on the samples, `(5, k)` each.

@@ -32,14 +32,17 @@ const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
 ];
 type Point = [f64; N_STRENGTHS];
 /// Natural logarithms between which each kind is searched. No bound on noise is physical; these end the search: a walk
-/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a hundredth of what
-/// the samples do not resolve.
+/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a hundredth of the
+/// motion faster than the samples.
 const CORNER: (f64, f64) = (-1.6, 8.5);
 const SCATTER: (f64, f64) = (-6.9, 9.2);
 /// A jump at an unknown instant departs from the line by √(1/12) of a jump of √2 (0.4), one at either end of the move
 /// by √2/2 (0.7), a third bias by √(3/2): no departure is larger.
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (-4.6, 9.2);
+/// Standard deviation of the logarithm of an excess below one: the motion faster than the samples is extrapolated, to a
+/// factor of three.
+const EXTRAPOLATED: f64 = 1.1;
 /// Rows with this excess have no weight, and keep none: a search leaves it as given.
 const NO_WEIGHT: f64 = 6.9;
 /// Scatter, or excess of moves, at which a search from nothing begins: near nothing the evidence is flat.
@@ -151,7 +154,9 @@ impl<'a> Search<'a> {
         let Some((_, weighted_rows)) = &self.weighted_rows else {
             return f64::NEG_INFINITY;
         };
+        let less = x[EXCESS_AT..].iter().map(|e| e.min(0.0).powi(2));
         self.hypothesis.beside(&strengths, weighted_rows)
+            - 0.5 * less.sum::<f64>() / EXTRAPOLATED.powi(2)
     }
 
     fn is_free(&self, i: usize) -> bool {

@@ -90,8 +90,8 @@ class SessionNoise:
 def measure_noise(
     recording: Recording, segments: Segments, ranges: list[tuple[int, int]]
 ) -> tuple[SessionNoise, FloatArray]:
-    """Noise of poses, and variance (m, 2, 3) of the integrals of every move, force and rate, (raw unit · s)², by motion
-    faster than the samples and by noise slower than a move, in the half-open sample ``ranges`` of the moves.
+    """Noise of poses, and variance (m, 4, 3) of the integrals of every move, (raw unit · s)², in the half-open sample
+    ``ranges`` of the moves: of force and rate by motion faster than the samples, then by rounding and slow noise.
 
     Refused when the segments state no uncertainty of their means.
     """
@@ -113,7 +113,7 @@ def measure_noise(
         densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
         of_rate = expected_scatter_of_axes(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
-    variances = np.zeros((len(ranges), 2, 3))
+    variances = np.zeros((len(ranges), 4, 3))
     for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
         if readings is None or not ranges:
             continue
@@ -121,10 +121,10 @@ def measure_noise(
         variances[:, k] = unresolved_variance(readings, ranges, spans, step_s, quantum, recording.time_s)
         if k == 0:
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
-            variances[:, k] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
+            variances[:, 2] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if k < len(sigmas):
             halves, lasts = _steps(readings, spans, np.eye(3)[None], 2)[:, 0], np.diff(spans, axis=1)[:, 0] * step_s
-            variances[:, k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
+            variances[:, 2 + k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
     scatter = 0.0 if along is None else expected_scatter(recording.accelerometer, spans, along[0])

@@ -83,7 +83,8 @@ pub(super) struct SessionMoves {
 #[pymethods]
 impl SessionMoves {
     /// `pose_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges`
-    /// `(m, 2)` of samples, the pose `before` `(m,)` each, `unresolved` `(m, 2, 3)` variances of their integrals.
+    /// `(m, 2)` of samples, the pose `before` `(m,)` each, `unresolved` `(m, 4, 3)` variances of their integrals: of force
+    /// and rate by motion faster than the samples, then by anything else beside white noise.
     #[new]
     #[pyo3(signature = (*, pose_time_s, time_s, force, rate, ranges, before, unresolved))]
     fn new(
@@ -164,9 +165,9 @@ fn moves_of(
     if m == 0 {
         return Ok(Vec::new());
     }
-    if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 2, 3] {
+    if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 4, 3] {
         return Err(PyValueError::new_err(format!(
-            "{m} moves need ranges ({m}, 2), poses ({m},) and unresolved variances ({m}, 2, 3)"
+            "{m} moves need ranges ({m}, 2), poses ({m},) and unresolved variances ({m}, 4, 3)"
         )));
     }
     let Some(rate) = rate else {
@@ -209,7 +210,7 @@ fn moves_of(
                 "move {k} begins in pose {pose} and there is none after it"
             )));
         }
-        let extra = [0, 1].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
+        let extra = [0, 1, 2, 3].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
         out.push(Move::new(
             pose,
             &time_s[start..stop],

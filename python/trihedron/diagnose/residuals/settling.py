@@ -79,8 +79,8 @@ def with_settling(context: Context, found: Settling) -> Observations:
     unresolved = dict(obs.unresolved)
     for before, after in obs.move_poses:
         key = int(before), int(after)
-        wider = np.zeros((2, 3)) if key not in unresolved else unresolved[key].copy()
-        wider[1] += (ends[before] ** 2 + begins[after] ** 2) / si_per_raw**2
+        wider = np.zeros((4, 3)) if key not in unresolved else unresolved[key].copy()
+        wider[3] += (ends[before] ** 2 + begins[after] ** 2) / si_per_raw**2
         unresolved[key] = wider
     settles = found.rate_rad_s * mean[:, None] / si_per_raw
     return replace(

@@ -35,8 +35,8 @@ class Observations(SessionReadings):
     of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
     is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
     disturbed intervals of poses, s.
-    ``unresolved`` maps a move's two poses to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
-    by motion faster than the samples, by noise slower than a move and by vibration at the end of a pose.
+    ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
+    rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
     ``pose_rate_sigma``.
     ``averaging`` is the share of the sample interval that the sensors average over (0 to 1).
@@ -145,7 +145,7 @@ class Observations(SessionReadings):
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
-        nothing = np.zeros((2, 3))
+        nothing = np.zeros((4, 3))
         unresolved = [self.unresolved.get((int(a), int(b)), nothing) for a, b in self.move_poses]
         force, rate = (
             None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
@@ -159,7 +159,7 @@ class Observations(SessionReadings):
             rate=rate,
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=np.array(unresolved).reshape(-1, 2, 3),
+            unresolved=np.array(unresolved).reshape(-1, 4, 3),
         )
 
 
@@ -202,7 +202,8 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         swing = swing + np.stack(
             [np.zeros((segments.n_poses, 3)), _turned_at_ends(noise.pose_rate_sigma, lasts)], axis=1
         )
-    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(of_moves, poses, strict=True)]
+    for own, ends in zip(of_moves, poses, strict=True):
+        own[2:] += swing[list(ends)].sum(axis=0)
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
@@ -212,7 +213,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         disturbed_s=bumped,
-        unresolved=dict(zip(poses, unresolved, strict=True)), averaging=averaging,
+        unresolved=dict(zip(poses, of_moves, strict=True)), averaging=averaging,
     )  # fmt: skip
 
 

@@ -139,7 +139,8 @@ def _again(
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
-    inflation = core.strengths[3]
+    gravity, velocity = core.strengths[3]
+    inflation = max(gravity, 1.0), max(velocity, 1.0)
     chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
