@@ -144,6 +144,7 @@ def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(
 
 def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command():
     begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
+    note_log(LogSource(log=Path("my log.csv"), rate=50.0))
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json`"
 
 
