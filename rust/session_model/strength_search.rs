@@ -254,10 +254,26 @@ impl<'a> Search<'a> {
 
     /// A step either way, doubled while it gains; otherwise the maximum of a parabola.
     fn along(&mut self, direction: &Range<usize>, step: &mut f64) {
-        // Less excess than none is searched too.
-        if self.is_nothing(direction) && !self.rises(direction) && direction.start < EXCESS_AT {
+        if self.is_nothing(direction) && !self.rises(direction) {
+            if direction.start >= EXCESS_AT {
+                self.below_one(direction, step);
+            }
             return;
         }
+        self.step_along(direction, step);
+    }
+
+    /// Less of the motion faster than the samples: an excess that a step from nothing does not show is none.
+    fn below_one(&mut self, direction: &Range<usize>, step: &mut f64) {
+        let bounds = self.bounds;
+        for i in direction.clone() {
+            self.bounds[i].1 = 0.0;
+        }
+        self.step_along(direction, step);
+        self.bounds = bounds;
+    }
+
+    fn step_along(&mut self, direction: &Range<usize>, step: &mut f64) {
         let (here, i) = (self.x, direction.start);
         let (down, up) = (self.moved(direction, -*step), self.moved(direction, *step));
         let mut value_of = |x: &Point| {

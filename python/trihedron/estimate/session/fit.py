@@ -72,23 +72,15 @@ class SessionSolution:
     @property
     def accel_drift(self) -> FloatArray:
         """Curves of the accelerometer's bias in the poses (n, 3, k), one prior σ each [m/s²]."""
-        drift = self._drift
-        of_poses = self.observed.force_effect[: self.observed.n_poses, :, drift]
-        return np.asarray(np.einsum("ij,njk->nik", self.S_a, of_poses) * self.observed.effect_sigma[drift])
+        return _drift_curves(self.observed, self.observed.force_effect, self.S_a)
 
     @property
     def accel_bias_change(self) -> tuple[float, float]:
         """RMS difference of the poses' biases from the session's, the least gravity error of S, b alone, and the range
         of their drift along a curve, largest axis; m/s²."""
-        drift = self._drift
-        along_curves = self.accel_drift @ (self.core.effect[drift] / self.observed.effect_sigma[drift])
+        along_curves = _drift(self.observed, self.core, self.observed.force_effect, self.S_a)
         away = self.core.pose_force_bias @ self.S_a.T + along_curves
         return float(np.sqrt(np.mean(away**2))), float(np.ptp(along_curves, axis=0).max())
-
-    @property
-    def _drift(self) -> slice:
-        n = len(self.observed.effect_sigma)
-        return slice(n - self.observed.n_drift, n)
 
     @property
     def parameters(self) -> FloatArray:
@@ -144,6 +136,10 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
+    # The bias of a session that drifts is its mean over the static time, which is known to a pose.
+    for at, effect, S in ((9, observed.force_effect, S_a), (21, observed.rate_effect, S_w)):
+        drift = _drift(observed, core, effect, S)
+        covariance[range(at, at + 3), range(at, at + 3)] += np.mean(drift**2, axis=0) / len(drift) ** 2
     return SessionSolution(
         S_a=S_a,
         b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
@@ -160,6 +156,18 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         observed=observed,
         core=core,
     )
+
+
+def _drift_curves(observed: Observed, effect: FloatArray, S: FloatArray) -> FloatArray:
+    """Curves of a sensor's bias in the poses (n, 3, k), one prior σ each, SI, from its ``effect`` columns."""
+    n = len(observed.effect_sigma) - observed.n_drift
+    return np.asarray(np.einsum("ij,njk->nik", S, effect[: observed.n_poses, :, n:]) * observed.effect_sigma[n:])
+
+
+def _drift(observed: Observed, core: _core.SessionFit, effect: FloatArray, S: FloatArray) -> FloatArray:
+    """Drift of a sensor's bias in the poses (n, 3), SI."""
+    n = len(observed.effect_sigma) - observed.n_drift
+    return _drift_curves(observed, effect, S) @ (core.effect[n:] / observed.effect_sigma[n:])
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
