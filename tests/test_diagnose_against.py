@@ -109,8 +109,8 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
 
 def test_an_effect_that_only_the_simulation_has_is_surplus(unit):
     profile, accel, gyro = unit
-    simulated = log(profile, accel, gyro, 3, 3, "accel-quadratic", k2=(6e-4, -4e-4, 4e-4))
-    found = trihedron.diagnose(log(profile, accel, gyro, 4, 4), against=simulated, gravity_m_s2=9.80665)
+    simulated = log(profile, accel, gyro, 3, 3, "accel-quadratic", k2=(3e-4, -2e-4, 2e-4))
+    found = trihedron.diagnose(log(profile, accel, gyro, 5, 5), against=simulated, gravity_m_s2=9.80665)
     assert found.verdict == "missing-physics"
     assert [(e.side, e.id) for e in found.effects] == [("model", "accel-quadratic")]
     assert not any(p.significant for p in found.parameters)
