@@ -79,7 +79,7 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
             rate,
             force,
             [pose_time[m], pose_time[m + 1]],
-            [Vector3::zeros(); 2],
+            [Vector3::zeros(); 4],
             first_point,
         ));
         first_point += n;

@@ -197,7 +197,7 @@ fn turned_evenly(session: &mut Session, inserted: Option<usize>, lost_s: f64) {
         vec![Vector3::new(90.0, -40.0, 60.0); n],
         vec![Vector3::new(4.0, 6.0, -3.0); n],
         [0.0, 5.0],
-        [Vector3::zeros(); 2],
+        [Vector3::zeros(); 4],
         0,
     )]);
 }
