@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trihedron.estimate.session.solved as solved_session
+from confidence.design import session
 from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand
@@ -110,3 +111,21 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     rms = np.sqrt(np.mean(np.square(scores)))
     # 27 numbers, correlated within a session: 1 +- 0.3. It was 0.36 to 0.40 over 40 and 60 sessions.
     assert 0.55 < rms < 1.4
+
+
+def test_motion_faster_than_the_samples_that_is_not_there_costs_no_certainty(monkeypatch):
+    # Its variance is extrapolated; at 50 Hz, in a hand that trembles, to twenty times the error that there is.
+    made = session(7, tremor_deg_s=0.0)
+    recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
+    plain = calibrate(recording, gravity_m_s2=G)
+
+    def far_too_large(readings, ranges, poses, step_s, quantum, time_s=None):
+        white = np.var(readings[poses[0, 0] : poses[0, 1]], axis=0)
+        added = [400.0 * white * (b - a) * step_s**2 for a, b in ranges]
+        return unresolved_variance(readings, ranges, poses, step_s, quantum, time_s) + np.array(added)
+
+    monkeypatch.setattr("trihedron.session.noise.unresolved_variance", far_too_large)
+    charged = calibrate(recording, gravity_m_s2=G)
+    wider = np.diag(charged.gyroscope.sigma_S) / np.diag(plain.gyroscope.sigma_S)
+    # Twenty times as wide before the evidence found how much of it there is.
+    assert wider.max() < 2.0
