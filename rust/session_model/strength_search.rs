@@ -32,8 +32,8 @@ const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
 ];
 type Point = [f64; N_STRENGTHS];
 /// Natural logarithms between which each kind is searched. No bound on noise is physical; these end the search: a walk
-/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a hundredth of the
-/// motion faster than the samples.
+/// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a
+/// hundredth of the motion faster than the samples.
 const CORNER: (f64, f64) = (-1.6, 8.5);
 const SCATTER: (f64, f64) = (-6.9, 9.2);
 /// A jump at an unknown instant departs from the line by √(1/12) of a jump of √2 (0.4), one at either end of the move
@@ -263,7 +263,8 @@ impl<'a> Search<'a> {
         self.step_along(direction, step);
     }
 
-    /// Less of the motion faster than the samples: an excess that a step from nothing does not show is none.
+    /// Less of the motion faster than the samples. An excess that a large step from nothing does not show is none: small
+    /// ones follow the chance of a few moves.
     fn below_one(&mut self, direction: &Range<usize>, step: &mut f64) {
         let bounds = self.bounds;
         for i in direction.clone() {
