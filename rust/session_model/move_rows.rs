@@ -6,11 +6,13 @@ use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
-use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, carry};
+use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, PoseBiases, carry};
 use super::response::{Response, Sums, effect_columns, loosened, respond, sums, wrt_lost_time};
 use super::rows::{Domain, Group, Kind};
 use super::sample_noise::widened;
-use super::{Distortion, LOWER, N_MODEL, N_SCATTER, Session, State, Strengths, tangent_plane};
+use super::{
+    Distortion, LOWER, N_MODEL, N_POSE_SCATTER, N_SCATTER, Session, State, Strengths, tangent_plane,
+};
 use crate::error::{Error, Result};
 
 /// `L⁻¹` of a move's covariance `L Lᵀ`.
@@ -97,13 +99,17 @@ impl Session {
         let part = |values: Option<&'a Vec<Vector3<f64>>>| -> Option<&'a [Vector3<f64>]> {
             values.map(|v| &v[first..first + one.n_samples()])
         };
+        let of_poses = |bias: &[Vector3<f64>], own: &[Vector3<f64>]| PoseBiases {
+            walking: [bias[i] - own[i], bias[j] - own[j]],
+            own: [own[i], own[j]],
+        };
         MoveModel {
             gravity: self.gravity,
             force_scale: state.force_scale,
             force_bias: state.force_bias,
             rate_scale: state.rate_scale,
-            pose_rate_bias: [state.pose_rate_bias[i], state.pose_rate_bias[j]],
-            pose_force_bias: [state.pose_force_bias[i], state.pose_force_bias[j]],
+            pose_rate_bias: of_poses(&state.pose_rate_bias, &state.own[1]),
+            pose_force_bias: of_poses(&state.pose_force_bias, &state.own[0]),
             up: [state.up[i], state.up[j]],
             plane,
             force_effect: part(effects.force.as_ref()),
@@ -203,6 +209,7 @@ impl Session {
             rate_model,
             pose_rate_bias,
             pose_force_bias,
+            own,
         } = &passed.sums;
         rows.border.columns_mut(0, 9).copy_from(force_model);
         rows.border.columns_mut(9, 9).copy_from(rate_model);
@@ -210,6 +217,12 @@ impl Session {
         rows.next.columns_mut(2, 3).copy_from(&pose_rate_bias[1]);
         rows.here.columns_mut(5, 3).copy_from(&pose_force_bias[0]);
         rows.next.columns_mut(5, 3).copy_from(&pose_force_bias[1]);
+        if layout.pose == N_POSE_SCATTER {
+            for (by_own, column) in own.iter().zip([11, 8]) {
+                rows.here.columns_mut(column, 3).copy_from(by_own);
+                rows.next.columns_mut(column, 3).copy_from(&-by_own);
+            }
+        }
         let (from, to) = (tangent_plane(&state.up[i]), tangent_plane(&state.up[j]));
         rows.here
             .view_mut((0, 0), (2, 2))

@@ -105,6 +105,27 @@ impl Move {
     }
 }
 
+/// Biases of the poses before and after a move.
+#[derive(Debug, Clone, Copy)]
+pub struct PoseBiases {
+    /// What walks, between the anchors.
+    pub walking: [Vector3<f64>; 2],
+    /// What belongs to one pose alone, constant in it: it changes during the move.
+    pub own: [Vector3<f64>; 2],
+}
+
+impl PoseBiases {
+    /// Bias at a sample of a move.
+    #[must_use]
+    pub fn at(&self, one: &Move, k: usize) -> Vector3<f64> {
+        let (x, y) = (one.fraction[k], one.progress[k]);
+        self.walking[0] * (1.0 - x)
+            + self.walking[1] * x
+            + self.own[0] * (1.0 - y)
+            + self.own[1] * y
+    }
+}
+
 /// Model values that a move needs: both sensors, biases of its two poses, verticals, distortion of each sample.
 #[derive(Debug)]
 pub struct MoveModel<'a> {
@@ -117,9 +138,9 @@ pub struct MoveModel<'a> {
     /// Gyro `S`.
     pub rate_scale: Matrix3<f64>,
     /// Raw biases of the gyro in the poses before and after.
-    pub pose_rate_bias: [Vector3<f64>; 2],
+    pub pose_rate_bias: PoseBiases,
     /// Raw biases of the accelerometer there.
-    pub pose_force_bias: [Vector3<f64>; 2],
+    pub pose_force_bias: PoseBiases,
     /// Verticals there.
     pub up: [Vector3<f64>; 2],
     /// Plane in which the vertical after is compared.
@@ -174,14 +195,13 @@ pub fn carry(one: &Move, move_model: &MoveModel<'_>) -> Carried {
     let mut rate = Vec::with_capacity(n);
     let mut force = Vec::with_capacity(n);
     for k in 0..n {
-        let x = one.fraction[k];
-        let bias = move_model.pose_rate_bias[0] * (1.0 - x) + move_model.pose_rate_bias[1] * x;
+        let bias = move_model.pose_rate_bias.at(one, k);
         let mut w = move_model.rate_scale * (one.rate[k] - bias);
         if let Some(effect) = move_model.rate_effect {
             w -= effect[k];
         }
         rate.push(w);
-        let bias = move_model.pose_force_bias[0] * (1.0 - x) + move_model.pose_force_bias[1] * x;
+        let bias = move_model.pose_force_bias.at(one, k);
         let mut f = move_model.force_scale * (one.force[k] - bias) + move_model.force_bias;
         if let Some(effect) = move_model.force_effect {
             f -= effect[k];

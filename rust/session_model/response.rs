@@ -142,6 +142,9 @@ pub struct Sums {
     pub pose_rate_bias: [SMatrix<f64, N_MOVE, 3>; 2],
     /// With respect to the raw biases of the accelerometer before and after.
     pub pose_force_bias: [SMatrix<f64, N_MOVE, 3>; 2],
+    /// With respect to the part of either bias (accelerometer, gyro) that belongs to the pose before alone, the bias
+    /// itself held; to that of the pose after with the opposite sign.
+    pub own: [SMatrix<f64, N_MOVE, 3>; 2],
 }
 
 /// Sums of the response over the samples.
@@ -156,13 +159,12 @@ pub fn sums(
     let mut rate_model = SMatrix::<f64, N_MOVE, 9>::zeros();
     let mut rates = [SMatrix::<f64, N_MOVE, 3>::zeros(); 2];
     let mut forces = [Matrix3::zeros(); 2];
+    let (mut own_rate, mut own_force) = (SMatrix::<f64, N_MOVE, 3>::zeros(), Matrix3::zeros());
     for k in 0..one.n_samples() {
         let x = one.fraction[k];
         let (r, f) = (&response.by_rate[k], &response.by_force[k]);
-        let w = one.rate[k]
-            - (move_model.pose_rate_bias[0] * (1.0 - x) + move_model.pose_rate_bias[1] * x);
-        let a = one.force[k]
-            - (move_model.pose_force_bias[0] * (1.0 - x) + move_model.pose_force_bias[1] * x);
+        let w = one.rate[k] - move_model.pose_rate_bias.at(one, k);
+        let a = one.force[k] - move_model.pose_force_bias.at(one, k);
         for i in 0..3 {
             for j in 0..3 {
                 rate_model
@@ -180,6 +182,8 @@ pub fn sums(
         rates[1] += r * x;
         forces[0] += f * (1.0 - x);
         forces[1] += f * x;
+        own_rate += r * (x - one.progress[k]);
+        own_force += f * (x - one.progress[k]);
     }
     let of_velocity = |part: Matrix3<f64>| {
         let mut out = SMatrix::<f64, N_MOVE, 3>::zeros();
@@ -192,6 +196,7 @@ pub fn sums(
         rate_model,
         pose_rate_bias: rates.map(|part| -part * move_model.rate_scale),
         pose_force_bias: forces.map(of_velocity),
+        own: [of_velocity(own_force), -own_rate * move_model.rate_scale],
     }
 }
 
