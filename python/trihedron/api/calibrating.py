@@ -158,7 +158,12 @@ def calibrate(
     calibration = in_frame(calibration, wanted)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
+    findings = (
+        *said,
+        *recording.findings,
+        *_as_they_weigh(segments, calibration),
+        *_of_fit(calibration, recording, segments),
+    )
     return _result(calibration, findings, segments, recording)
 
 
@@ -184,14 +189,17 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     return (*unless_seen(fitted, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
 
 
-def _as_they_weigh(segments: Segments) -> Found:
-    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it."""
-    return tuple(
-        replace(finding, severity=Severity.SERIOUS)
-        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["poses"] > MOST_SETTLING * segments.n_poses
-        else finding
-        for finding in segments.findings
-    )
+def _as_they_weigh(segments: Segments, calibration: Calibration) -> Found:
+    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it, that of
+    the bias where b is off by more than its uncertainty."""
+    sigma_mg = 1e3 * float(np.max(calibration.accelerometer.sigma_b)) / calibration.gravity_m_s2
+
+    def is_grave(one: Finding) -> bool:
+        if one.code is FindingCode.BIAS_SETTLING:
+            return one.numbers["mean_mg"] > sigma_mg
+        return one.code is FindingCode.POSE_SETTLING and one.numbers["poses"] > MOST_SETTLING * segments.n_poses
+
+    return tuple(replace(one, severity=Severity.SERIOUS) if is_grave(one) else one for one in segments.findings)
 
 
 def _require_poses(recording: Recording, segments: Segments) -> None:

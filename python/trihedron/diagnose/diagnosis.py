@@ -34,6 +34,7 @@ from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, Verdict
 from trihedron.records.domains import DomainTest, Where
+from trihedron.records.finding import FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
@@ -195,8 +196,24 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
 def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
     """Every domain's test; ``rejected`` are ids of effects that did not improve the prediction of held-out moves: jolts
     look like lost samples."""
-    rows, within = judge_rows(context.fitted, alpha), judge_within_poses(context.obs, alpha)
+    rows, within = (
+        _with_settling_bias(context, judge_rows(context.fitted, alpha)),
+        judge_within_poses(context.obs, alpha),
+    )
     return (*rows, within, _judge_timing(context, alpha, rejected))
+
+
+def _with_settling_bias(context: Context, rows: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
+    """The domains, where static poses disagree if the accelerometer's bias settles inside them: the noise of their
+    means had absorbed it."""
+    of_segments = context.obs.segments.findings
+    p = min((one.numbers["p_value"] for one in of_segments if one.code is FindingCode.BIAS_SETTLING), default=1.0)
+    return tuple(
+        replace(d, disagrees=True, p_value=min(d.p_value, p), limit=None)
+        if d.domain == "static-accel" and p < 1.0
+        else d
+        for d in rows
+    )
 
 
 def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:

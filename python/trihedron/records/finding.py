@@ -72,6 +72,7 @@ class FindingCode(str, Enum):
     # segment
     NO_INITIAL_POSE = "no-initial-pose"
     POSE_SETTLING = "pose-settling"
+    BIAS_SETTLING = "bias-settling"
     POSE_DISTURBED = "pose-disturbed"
     POSE_UNSTEADY = "pose-unsteady"
     POSE_AT_RANGE_LIMIT = "pose-at-range-limit"

@@ -11,7 +11,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.segment.channels import Channels
-from trihedron.segment.means import rounding_bias_variance
+from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_POSE_S, Run, means_of
@@ -132,6 +132,21 @@ def judge_log(
     if len(poses) < POSES_FOR_NINE:
         found.append(Finding.of(FindingCode.FEW_POSES, poses=len(poses), duration_s=duration, needed=POSES_FOR_NINE))
     return found
+
+
+def judge_bias(means: PoseMeans) -> list[Finding]:
+    """A bias that settles after moves: size at the start of a pose in parts of gravity, time constant, p-value."""
+    one = means.settling
+    if one is None:
+        return []
+    gravity = float(np.median(np.linalg.norm(means.mean[:, :3], axis=1)))
+    size, sigma = (x / gravity * 1e3 for x in (one.size, one.sigma))
+    return [
+        Finding.of(
+            FindingCode.BIAS_SETTLING, x_mg=size[0], y_mg=size[1], z_mg=size[2], sigma_mg=sigma.max(), tau_s=one.tau_s,
+            mean_mg=float(np.linalg.norm(size)) * one.share, p_value=one.p_value, wait_s=3.0 * one.tau_s,
+        )
+    ]  # fmt: skip
 
 
 def _start_s(recording: Recording, pose: Pose) -> float:

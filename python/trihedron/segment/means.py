@@ -13,6 +13,7 @@ from trihedron.records import Pose, Recording
 from trihedron.segment.channels import Channels, mean_present
 from trihedron.segment.noise import MeanNoise, pool_mean_noise, split_by_halves
 from trihedron.segment.runs import Run, means_of
+from trihedron.segment.settling_bias import SettlingBias, find_settling_bias
 from trihedron.units import acceleration_to_si
 
 PIECE = 1 << 18
@@ -27,6 +28,7 @@ class PoseMeans:
     """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples.
 
     ``up`` (h, 3) the accelerometer's vertical, ``sigma_up`` (h,) standard error of the mean along it, or ``None``.
+    ``settling`` is the change of the accelerometer's bias after every move, if any.
     """
 
     mean: FloatArray
@@ -34,6 +36,7 @@ class PoseMeans:
     n_averaged: np.ndarray[tuple[int], np.dtype[np.int64]]
     up: FloatArray | None = None
     sigma_up: FloatArray | None = None
+    settling: SettlingBias | None = None
 
 
 def average_poses(
@@ -71,7 +74,10 @@ def average_poses(
     model = pool_mean_noise(upward, steady_ranges or [r for run in runs for r in run.quiet_ranges()])
     ratio, freedom = _excess(upward, runs, model)
     own = model.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
-    return replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
+    out = replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
+    return replace(
+        out, settling=find_settling_bias(upward, runs, up, float(np.median(np.linalg.norm(mean[:, :3], axis=1))))
+    )
 
 
 def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_]) -> FloatArray:

@@ -18,7 +18,7 @@ from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
-from trihedron.segment.judge import judge_log, judge_runs, without_cut
+from trihedron.segment.judge import judge_bias, judge_log, judge_runs, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.range_ends import range_ends
@@ -157,6 +157,7 @@ def _describe(
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
+    found += judge_bias(means)
     return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 

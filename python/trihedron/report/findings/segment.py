@@ -13,6 +13,15 @@ ENTRIES = {
         numbers=("worst_pose",),
         or_severity=SERIOUS,
     ),
+    (Code.BIAS_SETTLING, "", WARNING): Words(
+        "The accelerometer's bias settles after every move: at its end X, Y, Z are {x_mg:.2f}, {y_mg:.2f}, {z_mg:.2f} "
+        "mg (each ± {sigma_mg:.2f}) off, with a time constant of about {tau_s:.1f} s; on average over the poses "
+        "{mean_mg:.2f} mg.",
+        "The package or its adhesive creeps after a change of load, or the motion warmed the sensor.",
+        "Wait about {wait_s:.0f} s after every move before a pose counts.",
+        numbers=("p_value",),
+        or_severity=SERIOUS,
+    ),
     (Code.POSE_DISTURBED, "", NOTE): Words(
         "{disturbances:# short disturbance} in {poses:# otherwise static pose} (pose {which:first 8}), "
         "{left_out_s:.1f} s in all, the first at {first_s:.1f} s, excluded from the means.",
