@@ -49,6 +49,7 @@ def signals(context: Context) -> list[Signal]:
     out = [
         *_each("accelerometer", HISTORY, history), *_each("accelerometer", "temperature", warming),
         *_each("accelerometer", "force", products), *_each("accelerometer", "rate", rates, is_motion=True),
+        *_each("accelerometer", "rate products", [("|w|^2", (w**2).sum(axis=0), "(rad/s)^2")], is_motion=True),
     ]  # fmt: skip
     if context.obs.raw_rate is not None:
         own = [(f"u_{AXES[a]}^2", u[a] ** 2, "g^2") for a in range(3)]
