@@ -24,6 +24,7 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
+from trihedron.records.words import words
 from trihedron.session.model import misfits
 
 HEADLINE = 0.5
@@ -201,11 +202,12 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
     found, out = answer.found, dict(answer.tested)
     out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in out}
     for key, one in found.tried.items():
-        out[key] = _candidate(one, found.against.get(key))
+        out[key] = _candidate(one, found.against.get(key), words("held-out-worse") if key in found.dropped else "")
     for key, bias in answer.asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
-            out[key] = Candidate(key, bias.p_value, True, "", bias.score, bias.parameters, float(np.max(limit)))
+            reason = words("within-flicker") if bias.score > 0.0 and not bias.is_large else ""
+            out[key] = Candidate(key, bias.p_value, True, reason, bias.score, bias.parameters, float(np.max(limit)))
     for k, term in enumerate(found.model.terms):
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)
@@ -213,10 +215,10 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
     return tuple(out[key] for key in sorted(out))
 
 
-def _candidate(one: Tried, against: str | None) -> Candidate:
+def _candidate(one: Tried, against: str | None, reason: str) -> Candidate:
     term, asked = one.term, one.asked
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
     # A parameter reported in another unit (an angle for a direction) has no upper limit here.
     linear = [p for p in size if p.name in term.variant.names and p.unit == size[0].unit]
     limit = max((abs(p.value) + NORMAL_95 * p.std for p in linear), default=None)
-    return Candidate(term.effect.id, one.p_value, True, "", one.score, size, limit, against)
+    return Candidate(term.effect.id, one.p_value, True, reason, one.score, size, limit, against)

@@ -117,14 +117,12 @@ def _flicker(model: Hypothesis) -> FloatArray:
 
 
 def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
-    """Rms of the bias about its mean over the poses, in standard errors of a pose mean."""
+    """Rms of the bias about its mean over the poses, in standard errors of a pose mean, largest axis."""
     sensor = effect.sensor
     if not effect.walks:
         return float(max(_scatter(model, sensor)))
     unit = model.obs.scatter_unit()[sensor] * model.context.si_per_raw(sensor)
-    return (
-        float(np.sqrt(np.mean(model.fitted.bias(sensor).var(axis=0)) / np.mean(unit**2))) if model.obs.n_poses else 0.0
-    )
+    return float(np.max(model.fitted.bias(sensor).std(axis=0) / unit)) if model.obs.n_poses else 0.0
 
 
 def _scatter(model: Hypothesis, sensor: int) -> tuple[float, ...]:

@@ -36,8 +36,9 @@ class Found:
     """Result of the search.
 
     By id: ``tried`` candidates beside the final hypothesis, ``against`` what took the place of those once above the
-    threshold, ``missing`` why others do not apply. Per term: ``gains`` twice the log-evidence, ``scores`` the gain less
-    its penalty, ``without`` the final hypothesis without it, ``rivals`` effects that explain as much.
+    threshold, ``missing`` why others do not apply, ``dropped`` those that lower no held-out rms. Per term: ``gains``
+    twice the log-evidence, ``scores`` the gain less its penalty, ``without`` the final hypothesis without it,
+    ``rivals`` effects that explain as much.
     """
 
     model: Hypothesis
@@ -46,6 +47,7 @@ class Found:
     tried: dict[str, Tried] = field(default_factory=dict)
     against: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
+    dropped: frozenset[str] = frozenset()
     gains: tuple[float, ...] = ()
     without: tuple[Hypothesis, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
@@ -152,6 +154,7 @@ def _concluded(state: _State, alpha: float) -> Found:
     return Found(
         model, beside, beside_it,
         {key: other for key, other in state.against.items() if other in held and key not in held}, missing,
+        frozenset(state.dropped),
         tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
         tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
     )  # fmt: skip

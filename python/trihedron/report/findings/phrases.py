@@ -91,6 +91,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # the text of an exception, a finding or an effect as a clause of another sentence
         "because": "{sentence:clause}",
         "quoted": "{sentence}",
+        # why a candidate was not accepted
+        "held-out-worse": "predicts held-out poses and moves no better",
+        "within-flicker": "no larger than 1/f noise that poses do not show",
         # why an effect was not compensated
         "effect-unknown": "this version does not know it",
         "effect-of-session": "it belongs to that session, not to the sensor",
