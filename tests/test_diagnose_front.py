@@ -202,11 +202,13 @@ def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign():
     )
 
 
-def test_a_bent_accelerometer_is_no_loss_of_samples_once_its_effect_is_found():
+def test_a_bent_accelerometer_is_bent_no_more_once_its_effect_is_found():
     recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
     bent = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    assert FindingCode.LOSSES_POSSIBLE in {one.code for one in bent.calibration.findings}
-    assert trihedron.extend(bent).is_trustworthy
+    extended = trihedron.extend(bent)
+    said = [{one.code for one in result.calibration.findings} for result in (bent, extended)]
+    assert [FindingCode.NONLINEAR_RESIDUAL in codes for codes in said] == [True, False]
+    assert extended.is_trustworthy
 
 
 def test_a_warning_of_the_linear_fit_is_gone_once_the_effects_explain_the_domain_it_is_about():

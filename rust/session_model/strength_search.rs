@@ -40,12 +40,12 @@ const SCATTER: (f64, f64) = (-6.9, 9.2);
 /// by √2/2 (0.7), a third bias by √(3/2): no departure is larger.
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (-4.6, 9.2);
-/// Standard deviation of the logarithm of an excess below one: the motion faster than the samples is extrapolated, to a
-/// factor of three.
+/// Standard deviation of the logarithm of an excess: the motion faster than the samples is extrapolated, to a factor of
+/// three.
 const EXTRAPOLATED: f64 = 1.1;
 /// Rows with this excess have no weight, and keep none: a search leaves it as given.
 const NO_WEIGHT: f64 = 6.9;
-/// Scatter, or excess of moves, at which a search from nothing begins: near nothing the evidence is flat.
+/// Scatter at which a search from nothing begins: near nothing the evidence is flat.
 const FROM_NOTHING: [f64; 2] = [1.0, 6.0];
 /// Corner time and scatter by which a walk and a scatter are exchanged for one another: a drifting bias may be either,
 /// and the evidence has an optimum at both.
@@ -154,9 +154,9 @@ impl<'a> Search<'a> {
         let Some((_, weighted_rows)) = &self.weighted_rows else {
             return f64::NEG_INFINITY;
         };
-        let less = x[EXCESS_AT..].iter().map(|e| e.min(0.0).powi(2));
+        let away = x[EXCESS_AT..].iter().map(|e| e.powi(2));
         self.hypothesis.beside(&strengths, weighted_rows)
-            - 0.5 * less.sum::<f64>() / EXTRAPOLATED.powi(2)
+            - 0.5 * away.sum::<f64>() / EXTRAPOLATED.powi(2)
     }
 
     fn is_free(&self, i: usize) -> bool {
@@ -234,12 +234,11 @@ impl<'a> Search<'a> {
 
     /// Whether strengths are so small that the evidence is flat there.
     fn is_nothing(&self, direction: &Range<usize>) -> bool {
-        let nothing = match direction.start {
-            SCATTER_AT..BETWEEN_AT => LEAST_SCATTER.ln(),
-            EXCESS_AT.. => LAST_STEP,
-            _ => return false,
-        };
-        self.x[direction.clone()].iter().all(|x| *x < nothing)
+        let is_scatter = (SCATTER_AT..BETWEEN_AT).contains(&direction.start);
+        is_scatter
+            && self.x[direction.clone()]
+                .iter()
+                .all(|x| *x < LEAST_SCATTER.ln())
     }
 
     /// Whether a step from nothing gains.
@@ -255,26 +254,8 @@ impl<'a> Search<'a> {
     /// A step either way, doubled while it gains; otherwise the maximum of a parabola.
     fn along(&mut self, direction: &Range<usize>, step: &mut f64) {
         if self.is_nothing(direction) && !self.rises(direction) {
-            if direction.start >= EXCESS_AT {
-                self.below_one(direction, step);
-            }
             return;
         }
-        self.step_along(direction, step);
-    }
-
-    /// Less of the motion faster than the samples. An excess that a large step from nothing does not show is none: small
-    /// ones follow the chance of a few moves.
-    fn below_one(&mut self, direction: &Range<usize>, step: &mut f64) {
-        let bounds = self.bounds;
-        for i in direction.clone() {
-            self.bounds[i].1 = 0.0;
-        }
-        self.step_along(direction, step);
-        self.bounds = bounds;
-    }
-
-    fn step_along(&mut self, direction: &Range<usize>, step: &mut f64) {
         let (here, i) = (self.x, direction.start);
         let (down, up) = (self.moved(direction, -*step), self.moved(direction, *step));
         let mut value_of = |x: &Point| {

@@ -69,16 +69,14 @@ def _with_time_constant(
     if n < FEWEST_POSES:
         return None
     settles, drifts = ((up * column[:, None])[used] for column in (length, slope))
+    noise = float(np.sqrt(_squares_beside(reading[used], settles) / dof))
+    if noise <= 0.0 or np.linalg.matrix_rank(settles) < 3:
+        return None
     lasts_s = (runs[-1].last - runs[0].first) * upward.step_s
     drift_size = TYPICAL[0] / STANDARD_GRAVITY_M_S2 * gravity / lasts_s
-    noise = _rms_beside(reading[used], settles, dof)
-    if noise <= 0.0:
-        return None
-    # Drift with its prior as three more rows.
+    # The drift's prior is three more rows.
     rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift_size * np.eye(3)])])
     y = np.append(reading[used], np.zeros(3))
-    if np.linalg.matrix_rank(settles) < 3:
-        return None
     left, without = (_squares_beside(y, columns) for columns in (rows, rows[:, 3:]))
     size = np.linalg.lstsq(rows, y, rcond=None)[0][:3]
     sigma = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[:3] * left / dof)
@@ -88,7 +86,3 @@ def _with_time_constant(
 
 def _squares_beside(y: FloatArray, columns: FloatArray) -> float:
     return float(((y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0]) ** 2).sum())
-
-
-def _rms_beside(y: FloatArray, columns: FloatArray, dof: int) -> float:
-    return float(np.sqrt(_squares_beside(y, columns) / dof))

@@ -184,6 +184,8 @@ def is_asked_for_losses(
 ) -> bool:
     """Whether losses may cause the tilt errors: those of moves in use exceed noise (at a higher p where moves were
     excluded), or those of excluded moves have the size of whole samples."""
-    dof, chance = solution.moves_dof, DOUBTFUL if outliers else CERTAIN
+    # Moves that are widened lean less on the fit, but the nine elements of S are determined by them all the same.
+    dof = min(solution.moves_dof, 2.0 * len(solution.observed.before) - 9.0)
+    chance = DOUBTFUL if outliers else CERTAIN
     is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
     return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)
