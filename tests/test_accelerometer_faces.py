@@ -112,19 +112,3 @@ def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_calle
     assert FindingCode.LEFT_HANDED not in codes(silent)
     _, findings = calibrate_faces(face_readings(SIX, 1e-3, 5) / 9.80665, 1e-4, G, raw_unit="m/s^2")
     assert FindingCode.SCALE_NOT_NOMINAL in codes(findings)
-
-
-@pytest.mark.parametrize(
-    ("means", "sigma", "gravity", "words"),
-    [
-        (np.zeros((6, 2)), 1e-3, G, r"shape \(n, 3\)"),
-        (np.full((6, 3), np.nan), 1e-3, G, "pose 0 is not finite"),
-        (np.eye(3), np.zeros(3), G, "positive"),
-        (np.eye(3), np.ones((2, 3)), G, "shape"),
-        (np.eye(3), 1e-3, 0.981, "m/s²"),
-        (np.zeros((0, 3)), 1e-3, G, "no pose was found"),
-    ],
-)
-def test_malformed_questions_are_answered_in_words(means, sigma, gravity, words):
-    with pytest.raises(ValueError, match=words):
-        calibrate_faces(means, sigma, gravity)

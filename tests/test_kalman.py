@@ -9,9 +9,10 @@ from scipy import stats
 from trihedron import _core
 from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.per_axis import calibrate_with_references
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
+from trihedron.records import AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
     ARTICLE_CONSTANTS,
+    DIVIDING_HEAD_ANGLES_DEG,
     GRAVITY,
     covariance_of_pose_means,
     generalised_least_squares,

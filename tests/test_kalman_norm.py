@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 from trihedron import _core
 from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.norm_invariant import NormFilter, calibrate_without_references, start_from_range
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
-from twins_kalman import normalised_error_squared
+from trihedron.records import AxisNoise
+from twins_kalman import DIVIDING_HEAD_ANGLES_DEG, normalised_error_squared
 
 GRAVITY = 9.80665
 S_TRUE = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])

@@ -15,10 +15,10 @@ from trihedron.estimate.kalman.session import (
     pose_readings,
 )
 from trihedron.read import ReadError, read_pose_table
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
+from trihedron.records import AxisNoise, FindingCode, PoseTable
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, NoiseTerms, Scenario, dividing_head, simulate
-from twins_kalman import normalised_error_squared
+from twins_kalman import DIVIDING_HEAD_ANGLES_DEG, normalised_error_squared
 
 GRAVITY = 9.80665
 S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.99]])
