@@ -16,18 +16,17 @@ from matplotlib.figure import Figure
 import trihedron
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.report.in_python import in_python
-from trihedron.simulate import hand_session, scenario_by_name
+from written_session import usual
 
 
 @pytest.fixture(scope="module")
 def recording():
-    motion = hand_session(n_poses=24, pose_s=2.0, first_pose_s=4.0)
-    return trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
+    return usual()[0]
 
 
 @pytest.fixture(scope="module")
-def result(recording):
-    return trihedron.calibrate(recording, latitude_deg=60.0)
+def result():
+    return usual()[1]
 
 
 def test_import_loads_neither_numpy_nor_anything_else_heavy():
@@ -133,11 +132,11 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
 SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
-def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(
-    recording, result, tmp_path, monkeypatch
-):
+def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(tmp_path, monkeypatch):
     """Examples name a recording and its calibration as a reader has them."""
     monkeypatch.chdir(tmp_path)
+    recording = trihedron.simulate("hand-session", 3)[0]
+    result = trihedron.calibrate(recording, latitude_deg=60.0)
     run = doctest.DocTestRunner()
     for name in trihedron.__all__:
         verb = getattr(trihedron, name)

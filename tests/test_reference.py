@@ -209,7 +209,7 @@ def test_a_simulation_moved_as_the_log_was_is_a_model_first_and_a_reference_besi
 
 
 def test_attitudes_from_world_to_body_are_read_so_and_it_is_said():
-    trial = tracked(3, seconds=15)
+    trial = tracked(3, seconds=12)
     turned = replace(trial.motion, attitude=np.swapaxes(trial.motion.attitude, 1, 2).copy())
     found = fit_reference(trial.log, turned, G)
     assert any(f.code is FindingCode.REFERENCE_TURNED_ROUND for f in found.findings)
@@ -283,8 +283,8 @@ def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_sam
 
 
 def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own(posed, found):
-    # The unit of this seed again, for twelve seconds: by itself it shows less than the first.
-    more = tracked(3, seconds=12)
+    # The unit of this seed again, for nine seconds: by itself it shows less than the first.
+    more = tracked(3, seconds=9)
     result = trihedron.calibrate_references(
         [posed.log, more.log], [posed.motion, more.motion], gravity_m_s2=G, frame="case"
     )
