@@ -164,3 +164,19 @@ def test_the_tail_of_a_hidden_tilt_has_the_freedom_of_its_headings():
     assert np.log2(share[1] / share[0]) == pytest.approx(3.0, abs=0.3)
     assert widened(6, 6) == pytest.approx(3.182 / 1.96, rel=1e-3)
     assert widened(42, 40) == pytest.approx(widened(37, 100), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("means", "sigma", "gravity", "words"),
+    [
+        (np.zeros((6, 2)), 1e-3, G, r"shape \(n, 3\)"),
+        (np.full((6, 3), np.nan), 1e-3, G, "pose 0 is not finite"),
+        (np.eye(3), np.zeros(3), G, "positive"),
+        (np.eye(3), np.ones((2, 3)), G, "shape"),
+        (np.eye(3), 1e-3, 0.981, "m/s²"),
+        (np.zeros((0, 3)), 1e-3, G, "no pose was found"),
+    ],
+)
+def test_malformed_questions_are_answered_in_words(means, sigma, gravity, words):
+    with pytest.raises(ValueError, match=words):
+        calibrate_faces(means, sigma, gravity)

@@ -99,6 +99,8 @@ def test_arrays_make_an_audited_recording_in_their_units():
 @pytest.mark.parametrize(
     ("data", "complaint"),
     [
+        (3, "takes a file name, an array .*got int"),
+        (np.zeros((4, 4, 4)), r"got shape \(4, 4, 4\)"),
         (np.array(["a", "b"]), "got shape"),
         (np.array([["a", "b"]]), "contains numbers, got dtype"),
         ({"t": np.arange(5), "ax": np.arange(4)}, "differ in length"),
