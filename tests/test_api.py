@@ -16,18 +16,17 @@ from matplotlib.figure import Figure
 import trihedron
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.report.in_python import in_python
-from trihedron.simulate import hand_session, scenario_by_name
+from written_session import usual
 
 
 @pytest.fixture(scope="module")
 def recording():
-    motion = hand_session(n_poses=24, pose_s=2.0, first_pose_s=4.0)
-    return trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
+    return usual()[0]
 
 
 @pytest.fixture(scope="module")
-def result(recording):
-    return trihedron.calibrate(recording, latitude_deg=60.0)
+def result():
+    return usual()[1]
 
 
 def test_import_loads_neither_numpy_nor_anything_else_heavy():

@@ -17,14 +17,12 @@ from trihedron.files.calibration import (
     write_calibration,
 )
 from trihedron.records.frozen import thawed
-from trihedron.simulate import hand_session, scenario_by_name, simulate
+from written_session import usual
 
 
 @pytest.fixture(scope="module")
 def session():
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=14, first_pose_s=5.0))
-    recording, truth = simulate(scenario, seed=7)
-    return recording, calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+    return usual()[:2]
 
 
 def same(a, b):

@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from hand_made_sessions import Instrument, recorded
+from test_streaming import COLUMNS, opened, path, whole
 from trihedron import _core
 from trihedron.api import identifying, streaming
 from trihedron.cli import main
@@ -15,7 +15,7 @@ from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.files import checkpoint as kept_file
 from trihedron.files.checkpoint import Checkpoint
 
-COLUMNS = "ax,ay,az,gx,gy,gz"
+__all__ = ["path", "whole"]
 
 
 class Stopped(Exception):
@@ -26,18 +26,6 @@ class Stopped(Exception):
 def keep_after_every_piece(monkeypatch):
     monkeypatch.setattr(kept_file, "EVERY_S", 0.0)
     monkeypatch.setattr(Checkpoint.__init__, "__defaults__", (0.0,))
-
-
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    whole = recorded(Instrument(), 5, rate_hz=100.0)
-    out = tmp_path_factory.mktemp("long") / "log.npy"
-    np.save(out, np.hstack([whole.accelerometer, whole.gyroscope]))
-    return out
-
-
-def opened(path, rate_hz=100.0):
-    return streaming.log_on_disk(path, columns=COLUMNS, rate_hz=rate_hz)
 
 
 def stop_after(monkeypatch, times):

@@ -10,7 +10,7 @@ from trihedron.cli import main
 from trihedron.cli.options import signs
 from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose
-from written_session import G, log_text, recording, rejected, rejected_only, session, simulated
+from written_session import G, log_text, recording, rejected, session, simulated
 
 __all__ = ["recording", "session"]
 
@@ -48,16 +48,6 @@ def test_a_gyro_that_is_missing_from_every_third_row_leaves_the_accelerometer(tm
 
 def test_signs_of_axes_are_taken_in_their_order():
     assert signs("--axis-signs", "-+-") == [-1, 1, -1]
-
-
-@pytest.mark.parametrize("content", [b"", b"dear diary\n" * 50, b"\x89PNG\r\n\x1a\n" + b"\x00" * 100])
-def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(tmp_path, capsys, content):
-    log = tmp_path / "bad.csv"
-    log.write_bytes(content)
-    for command in ("check", "calibrate"):
-        said = rejected_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
-        assert "bad.csv" in said
-    assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
 
 
 def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):

@@ -3,15 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 import trihedron
 from small_session import G, made_once
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-
-GOOD = 'name = "mine"\nprofile = "mpu"\n[session]\nkind = "hand"\n[gyroscope]\nb = [0.0, 0.0, 0.0]\n'
 
 
 def rejected(given, capsys):
@@ -21,22 +18,6 @@ def rejected(given, capsys):
     said = capsys.readouterr().err.strip()
     assert "Traceback" not in said
     return " ".join(said.split())
-
-
-@pytest.mark.parametrize(
-    ("wrong", "place", "remedy"),
-    [
-        (GOOD.replace("profile", "profil"), "mine.toml: the file has no key 'profil'", "is 'profile' meant?"),
-        (GOOD.replace('"mpu"', '"mpu'), "mine.toml: this is not a TOML file", "line 2"),
-        (GOOD + '[[effect]]\nid = "accel-quadratic"\nk3 = 1.0\n', "effect accel-quadratic", "'k3'"),
-    ],
-)
-def test_a_scenario_with_a_typing_error_is_refused_with_its_place(tmp_path, capsys, wrong, place, remedy):
-    given = tmp_path / "mine.toml"
-    given.write_text(wrong)
-    said = rejected(given, capsys)
-    assert place in said
-    assert remedy in said
 
 
 def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):

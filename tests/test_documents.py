@@ -147,6 +147,7 @@ LOOK = """() => {
 }"""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 @pytest.mark.skipif(find_spec("playwright") is None, reason="playwright is not installed (extra test)")
 @pytest.mark.filterwarnings("default")

@@ -1,9 +1,16 @@
 """Effects as curves over the variable that drives them, found from their columns, with what poses show beside them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from diagnosed_session import diagnosed
+from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
+from trihedron.diagnose.effects.thermal import GyroThermalBias
+from trihedron.diagnose.session.state import NO_DISTORTION
+from trihedron.gravity import EARTH_RATE_RAD_S
 
 G = 9.80665
 
@@ -43,3 +50,73 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         # Three standard normal numbers: 4 sigma is passed by chance once in 5000 runs.
         assert np.max(np.abs(z)) < 4.0
         assert effect.held_out[0].chi2_per_dof_after < 1.3 < effect.held_out[0].chi2_per_dof_before
+
+
+def variants(temperature, rate, n_poses=10):
+    obs = SimpleNamespace(n_poses=n_poses)
+    log = SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=obs, on_gyros=on_axes)
+    return GyroThermalBias().variants(log)
+
+
+def on_axes(values):
+    return np.eye(3)[None] * values[:, None, :]
+
+
+@pytest.mark.parametrize(
+    ("rate", "n_poses", "labels"),
+    [
+        (np.full(50, 0.01), 10, ["linear", "quadratic"]),
+        (np.linspace(0.02, 0.001, 50), 10, ["linear", "quadratic", "rate"]),
+        (np.repeat([0.04, -0.04], 25), 10, ["linear", "quadratic", "rate", "hysteresis"]),
+        # Subtracted from another log, every shape exists.
+        (np.full(50, 0.01), 0, ["linear", "quadratic", "rate", "hysteresis"]),
+    ],
+)
+def test_a_rate_or_a_branch_is_offered_only_where_temperature_shows_one(rate, n_poses, labels):
+    assert [one.label for one in variants(np.linspace(-10.0, 10.0, 50), rate, n_poses)] == labels
+
+
+def test_the_gap_between_branches_is_twice_the_parameter():
+    t = np.r_[np.linspace(0, 20, 40), np.linspace(20, 0, 40)] - 10.0
+    made = variants(t, np.repeat([0.04, -0.04], 40))[3]
+    values = made.distortion.rate @ np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(values[0], [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(values[0] - values[-1], [2.0, 4.0, 6.0])
+
+
+def turning(latitude, azimuth):
+    level = np.cos(latitude)
+    return EARTH_RATE_RAD_S * np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(latitude)])
+
+
+@pytest.mark.parametrize("sigma", [(1e-8, 1e-8, 1e-8), (2e-6, 2e-6, 5e-6), (8e-6, 8e-6, 1e-3)])
+def test_errors_of_latitude_and_north_are_those_they_say(sigma):
+    rng = np.random.default_rng(4)
+    z = []
+    for _ in range(60):
+        latitude, azimuth = rng.uniform(0.25, 1.0), rng.uniform(-3.0, 3.0)
+        near = nearest_turning(turning(latitude, azimuth) + sigma * rng.normal(size=3), np.diag(np.square(sigma)))
+        # With the vertical part unknown the hemisphere is a guess.
+        z.append([
+            (abs(near.latitude) - latitude) / near.latitude_std,
+            np.angle(np.exp(1j * (near.azimuth - azimuth))) / near.azimuth_std,
+        ])  # fmt: skip
+    # 120 draws, two sigma: 95.4 % expected, 88 % four standard deviations below.
+    assert np.mean(np.abs(z) < 2.0) > 0.88
+
+
+def test_a_vector_that_is_not_the_earths_is_not_called_so():
+    effect, sigma = EarthRate(), np.diag(np.square([3e-6, 3e-6, 3e-6]))
+
+    at_home, here = Variant(NO_DISTORTION, ("x", "y", "z"), ("rad/s",) * 3), np.radians(35.0)
+    assert effect.is_plausible(at_home, turning(here, 1.0), sigma)
+    assert effect.is_plausible(at_home, turning(-here, 1.0), sigma)
+    assert not effect.is_plausible(at_home, 2.0 * turning(here, 1.0), sigma)
+    assert not effect.is_plausible(at_home, 0.5 * turning(here, 1.0), sigma)
+
+
+def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_one():
+    value = turning(np.radians(35.0), 2.0) + np.array([0.0, 0.0, 8e-4])
+    near = nearest_turning(value, np.diag(np.square([5e-6, 5e-6, 8e-4])))
+    assert abs(np.degrees(near.latitude)) == pytest.approx(35.0, abs=3.0 * np.degrees(near.latitude_std))
+    assert np.degrees(near.latitude_std) < 15.0

@@ -75,6 +75,7 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
     assert not any(p.remark for p in found.parameters if p.id.endswith("bias"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_simulations")
 def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
     _, recording = clipped

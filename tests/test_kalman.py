@@ -9,9 +9,10 @@ from scipy import stats
 from trihedron import _core
 from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.per_axis import calibrate_with_references
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
+from trihedron.records import AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
     ARTICLE_CONSTANTS,
+    DIVIDING_HEAD_ANGLES_DEG,
     GRAVITY,
     covariance_of_pose_means,
     generalised_least_squares,
@@ -161,17 +162,17 @@ ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SI
 
 def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars():
     nees, z = [], []
-    for seed in range(40):
+    for seed in range(20):
         table, readings, start, pose = article_readings(seed, ARTICLE_MIX)
         result = calibrate_with_references(readings, table, ARTICLE_MIX, start_s=start, pose_s=pose, raw_unit="V")
         for axis in result.axes:
             error = axis.constants - ARTICLE_CONSTANTS[axis.axis]
             nees.append(normalised_error_squared(error, axis.covariance))
             z.append(error / axis.sigma)
-    # 120 independent draws of chi-square with 4 degrees of freedom; two-sided 99.9 % limits of their sum.
+    # 60 independent draws of chi-square with 4 degrees of freedom; two-sided 99.9 % limits of their sum.
     low, high = stats.chi2.ppf([0.0005, 0.9995], 4 * len(nees))
     assert low < np.sum(nees) < high
-    # Largest of 480 standard normals: beyond 4.8 once in 1300 such tests.
+    # Largest of 240 standard normals: beyond 4.8 once in 2600 such tests.
     assert np.max(np.abs(z)) < 4.8
 
 

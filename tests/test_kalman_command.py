@@ -10,7 +10,6 @@ import trihedron
 from trihedron.cli import main
 from trihedron.estimate.kalman.identified import noise_from_identified
 from trihedron.read import ReadError, read_axis_noise
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG
 from trihedron.simulate import (
     Accelerometer,
     Clock,
@@ -21,6 +20,7 @@ from trihedron.simulate import (
     scenario_by_name,
     simulate,
 )
+from twins_kalman import DIVIDING_HEAD_ANGLES_DEG
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)

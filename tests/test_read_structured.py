@@ -1,13 +1,15 @@
-"""Logs that are no table of named columns: JSON, labels in front of readings, messages, folders, names of words."""
+"""Logs laid out as makers' programs write them, and logs that are no table: JSON, labels, messages, folders."""
 
 import json
 
 import numpy as np
 import pytest
 
+from formats.table import LAYOUTS, read_layout, verdict
 from makers.structured import documents, drive
 from test_read_in_silence import motion, table
 from trihedron.read import ReadError, read_recording
+from trihedron.records import Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 
@@ -115,3 +117,11 @@ def test_long_rows_of_whole_numbers_beside_another_cell_are_judged_at_once(tmp_p
     (tmp_path / "log.txt").write_text("\n".join([row] * 20) + "\n")
     with pytest.raises(ReadError):
         read_recording(tmp_path / "log.txt")
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_log_of_this_maker_is_read_as_it_was_written(tmp_path, name):
+    made = LAYOUTS[name]()
+    recording = read_layout(made, tmp_path)
+    assert verdict(made, recording) == "as written"
+    assert not [f for f in recording.findings if f.severity is Severity.SERIOUS]

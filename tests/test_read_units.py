@@ -1,13 +1,15 @@
-"""Units and column order recognised by what the readings can only be, and said to be a guess where they are one."""
+"""Column names, units and the order of columns: by what names mean, and by what the readings can only be."""
 
 import math
 
 import numpy as np
 import pytest
 
+import trihedron
 from test_read import HEADER, codes, finding, write
 from trihedron.channel_facts.quiet import is_integer
 from trihedron.read import read_recording
+from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -135,3 +137,109 @@ def test_whole_numbers_are_told_wherever_the_one_that_is_none_stands():
                 changed[row, 1] = odd
                 assert is_integer(changed) is whole
     assert not is_integer(np.full((5000, 3), np.nan))
+
+
+# Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two
+# code points for a micro.
+MEANINGS = {
+    (
+        "accelerometer",
+        "x",
+        "",
+    ): "ax | acc_x | Acc_X | AccX | linear_acceleration.x | ACCEL_XOUT | AcX | уск_x | Уск_Х | accélération_x",
+    ("accelerometer", "y", ""): "fy",
+    ("accelerometer", "z", ""): "accel_z",
+    ("accelerometer", "x", "counts"): "ax_adc",
+    ("accelerometer", "x", "g"): "ax_g | accelerometerAccelerationX(G) | Beschl. X [g] | 加速度X(g) | X轴加速度（g）",
+    ("accelerometer", "x", "mg"): "acc_x (mg)",
+    ("accelerometer", "0", "m/s^2"): "accelerometer_m_s2[0]",
+    ("accelerometer", "x", "m/s^2"): "Acceleration x (m/s^2) | ax [m/s²] | Acel X (m/s²)",
+    ("accelerometer", "z", "m/s^2"): "a_RS_S_z [m s^-2]",
+    ("gyroscope", "x", ""): "wx | gyro_x | gx_output | AngularVelocityX | GyX | girox | ωx",
+    ("gyroscope", "y", ""): "Gyr_Y | vitesse_angulaire_y | prędkość kątowa Y",
+    ("gyroscope", "z", ""): "gyr_z | field.angular_velocity.z | GYRO_ZOUT | угл_скорость_z",
+    ("gyroscope", "z", "counts"): "wz_adc",
+    ("gyroscope", "x", "deg/s"): "gx_dps | GyroX [deg/s] | gx [°/s]",
+    ("gyroscope", "y", "deg/s"): "гироскоп_Y (град/с)",
+    ("gyroscope", "z", "deg/s"): "Drehrate Z [°/s] | 角速度Z(°/s)",
+    ("gyroscope", "2", "rad/s"): "gyro_rad[2]",
+    ("gyroscope", "x", "rad/s"): "w_RS_S_x [rad s^-1] | gyroRotationX(rad/s) | omega x [rad s^-1]",
+    ("gyroscope", "y", "rad/s"): "Gyroscope y (rad/s)",
+    ("gyroscope", "z", "rad/s"): "Giro Z (rad/s)",
+    ("gyroscope", "z", "mrad/s"): "gyro_z (mrad/s)",
+    ("time", "", ""): "t | time | %time | время | temps | 时间",
+    ("time", "", "s"): "t_s | t_unix_s | Time (s) | seconds_elapsed",
+    ("time", "", "ms"): "time_ms | millis | время, мс | Tempo (ms)",
+    ("time", "", "us"): "t [µs] | t [\u03bcs]",
+    ("time", "", "ns"): "timestamp [ns] | Timestamp[nanosec]",
+    ("time", "", "100us"): "SampleTimeFine",
+    ("temperature", "", ""): "Temperature | imu_temperature | 温度(℃)",
+    ("supply", "", ""): "vdd | Supply Voltage",
+    ("counter", "", ""): "PacketCounter | n_samples | seq",
+    ("bare", "x", ""): "x",
+    ("", "x", ""): "угловое_ускорение_x | Winkelbeschleunigung x | 角度X(°) | скачок_x | \ufffd\ufffd\ufffd_x",
+}
+NAMES = [(name, meaning) for meaning, names in MEANINGS.items() for name in names.split(" | ")]
+
+
+@pytest.mark.parametrize(("name", "meaning"), NAMES, ids=[name for name, _ in NAMES])
+def test_a_column_is_recognised_with_its_role_axis_and_unit(name, meaning):
+    parsed = parse_name(name)
+    assert (parsed.role, parsed.axis, parsed.unit or parsed.time_unit) == meaning
+
+
+OTHERS = (
+    "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
+    "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
+)
+
+
+@pytest.mark.parametrize("name", ["", *OTHERS.split(" | ")])
+def test_what_is_neither_sensor_nor_time_is_not_taken_for_one(name):
+    assert parse_name(name).role == ""
+
+
+def test_units_of_other_columns_do_not_hide_their_role():
+    assert parse_name("temp_C").role == "temperature"
+    assert parse_name("Z (m/s^2)").role == "bare"
+
+
+def test_raw_readings_rank_above_corrected_ones():
+    assert parse_name("gx_measured").rank > parse_name("gx").rank > parse_name("gx_output").rank
+    assert parse_name("motionUserAccelerationX(G)").rank < parse_name("accelerometerAccelerationX(G)").rank
+
+
+def log_of(tmp_path, header, change=lambda row: row):
+    """A log of a static sensor under ``header``; ``change`` of the cells of a row."""
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((300, 6))
+    read = noise + np.array([0.1, 0.2, 9.8, 0.01, 0.02, -0.01])
+    rows = [change([f"{0.01 * k:.2f}", *(f"{value:.5f}" for value in row)]) for k, row in enumerate(read)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([header, *(",".join(row) for row in rows)]))
+    return log
+
+
+def test_a_unit_in_the_name_of_one_axis_is_that_of_all_three(tmp_path):
+    read = trihedron.read(log_of(tmp_path, "t [s],ax [m/s^2],ay,az,gx [deg/s],gy,gz"))
+    assert (read.accelerometer_unit.value, read.gyroscope_unit.value) == ("m/s^2", "deg/s")
+    read = trihedron.read(log_of(tmp_path, "t [s],ax,ay,az [m/s^2],gx,gy [deg/s],gz"))
+    assert (read.accelerometer_unit.value, read.gyroscope_unit.value) == ("m/s^2", "deg/s")
+
+
+def test_of_two_accelerometers_one_is_taken_and_the_columns_of_the_other_are_given(tmp_path):
+    header = "t,accel_a_x,accel_a_y,accel_a_z,accel_b_x,accel_b_y,accel_b_z,gx,gy,gz"
+    read = trihedron.read(log_of(tmp_path, header, lambda row: [*row[:4], *row[1:]]))
+    (found,) = [f for f in read.findings if "More than one triad" in f.seen]
+    assert "'accel_b_x' 'accel_b_y' 'accel_b_z' not used" in found.seen
+    assert "time=1,ax=5,ay=6,az=7,gx=8,gy=9,gz=10" in found.action
+
+
+def test_an_axis_without_numbers_is_named(tmp_path):
+    named = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    read = trihedron.read(log_of(tmp_path, named, lambda row: [*row[:2], "north", *row[3:]]))
+    assert read.accelerometer is None
+    words = next(one for one in read.findings if one.code is FindingCode.COLUMN_LEFT_OUT)
+    assert "'ay [m/s^2]' contains no numbers (such as north), so the accelerometer" in words.seen
+    assert words.severity is Severity.WARNING
+    with pytest.raises(trihedron.InputError, match=r"column 'ay' of the accelerometer contains no numbers"):
+        trihedron.read(log_of(tmp_path, "t,ax,ay,az", lambda row: [*row[:2], "north", row[3]]))

@@ -209,7 +209,7 @@ def test_a_simulation_moved_as_the_log_was_is_a_model_first_and_a_reference_besi
 
 
 def test_attitudes_from_world_to_body_are_read_so_and_it_is_said():
-    trial = tracked(3, seconds=15)
+    trial = tracked(3, seconds=12)
     turned = replace(trial.motion, attitude=np.swapaxes(trial.motion.attitude, 1, 2).copy())
     found = fit_reference(trial.log, turned, G)
     assert any(f.code is FindingCode.REFERENCE_TURNED_ROUND for f in found.findings)
@@ -264,10 +264,10 @@ def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
 
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():
     # Four fifths are static, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
-    trial = tracked(4, 30, sigma_deg=0.2, rest_s=12.0)
+    trial = tracked(4, 24, sigma_deg=0.2, rest_s=9.6)
     assert np.abs(z_of(fit_reference(trial.log, trial.motion, G), trial)).max() < 4.5
     with pytest.raises(ValueError, match="share no motion"):
-        fit_reference(trial.log, tracked(54, 30, sigma_deg=0.2, rest_s=12.0).motion, G)
+        fit_reference(trial.log, tracked(54, 24, sigma_deg=0.2, rest_s=9.6).motion, G)
 
 
 def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_samples_a_radian():
@@ -283,8 +283,8 @@ def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_sam
 
 
 def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own(posed, found):
-    # The unit of this seed again, for twelve seconds: by itself it shows less than the first.
-    more = tracked(3, seconds=12)
+    # The unit of this seed again, for nine seconds: by itself it shows less than the first.
+    more = tracked(3, seconds=9)
     result = trihedron.calibrate_references(
         [posed.log, more.log], [posed.motion, more.motion], gravity_m_s2=G, frame="case"
     )
@@ -298,7 +298,7 @@ def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own
 
 
 def test_an_attitude_that_the_gyro_itself_carried_is_not_independent(found):
-    other = neighbour(44, 30)
+    other = neighbour(44, 18)
     C, now = np.empty((len(other.time_s), 3, 3)), np.eye(3)
     for k, step in enumerate(rotation_from_vector(other.gyroscope[:-1] * np.diff(other.time_s)[:, None])):
         C[k] = now

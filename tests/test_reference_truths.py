@@ -28,6 +28,8 @@ def test_a_sound_truth_is_not_refused_for_the_filters_rounding():
     assert np.abs(z_of_bias(found, trial)).max() < 4.5
 
 
+# Beside a tracker at rest: tests/test_reference.py.
+@pytest.mark.slow
 def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
     # It leans into its acceleration: its accelerometer's parameters are not stated, and what its gyro feels still is.
     trial = truth(4, "drone", seconds=40, has_g_sensitivity=True, size_deg=0.1)

@@ -203,11 +203,11 @@ def test_a_forked_child_computes_what_its_parent_computes():
 
 # Thousands of cases: benches/fuzz.py.
 @pytest.mark.parametrize(
-    ("attack", "count"), [("inputs.Inputs", 100), ("formats.Formats", 120), ("commands.Commands", 8)]
+    ("attack", "count"), [("inputs.Inputs", 100), ("formats.Formats", 30), ("commands.Commands", 8)]
 )
 def test_mutated_files_and_command_lines_end_in_an_answer_or_a_sentence(attack, count):
-    for library in ("h5py", "rosbags", "pyulog", "pymavlink") if attack == "formats.Formats" else ():
-        pytest.importorskip(library)
+    for library in ("h5py", "rosbags") if attack == "formats.Formats" else ():
+        pytest.importorskip(library)  # its logs are made with these
     module, name = attack.split(".")
     # In a process of its own: one that has read a table before, as tests do, cannot fork and read.
     code = (

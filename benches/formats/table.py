@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.extend([str(Path(__file__).parents[2] / "tests"), str(Path(__file__).parents[1])])
 from makers import LAYOUTS, Layout
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording

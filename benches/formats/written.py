@@ -28,6 +28,10 @@ class Session:
     s_force: np.ndarray
     s_rate: np.ndarray
 
+    @property
+    def n(self) -> int:
+        return len(self.time_s)
+
 
 def session(rng: Rng, rate_hz: float, n_poses: int = 18) -> Session:
     """Poses of a hand-held part in all directions, turns of 60 to 150 degrees about level-ish axes between."""

@@ -19,18 +19,13 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.records.calibration import Calibration, Frame, SensorCalibration
+from trihedron.records.calibration import Calibration, Frame
 from trihedron.transforms import cross_matrix
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
     """Raw readings (n, 3) → truth (n, 3) in SI, ``S a' + b`` (eq. 1)."""
     return np.asarray(np.asarray(readings, dtype=np.float64) @ S.T + b, dtype=np.float64)
-
-
-def distort(truth: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
-    """Truth (n, 3) in SI → raw readings (n, 3), ``S⁻¹ (f - b)`` (eq. 2)."""
-    return np.asarray(np.linalg.solve(S, (np.asarray(truth, dtype=np.float64) - b).T).T, dtype=np.float64)
 
 
 def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -140,15 +135,6 @@ def _nearest_proper(q: FloatArray) -> FloatArray:
     wanted = np.sign(np.linalg.det(q))
     choices = [np.array(signs) for signs in product((1.0, -1.0), repeat=3) if np.prod(signs) == wanted]
     return max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
-
-
-def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibration:
-    """The same sensor in a frame rotated by a known R: ``S → R S``, ``b → R b``, covariance likewise."""
-    rotation = np.asarray(rotation, dtype=np.float64)
-    order = _columns_first()
-    jacobian = np.kron(np.eye(4), rotation)[np.ix_(order, order)]
-    covariance = jacobian @ sensor.covariance @ jacobian.T
-    return replace(sensor, S=rotation @ sensor.S, b=rotation @ sensor.b, covariance=covariance)
 
 
 def in_frame(calibration: Calibration, frame: Frame) -> Calibration:

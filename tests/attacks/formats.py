@@ -92,7 +92,7 @@ def _logs() -> Iterator[tuple[str, Log]]:
         yield f"{name}.json", Log({"": json.dumps(document).encode()})
     yield "lines.jsonl", Log({"": b"\n".join(json.dumps(row).encode() for row in read["rows"])})
     yield "log.ulg", Log({"": ecosystems.ulog(ecosystems.raw_topics(0, TABLE))})
-    yield "fifo.ulg", Log({"": ecosystems.ulog_of_batches(ecosystems.batches(0, TABLE))})
+    yield "fifo.ulg", Log({"": ecosystems.ulog(ecosystems.batches(0, TABLE)[0])})
     yield "flash.bin", Log({"": ecosystems.dataflash(1, TABLE)})
     oxts = structured.drive(TABLE[:40, 0], TABLE[:40, 1:4], TABLE[:40, 4:])
     yield "drive", Log({f"oxts/{place}": text.encode() for place, text in oxts.items()})

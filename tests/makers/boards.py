@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from makers.layout import COUNTS, SI, Layout, dates, layout, plain, written
-from makers.session import G, session
+from formats.layout import G
+from makers.layout import COUNTS, SI, Layout, dates, layout, plain, session, written
 
 
 @layout

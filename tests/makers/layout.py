@@ -12,7 +12,8 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from makers.session import Session
+from formats import written as known
+from formats.written import Session
 
 EPOCH = datetime(2024, 3, 1, 12, 0, 0)
 EPOCH_S = 1709294400.0
@@ -42,6 +43,11 @@ LAYOUTS: dict[str, Callable[[], Layout]] = {}
 def layout(make: Callable[[], Layout]) -> Callable[[], Layout]:
     LAYOUTS[make.__name__] = make
     return make
+
+
+def session(rate_hz: float, seed: int = 1) -> Session:
+    """Four poses and the turns between them, 18.5 s."""
+    return known.session(np.random.default_rng(seed), rate_hz, n_poses=4)
 
 
 def written(*columns: np.ndarray, separator: str = ",", end: str = "\n", form: str = "{!r}") -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from makers.layout import EPOCH_S, SI, Layout, dates, in_si, layout, nanoseconds, written
-from makers.session import G, session
+from formats.layout import G
+from makers.layout import EPOCH_S, SI, Layout, dates, in_si, layout, nanoseconds, session, written
 
 
 @layout

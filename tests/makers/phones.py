@@ -7,8 +7,8 @@ import zipfile
 
 import numpy as np
 
-from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, written
-from makers.session import G, session
+from formats.layout import G
+from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, session, written
 
 
 @layout
@@ -49,23 +49,22 @@ def _zip(members: dict[str, bytes]) -> bytes:
 @layout
 def phyphox_zip() -> Layout:
     """phyphox, several sensors, CSV (comma, decimal point) exported as .zip with meta/."""
-    acc, gyr = session(100, 1), session(100, 1, 0.0031)
+    s = session(100)
     members = {}
-    for name, quantity, unit, s, v in (
-        ("Accelerometer.csv", "Acceleration", "m/s^2", acc, acc.force),
-        ("Gyroscope.csv", "Gyroscope", "rad/s", gyr, gyr.rate),
+    for name, quantity, unit, late_s, v in (
+        ("Accelerometer.csv", "Acceleration", "m/s^2", 0.0, s.force),
+        ("Gyroscope.csv", "Gyroscope", "rad/s", 0.0031, s.rate),
     ):
         head = ",".join(['"Time (s)"', *(f'"{quantity} {x} ({unit})"' for x in "xyz")]) + "\n"
-        t = s.time_s + (0.0031 if s is gyr else 0.0)
-        members[name] = (head + written(t, *v.T, form="{:.9E}")).encode()
+        members[name] = (head + written(s.time_s + late_s, *v.T, form="{:.9E}")).encode()
     members["meta/device.csv"] = b'"property","value"\n"version","1.1.16"\n"deviceModel","Pixel 7"\n'
     members["meta/time.csv"] = (
         b'"event","experiment time","system time","system time text"\n'
         b'"START",0.000000000E0,1.709294400E9,"2024-03-01 12:00:00.000 UTC+00:00"\n'
     )
-    a = np.array([[float(f"{v:.9E}") for v in row] for row in acc.force])
+    a = np.array([[float(f"{v:.9E}") for v in row] for row in s.force])
     # The gyro starts 3.1 ms later: the first reading of the accelerometer has no partner and is reported.
-    return Layout("phyphox (zip)", {"phyphox.zip": _zip(members)}, 100, a[1:], None, SI, acc.n + gyr.n, {}, False, True)
+    return Layout("phyphox (zip)", {"phyphox.zip": _zip(members)}, 100, a[1:], None, SI, 2 * s.n, {}, False, True)
 
 
 @layout

@@ -12,12 +12,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, file_sha256, first_line
-from trihedron.read.table import StatedClock, Table
+from trihedron.read.table import Table
 from trihedron.records import Finding
 from trihedron.records.progress import Progress
 from trihedron.records.words import Words, words
-
-SECONDS = StatedClock(unit="s")
 
 
 @dataclass(frozen=True)

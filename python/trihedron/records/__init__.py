@@ -15,7 +15,6 @@ from trihedron.records.calibration import (
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.kalman import (
     CONSTANT_NAMES,
-    DIVIDING_HEAD_ANGLES_DEG,
     AxisKalmanResult,
     AxisNoise,
     Consistency,
@@ -42,7 +41,6 @@ from trihedron.records.verification import Verification
 
 __all__ = [
     "CONSTANT_NAMES",
-    "DIVIDING_HEAD_ANGLES_DEG",
     "PARAMETER_NAMES",
     "AllanCurve",
     "AxisKalmanResult",

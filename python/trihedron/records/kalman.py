@@ -50,17 +50,6 @@ class AxisNoise:
         return AxisNoise(**{k: v if k in times else factor * v for k, v in vars(self).items()})
 
 
-def _dividing_head() -> FloatArray:
-    roll, pitch = np.meshgrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 351.0, 10.0), indexing="ij")
-    angles: FloatArray = np.column_stack([pitch.ravel(), roll.ravel()])
-    angles.setflags(write=False)
-    return angles
-
-
-DIVIDING_HEAD_ANGLES_DEG: FloatArray = _dividing_head()
-"""(324, 2) pitch and roll of an optical dividing head: a full circle of pitch by 10° at each roll of 0, 10 … 80°."""
-
-
 @dataclass(frozen=True, eq=False)
 class PoseTable:
     """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.

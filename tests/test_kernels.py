@@ -1,0 +1,215 @@
+"""Kernels against slow counterparts: sums over ranges, lines, slopes, moves, and distributions."""
+
+import numpy as np
+import pytest
+from scipy import special
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from trihedron import _core, probability
+from trihedron.diagnose.session.state import smoothed_slope
+from trihedron.ranges import edges_of, ranges_of
+from trihedron.segment.noise import MeanNoise
+
+NOISE = MeanNoise(np.array([0.1, 0.2, 0.0]), np.array([1e-3, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))
+
+
+def test_means_over_ranges_pass_over_what_is_no_number():
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=(50, 4))
+    values[rng.random((50, 4)) < 0.1] = np.nan
+    values[30:35, 2] = np.nan
+    ranges, owner = np.array([[0, 10], [10, 10], [20, 30], [30, 35], [40, 50]]), np.array([1, 0, 1, 2, 4])
+    found = _core.column_means(values, ranges, owner, 5)
+    for k, rows in ((1, np.vstack([values[:10], values[20:30]])), (4, values[40:])):
+        # Twenty numbers in the order of the counterpart.
+        np.testing.assert_allclose(found[k], np.nanmean(rows, axis=0), rtol=1e-14)
+    assert np.isnan(found[[0, 3]]).all()
+    assert np.isnan(found[2]).tolist() == [False, False, True, False]
+    for wrong in ([[0, 51]], [[-1, 3]], [[3, 1]]):
+        with pytest.raises(ValueError, match="50 rows"):
+            _core.column_means(values, np.array(wrong), np.array([0]), 1)
+
+
+def test_moments_of_moves_are_trapezoids_over_the_rows_that_are_numbers():
+    rng = np.random.default_rng(7)
+    time = np.cumsum(rng.uniform(0.005, 0.02, 120))
+    reading, rate, zero = 3e4 + 1e3 * rng.normal(size=(120, 3)), rng.normal(size=(120, 3)), rng.normal(size=(4, 3))
+    reading[17], rate[[18, 55, 56, 58]] = np.nan, np.inf
+    S, b = rng.normal(size=(3, 3)), 1e4 * rng.normal(size=3)
+    moves = np.array([[0, 50], [54, 58], [60, 61], [60, 120]])
+    found = _core.move_moments(time, reading, S, b, rate, moves, zero)
+    for k in (0, 1, 3):
+        a, z = moves[k]
+        keep = a + np.flatnonzero(np.isfinite(reading[a:z]).all(axis=1) & np.isfinite(rate[a:z]).all(axis=1))
+        product = np.einsum("ni,nj->nij", reading[keep] @ S.T + b, rate[keep] - zero[k])
+        twin = np.trapezoid(product, time[keep], axis=0)
+        # Sixty products of one size.
+        np.testing.assert_allclose(found[k], twin, rtol=0.0, atol=1e-12 * np.abs(product).max())
+    assert found[2] is None
+
+
+def explained(t, x, f):
+    basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
+    return float(((basis @ np.linalg.lstsq(basis, x, rcond=None)[0]) ** 2).sum())
+
+
+@pytest.mark.parametrize("n", [3, 511, 512, 5000])
+def test_every_frequency_of_the_grid_is_plain_least_squares(n):
+    rng = np.random.default_rng(n)
+    # Uneven timestamps with a hole, far from zero: phases of thousands of turns.
+    t = 4000.0 + np.sort(rng.uniform(0.0, 20.0, n)) + np.where(np.arange(n) > n // 2, 7.0, 0.0)
+    x = np.sin(2 * np.pi * 3.1 * t) + rng.normal(size=n)
+    found = _core.sinusoid_power(t, np.repeat(x, 2)[::2], start_hz=2.9, step_hz=0.011, count=41)
+    plain = [explained(t, x, 2.9 + 0.011 * k) for k in range(41)]
+    # A phase of 10^4 turns is good to 10^-11 of a turn; three samples may see sine and cosine nearly alike.
+    assert np.abs(found - plain).max() < 1e-8 * (x @ x)
+
+
+def test_readings_need_as_many_times():
+    with pytest.raises(ValueError, match="5 readings need as many times"):
+        _core.sinusoid_power(np.zeros(4), np.zeros(5), start_hz=1.0, step_hz=0.1, count=3)
+
+
+def exact(values, time_s, width):
+    return np.gradient(gaussian_filter1d(values, max(width, 1.0), mode="nearest"), time_s)
+
+
+@pytest.mark.parametrize("width", [3.0, 40.0, 1003.7])
+def test_inside_it_is_the_slope_of_the_smoothed_signal(width):
+    rng = np.random.default_rng(int(width))
+    time = np.arange(20_000) / 100.0
+    # A temperature in tenths of a kelvin that warms, swings and is noisy.
+    values = np.round(
+        20.0 + 6.0 * (1.0 - np.exp(-time / 60.0)) + np.sin(time / 25.0) + rng.normal(0.0, 0.05, 20_000), 1
+    )
+    slope, asked = smoothed_slope(values, time, width), exact(values, time, width)
+    inside = slice(int(4 * width), len(time) - int(4 * width))
+    # Blocks of a tenth of the width: the width is wrong by 1/2400, the line between their middles by (1/10)²/8.
+    assert np.abs(slope - asked)[inside].max() < 0.02 * np.abs(asked).max()
+
+
+def test_a_straight_line_keeps_its_slope_between_uneven_stamps_across_pauses_and_to_the_ends():
+    width = 300.0
+    rng = np.random.default_rng(3)
+    step = rng.uniform(0.005, 0.015, 8000)
+    step[[700, 5000]] = 12.0
+    time = np.cumsum(step)
+    assert smoothed_slope(0.25 * time + 4.0, time, width) == pytest.approx(0.25, rel=1e-6)
+    # A signal shorter than a block has none.
+    assert not smoothed_slope(np.arange(5.0), np.arange(5) / 10.0, 100.0).any()
+
+
+def walked(mask):
+    out, first = [], None
+    for k, is_true in enumerate([*mask, False]):
+        if is_true and first is None:
+            first = k
+        if not is_true and first is not None:
+            out.append((first, k))
+            first = None
+    return out
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7, 300])
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.8, 1.0])
+def test_runs_are_those_of_a_walk_along_the_mask(n, share):
+    mask = np.random.default_rng(n).random(n) < share
+    assert ranges_of(mask) == walked(mask)
+    assert edges_of(mask).shape == (len(walked(mask)), 2)
+
+
+RNG = np.random.default_rng(20261)
+TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
+VALUES = np.cumsum(RNG.normal(size=(90, 3)), axis=0)
+MOVES = np.array([[5, 40], [40, 43], [50, 90]])
+
+
+def test_play_is_the_running_clip_of_its_definition():
+    follower, expected = VALUES[0].copy(), []
+    for row in VALUES:
+        follower = np.clip(follower, row - 0.7, row + 0.7)
+        expected.append((row - follower) / 0.7)
+    assert np.array_equal(_core.play(VALUES, 0.7), expected)
+
+
+def test_a_derivative_is_numpys_gradient_inside_every_move_and_nothing_outside():
+    expected = np.zeros_like(VALUES)
+    for a, b in MOVES:
+        expected[a:b] = np.gradient(VALUES[a:b], TIME[a:b], axis=0)
+    # The same sums in another order: a few roundings of values of a hundred.
+    assert np.abs(_core.move_derivative(TIME, VALUES, MOVES) - expected).max() < 1e-11
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 0.004, -0.013, 0.09, 3.0, -3.0])
+def test_a_shift_reads_the_clamped_spline_of_every_move(ahead_s):
+    expected = VALUES.copy()
+    for a, b in MOVES:
+        spline = CubicSpline(TIME[a:b], VALUES[a:b], bc_type="clamped")
+        expected[a:b] = spline(np.clip(TIME[a:b] + ahead_s, TIME[a], TIME[b - 1]))
+    assert np.abs(_core.move_shifted(TIME, VALUES, MOVES, ahead_s) - expected).max() < 1e-11
+
+
+def test_moves_beyond_the_values_are_refused():
+    with pytest.raises(ValueError, match="within 90 points"):
+        _core.move_derivative(TIME, VALUES, np.array([[80, 91]]))
+    with pytest.raises(ValueError, match="as many times"):
+        _core.move_shifted(TIME[1:], VALUES, MOVES, 0.01)
+    with pytest.raises(ValueError, match="positive"):
+        _core.play(VALUES, 0.0)
+
+
+DOF = [0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000]
+TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
+# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
+RTOL = 1e-9
+
+
+@pytest.mark.parametrize("dof", DOF)
+@pytest.mark.parametrize("tail", TAILS)
+def test_chi_square(dof, tail):
+    value = special.chdtri(dof, tail)
+    assert probability.chdtri(dof, tail) == pytest.approx(value, rel=RTOL)
+    assert probability.chdtrc(dof, value) == pytest.approx(tail, rel=RTOL)
+
+
+@pytest.mark.parametrize("top", [1, 2, 9, 40, 3000])
+@pytest.mark.parametrize("bottom", [1, 5, 60, 1000, 1e6])
+@pytest.mark.parametrize("tail", TAILS)
+def test_f(top, bottom, tail):
+    value = probability.fdtri(top, bottom, 1.0 - tail)
+    # Judged by SciPy's tail, which is computed forwards; its inverse is itself a search. `1 - tail` rounds.
+    rounding = 3e-16 / tail
+    assert special.fdtrc(top, bottom, value) == pytest.approx(tail, rel=3.0 * RTOL + rounding)
+    assert probability.fdtrc(top, bottom, value) == pytest.approx(special.fdtrc(top, bottom, value), rel=3.0 * RTOL)
+
+
+@pytest.mark.parametrize("dof", [1, 3, 12, 500])
+@pytest.mark.parametrize("below", [1e-9, 1e-4, 0.2, 0.5, 0.9])
+def test_student_and_normal(dof, below):
+    assert probability.stdtrit(dof, below) == pytest.approx(special.stdtrit(dof, below), rel=RTOL, abs=1e-12)
+    assert probability.ndtri(below) == pytest.approx(special.ndtri(below), rel=RTOL, abs=1e-12)
+    value = special.ndtri(below)
+    assert probability.ndtr(value) == pytest.approx(below, rel=RTOL)
+
+
+@pytest.mark.parametrize(("count", "trials"), [(0, 1), (3, 10), (60, 100), (700, 1000), (10, 10), (-1, 5)])
+def test_counts(count, trials):
+    expected = 1.0 if count < 0 else special.bdtrc(count, trials, 0.5)
+    assert probability.bdtrc(count, trials, 0.5) == pytest.approx(float(expected), rel=RTOL)
+
+
+@pytest.mark.parametrize(("k", "n"), [(1, 20), (7, 20), (20, 20), (150, 2000)])
+def test_shares(k, n):
+    for below in (0.025, 0.5, 0.975):
+        assert probability.betaincinv(k, n - k + 1, below) == pytest.approx(
+            special.betaincinv(k, n - k + 1, below), rel=RTOL
+        )
+
+
+def test_no_number_is_made_of_what_is_none():
+    assert np.isnan(probability.chdtri(3, 1.5))
+    assert np.isnan(probability.chdtrc(-1, 2.0))
+    assert probability.chdtrc(3, -1.0) == 1.0
+    assert probability.fdtrc(3, 5, 0.0) == 1.0
+    assert probability.chdtri(3, 0.0) == np.inf
