@@ -38,8 +38,12 @@ def verification_report(
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
     caption = (
-        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow."
+        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow: "
     )
+    caption += (
+        "one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them together; an rms "
+    )
+    caption += "can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
