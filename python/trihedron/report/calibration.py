@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, TINY, XYZ
-from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
@@ -32,13 +32,14 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
     unit_in_print,
+    with_unit,
 )
 from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = f"Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
+NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -84,7 +85,16 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             is_open = is_assumed and name == "accelerometer"
             beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
             uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
-    return [*held, *uncertain, *in_sample]
+    return [*undetermined_headlines(calibration), *held, *uncertain, *in_sample]
+
+
+def undetermined_headlines(calibration: Calibration) -> list[Headline]:
+    """The error that the poses allow in the orientation that they determine least, where it forbids the result."""
+    grave = [f.numbers for f in calibration.findings if f.severity is Severity.SERIOUS]
+    worst = [numbers["worst_prediction_g"] for numbers in grave if "worst_prediction_g" in numbers]
+    beside = "1 σ of gravity, by the orientations that were recorded"
+    what = "gravity error in the least certain orientation"
+    return [Headline(what, f"± {plain_number(100.0 * one, 2)}", "%", beside) for one in worst[:1]]
 
 
 def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
@@ -114,12 +124,16 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    errors = [(line.what, times) for line, times, is_held in _errors(calibration) if is_held]
-    times = [f"{what} {plain_number(times, 2)} times the noise" for what, times in errors if times < 1.0 / TINY]
-    above = f": {listed(times)} ({HELD_OUT})" if times else ""
+    errors = [
+        (f"{line.what} {with_unit(line.value, line.unit)}", times)
+        for line, times, is_held in _errors(calibration)
+        if is_held
+    ]
+    said = [f"{rms} ({plain_number(times, 2)} times the noise)" for rms, times in errors if times < 1.0 / TINY]
+    above = f": {listed(said)}, {HELD_OUT}" if said else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
-    said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
-    return " ".join([said, *effects])
+    whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
+    return " ".join([whole, *effects])
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

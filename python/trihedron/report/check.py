@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of
-from trihedron.report.calibration import next_pose
+from trihedron.report.calibration import next_pose, undetermined_headlines
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -45,7 +45,7 @@ def check_report(
 
 
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
-    out = []
+    out = [] if calibration is None else undetermined_headlines(calibration)
     expected = {} if calibration is None else _expected_cells(calibration)
     for name, (scale, *_) in expected.items():
         if scale == NONE:

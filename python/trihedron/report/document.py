@@ -39,12 +39,16 @@ CONSEQUENCE = (
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
+THEN_RUN = {
+    **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
+    FindingCode.GYRO_G_SENSITIVITY: "Run `trihedron calibrate LOG --extended -o FILE`.",
+}
+"""The command of an action in the next step."""
 
 
 def action_in_words(finding: Finding) -> str:
-    """The action of a finding; where it adds motion, with the same command on a new log."""
-    new = " Record a new log with them, then: `... NEW_LOG`." if finding.code in IN_A_NEW_LOG else ""
-    return finding.action[:1].upper() + finding.action[1:] + new
+    """The action of a finding with its command, where it has one."""
+    return f"{finding.action[:1].upper()}{finding.action[1:]} {THEN_RUN.get(finding.code, '')}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class Document:
 
     ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
     without a serious finding, in place of that from ``is_trustworthy`` and the warnings; ``provenance`` is how the
-    report was made; ``next_step`` is the advice for the use of the result.
+    report was made; ``next_step`` is the advice for the use of the result, with ``is_filled`` all of what is next.
     """
 
     title: str
@@ -142,6 +146,7 @@ class Document:
     stated_level: Level | None = None
     provenance: tuple[tuple[str, str], ...] = ()
     next_step: str = ""
+    is_filled: bool = False
 
     @property
     def level(self) -> Level:
@@ -166,7 +171,7 @@ class Document:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
         ``next_step``."""
         first, then = self.foremost, self.next_step
-        if first is None or not first.action or then[1:].startswith(first.action[1:]):
+        if self.is_filled or first is None or not first.action or then[1:].startswith(first.action[1:]):
             return then
         action = action_in_words(first)
         if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:
