@@ -7,11 +7,11 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, TINY, XYZ
-from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
+from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
-from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables, undetermined
 from trihedron.report.calibration_pictures import (
     before_words,
     correlation_picture,
@@ -20,7 +20,7 @@ from trihedron.report.calibration_pictures import (
     uncalibrated_error,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.numbers import (
     duration,
     each_with_sigma,
@@ -85,16 +85,8 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             is_open = is_assumed and name == "accelerometer"
             beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
             uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
-    return [*undetermined_headlines(calibration), *held, *uncertain, *in_sample]
-
-
-def undetermined_headlines(calibration: Calibration) -> list[Headline]:
-    """The error that the poses allow in the orientation that they determine least, where it forbids the result."""
-    grave = [f.numbers for f in calibration.findings if f.severity is Severity.SERIOUS]
-    worst = [numbers["worst_prediction_g"] for numbers in grave if "worst_prediction_g" in numbers]
-    beside = "1 σ of gravity, by the orientations that were recorded"
-    what = "gravity error in the least certain orientation"
-    return [Headline(what, f"± {plain_number(100.0 * one, 2)}", "%", beside) for one in worst[:1]]
+    grave = next(iter(serious_ones(calibration.findings)), None)
+    return [*undetermined(grave), *held, *uncertain, *in_sample]
 
 
 def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:

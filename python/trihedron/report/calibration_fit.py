@@ -7,17 +7,26 @@ from collections.abc import Mapping
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE, counted_moves
 from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
-from trihedron.report.document import Block, Table
+from trihedron.report.document import Block, Headline, Table
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.segments import state_of
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
 """Words for methods that records store as ids; other methods are words already."""
+
+
+def undetermined(grave: Finding | None) -> list[Headline]:
+    """The error of gravity in the orientation that the poses determine least, where the gravest finding is about it."""
+    if grave is None or "worst_prediction_g" not in grave.numbers:
+        return []
+    size = f"± {plain_number(100.0 * grave.numbers['worst_prediction_g'], 2)}"
+    beside = "of gravity, 1 σ by the orientations that were recorded"
+    return [Headline("error in the least certain orientation", size, "%", beside)]
 
 
 def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.calibration_fit import figures_table
+from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
@@ -106,7 +106,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         verdict=verdict_in_words(diagnosis) + _distrust(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        headlines=(*differing_headline(diagnosis), *headlines_of(diagnosis)),
+        headlines=(*undetermined(own_serious(diagnosis)), *differing_headline(diagnosis), *headlines_of(diagnosis)),
         lead=strengths,
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),

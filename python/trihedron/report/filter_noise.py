@@ -61,7 +61,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     return Document(
         title="Noise for your filter",
         subtitle=escaped(found.source),
-        verdict=verdict_of(found.findings, _good(found), "Usable", "NOT TO BE TRUSTED"),
+        verdict=verdict_of(found.findings, _good(found), "Usable" + _predicted(found), "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
@@ -79,6 +79,19 @@ def _good(found: FilterNoise) -> str:
         if one.shares and not (share := _ranked(one)[0]).share.is_limit
     ]
     return f"OK: no problems found; {listed(largest)}." if largest else "OK: no problems found."
+
+
+def _predicted(found: FilterNoise) -> str:
+    """How well N and K predict each sensor's error over the longest horizon; empty without a cross-validation."""
+    said = []
+    for one in found.sensors:
+        if one.consistency:
+            last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
+            over, (predicted, actual) = f"{last.horizon_s:g} s", (last.predicted * factor, last.actual * factor)
+            said.append(
+                f"{what} over {over} predicted {plain_number(predicted, 2)}, was {plain_number(actual, 2)} {unit}"
+            )
+    return f": {'; '.join(said)}" if said else ""
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:

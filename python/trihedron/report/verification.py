@@ -72,8 +72,9 @@ def above_noise(v: Verification) -> list[Finding]:
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above_noise(v))
-    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else "Verified"
-    return verdict_of(v.findings, "Verified: errors are within noise and uncertainty.", usable, "NOT VERIFIED")
+    verified = "Verified: errors are within noise and uncertainty"
+    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else verified
+    return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
 
 
 def use_in_words(v: Verification, what: str) -> str:

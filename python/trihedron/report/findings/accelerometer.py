@@ -17,8 +17,8 @@ ENTRIES = {
         "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
         "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
         "{is_joint:?The bias differs between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per axis{is_drift:?, "
-        "with a drift of {drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|All "
-        "standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
+        "with a drift of {drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|"
+        "All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
         "{is_drift:?The sensor warmed up, or its supply drifted|" + _UNQUIET + "}.",
         _LOOK,
     ),
