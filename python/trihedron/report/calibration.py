@@ -77,6 +77,12 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     errors = _errors(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
+    grave = next(iter(serious_ones(calibration.findings)), None)
+    return [*undetermined(grave), *held, *scale_headlines(calibration), *in_sample]
+
+
+def scale_headlines(calibration: Calibration) -> list[Headline]:
+    """The uncertainty of every sensor's scale on its worst axis."""
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibration.sensors:
@@ -85,8 +91,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             is_open = is_assumed and name == "accelerometer"
             beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
             uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
-    grave = next(iter(serious_ones(calibration.findings)), None)
-    return [*undetermined(grave), *held, *uncertain, *in_sample]
+    return uncertain
 
 
 def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:

@@ -15,7 +15,7 @@ from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
-from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print
+from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print, with_unit
 from trihedron.sanitise import escaped
 from trihedron.units import degrees_from_radians
 
@@ -87,10 +87,10 @@ def _predicted(found: FilterNoise) -> str:
     for one in found.sensors:
         if one.consistency:
             last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
-            over, (predicted, actual) = f"{last.horizon_s:g} s", (last.predicted * factor, last.actual * factor)
-            said.append(
-                f"{what} over {over} predicted {plain_number(predicted, 2)}, was {plain_number(actual, 2)} {unit}"
+            predicted, actual = (
+                with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)
             )
+            said.append(f"{what} over {last.horizon_s:g} s predicted {predicted}, was {actual}")
     return f": {'; '.join(said)}" if said else ""
 
 

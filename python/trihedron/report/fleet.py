@@ -109,7 +109,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     opened = [log.name for log in usable if log.verdict in OPEN]
     steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"record again {_first(again)}"] if again else []
-    steps += [f"`trihedron diagnose` each of {_first(opened)}: what its effects gain"] if opened else []
+    steps += [f"see what effects gain in {_first(opened)}: `trihedron diagnose` each"] if opened else []
     steps += [f"look at {_first(strays)}"] if strays else []
     steps += ["use each device's own calibration (folder calibrations)"] if usable else []
     return capital("; ".join(steps)) + "." if steps else ""

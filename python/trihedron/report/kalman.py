@@ -18,7 +18,7 @@ from trihedron.records import (
     NormKalmanCalibration,
 )
 from trihedron.records.published import BY_FILTER
-from trihedron.report.calibration import FRAMES, parameter_table
+from trihedron.report.calibration import FRAMES, parameter_table, scale_headlines
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import (
@@ -61,7 +61,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         ),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
-        headlines=tuple(_headlines(outcome)),
+        headlines=(*_headlines(outcome), *scale_headlines(calibration)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
         next_step="Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
         if calibration.is_trustworthy

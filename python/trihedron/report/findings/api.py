@@ -102,7 +102,7 @@ _USE = {
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
         "This finding was made when it was calibrated; it concerns everything the calibration is applied to.",
-        "Calibrate again as its findings say, or apply another calibration.",
+        "{action} Calibrate again, or apply another calibration.",
     ),
     (Code.EFFECT_NOT_APPLIED, "of-session", NOTE): Words(
         "The {effect:ids} of the extended calibration was not compensated: {why}.",
