@@ -51,7 +51,7 @@ def noise_report(
         title="Noise of a static log",
         subtitle=noise.source,
         verdict=verdict_of(
-            findings, "OK: a sum of noise terms fits the whole spectrum.", "Usable", "NOT TO BE TRUSTED"
+            findings, "OK: a sum of noise terms fits the whole spectrum.", _usable(noise), "NOT TO BE TRUSTED"
         ),
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
@@ -67,6 +67,13 @@ def noise_report(
             Section("Kalibr", _kalibr(noise)),
         ),
     )
+
+
+def _usable(noise: Noise) -> str:
+    """The verdict with warnings: how far white noise is determined, on the worst axis."""
+    white = [axis.terms[TermName.WHITE] for axis in noise.axes]
+    sigma = max((one.sigma / one.value for one in white if one.is_present), default=0.0)
+    return f"Usable: white noise N to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)" if sigma else "Usable"
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
