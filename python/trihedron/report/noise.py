@@ -271,9 +271,10 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
-    caption += "(dashed); N is read off at 1 s"
+    caption += "(dashed); N is its line at 1 s"
     names = part_names(noise.curve, axes)
     caption += ", K at 3 s" if any(name.startswith("K ") for name in names) else ""
+    caption += ", B 1.5 times its flat line" if any(name.startswith("B ") for name in names) else ""
     caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
     found = any(axis.optimal_averaging() is not None for axis in axes)
     caption += "; the orange mark is the least deviation." if found else "."
