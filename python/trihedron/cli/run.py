@@ -127,7 +127,7 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
     if re.search(r"\bFILE\b", commands) and not _now().file:
         said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
     filled = _COMMAND.sub(lambda found: _filled(found[0]), replace(document, next_step=said).what_next)
-    return document if filled == document.next_step else replace(document, next_step=filled, is_filled=True)
+    return document if filled == document.next_step else replace(document, next_step=filled)
 
 
 def _filled(command: str) -> str:

@@ -51,6 +51,11 @@ def action_in_words(finding: Finding) -> str:
     return f"{finding.action[:1].upper()}{finding.action[1:]} {THEN_RUN.get(finding.code, '')}".rstrip()
 
 
+def begins_with(step: str, action: str) -> bool:
+    """Whether a next step states an action, whose commands may be filled there."""
+    return step[1:].startswith(action[1:].partition("`")[0])
+
+
 @dataclass(frozen=True)
 class Paragraph:
     """Running text, one sentence after another."""
@@ -133,7 +138,7 @@ class Document:
 
     ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
     without a serious finding, in place of that from ``is_trustworthy`` and the warnings; ``provenance`` is how the
-    report was made; ``next_step`` is the advice for the use of the result, with ``is_filled`` all of what is next.
+    report was made; ``next_step`` is the advice for the use of the result.
     """
 
     title: str
@@ -146,7 +151,6 @@ class Document:
     stated_level: Level | None = None
     provenance: tuple[tuple[str, str], ...] = ()
     next_step: str = ""
-    is_filled: bool = False
 
     @property
     def level(self) -> Level:
@@ -171,7 +175,7 @@ class Document:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
         ``next_step``."""
         first, then = self.foremost, self.next_step
-        if self.is_filled or first is None or not first.action or then[1:].startswith(first.action[1:]):
+        if first is None or not first.action or begins_with(then, first.action):
             return then
         action = action_in_words(first)
         if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:
