@@ -77,8 +77,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     errors = _errors(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
-    grave = next(iter(serious_ones(calibration.findings)), None)
-    return [*undetermined(grave), *held, *scale_headlines(calibration), *in_sample]
+    return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
 
 
 def scale_headlines(calibration: Calibration) -> list[Headline]:
@@ -121,12 +120,11 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    errors = [
-        (f"{line.what} {with_unit(line.value, line.unit)}", times)
+    said = [
+        f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
         for line, times, is_held in _errors(calibration)
-        if is_held
+        if is_held and times < 1.0 / TINY
     ]
-    said = [f"{rms} ({plain_number(times, 2)} times the noise)" for rms, times in errors if times < 1.0 / TINY]
     above = f": {listed(said)}, {HELD_OUT}" if said else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")

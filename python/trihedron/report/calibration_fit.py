@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,13 +20,11 @@ METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "grav
 """Words for methods that records store as ids; other methods are words already."""
 
 
-def undetermined(grave: Finding | None) -> list[Headline]:
+def undetermined(grave: Sequence[Finding]) -> list[Headline]:
     """The error of gravity in the orientation that the poses determine least, where the gravest finding is about it."""
-    if grave is None or "worst_prediction_g" not in grave.numbers:
-        return []
-    size = f"± {plain_number(100.0 * grave.numbers['worst_prediction_g'], 2)}"
-    beside = "of gravity, 1 σ by the orientations that were recorded"
-    return [Headline("error in the least certain orientation", size, "%", beside)]
+    sizes = [100.0 * one.numbers["worst_prediction_g"] for one in grave[:1] if "worst_prediction_g" in one.numbers]
+    what, beside = "error in the least certain orientation", "of gravity, 1 σ by the orientations that were recorded"
+    return [Headline(what, f"± {plain_number(size, 2)}", "%", beside) for size in sizes]
 
 
 def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:

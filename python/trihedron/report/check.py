@@ -46,8 +46,7 @@ def check_report(
 
 
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
-    grave = () if calibration is None else serious_ones(calibration.findings)
-    out = [*undetermined(next(iter(grave), None))]
+    out = [] if calibration is None else undetermined(serious_ones(calibration.findings))
     expected = {} if calibration is None else _expected_cells(calibration)
     for name, (scale, *_) in expected.items():
         if scale == NONE:

@@ -84,13 +84,10 @@ def _good(found: FilterNoise) -> str:
 def _predicted(found: FilterNoise) -> str:
     """How well N and K predict each sensor's error over the longest horizon; empty without a cross-validation."""
     said = []
-    for one in found.sensors:
-        if one.consistency:
-            last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
-            predicted, actual = (
-                with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)
-            )
-            said.append(f"{what} over {last.horizon_s:g} s predicted {predicted}, was {actual}")
+    for one in (sensor for sensor in found.sensors if sensor.consistency):
+        last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
+        sizes = [with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)]
+        said.append(f"{what} over {last.horizon_s:g} s predicted {sizes[0]}, was {sizes[1]}")
     return f": {'; '.join(said)}" if said else ""
 
 
