@@ -41,6 +41,7 @@ IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
 THEN_RUN = {
     **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
+    FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.GYRO_G_SENSITIVITY: "Run `trihedron calibrate LOG --extended -o FILE --force`.",
 }
 """The command of an action in the next step."""
