@@ -282,8 +282,8 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
-    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted terms, a longer "
-    caption += "mean is no better (no mark: their sum still falls at the end). The terms, each with its part of the "
+    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted sum, a longer "
+    caption += "mean is no better (no mark: it still falls at the end). The terms, each with its part of the "
     caption += "curve, stand below."
     return Picture("sensors", caption, partial(sensors_chart, noise.curve, groups))
 
