@@ -146,6 +146,10 @@ def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command():
     begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
     note_log(LogSource(log=Path("my log.csv"), rate=50.0))
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json`"
+    begin(("calibrate", "a.csv", "b.csv", "--rate", "50"))
+    for name in ("a.csv", "b.csv"):
+        note_log(LogSource(log=Path(name), rate=50.0))
+    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG_1 NEW_LOG_2 --rate 50`"
 
 
 def test_several_logs_are_all_named_in_a_command_of_another_verb():

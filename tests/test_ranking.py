@@ -163,6 +163,8 @@ def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(ses
     log = replace(trihedron.simulate("hand-session", 6)[0], sha256="of this log")
     own = replace(trihedron.calibrate(log, gravity_m_s2=9.81).calibration, recording_sha256="of this log")
     assert not trihedron.verify(own, log).is_passed
+    one_of_several = {"sessions": [{"sha256": "of another log"}, {"sha256": "of this log"}]}
+    assert not trihedron.verify(replace(own, recording_sha256="", extensions=one_of_several), log).is_passed
     ranking = trihedron.rank([own, session[1]], log, gravity_m_s2=9.81)
     assert [one.name for one in ranking.candidates] == ["calibration 2", "calibration 1"]
     assert ranking.best.behind == 0.0
@@ -174,6 +176,9 @@ def test_a_ranking_shows_its_order_and_says_which_to_use(session):
     document = ranking_report(trihedron.rank([wrong, known], log, gravity_m_s2=9.81))
     assert document.next_step.startswith("Use calibration 2: `trihedron apply FILE LOG")
     assert document.verdict.startswith("calibration 2 fits this log best; calibration 1 is rejected. Verified")
+    again = trihedron.calibrate(trihedron.simulate("hand-session", 7)[0], gravity_m_s2=9.81).calibration
+    alike = ranking_report(trihedron.rank([again, known], log, gravity_m_s2=9.81)).verdict
+    assert "calibration 1 fit this log equally well" in alike or "calibration 2 fit this log equally well" in alike
     gravity, tilt = document.lead.chart().panels
     assert gravity.y.names == tilt.y.names == ("calibration 2", "calibration 1")
     interval, right, rejected = gravity.marks

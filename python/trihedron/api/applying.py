@@ -193,7 +193,8 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
     if not grave:
         return ()
-    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=words("quoted", sentence=grave[0].seen)),)
+    seen, action = (words("quoted", sentence=sentence) for sentence in (grave[0].seen, grave[0].action))
+    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=seen, action=action),)
 
 
 def _not_applied(effect_id: str, why: str) -> Finding:

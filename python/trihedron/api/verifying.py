@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.api.calibrating import calibrate
@@ -104,6 +105,8 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
 
 
 def same_recording(known: Calibration, recording: Recording) -> tuple[Finding, ...]:
-    """A finding where a calibration is tested on the log that it was made from."""
-    is_same = bool(known.recording_sha256) and known.recording_sha256 == recording.sha256
+    """A finding where a calibration is tested on the log, or on one of several, that it was made from."""
+    sessions: Any = known.extensions.get("sessions", ())
+    made_from = {known.recording_sha256, *(one.get("sha256") for one in sessions)}
+    is_same = bool(recording.sha256) and recording.sha256 in made_from
     return (Finding.of(FindingCode.SAME_RECORDING),) if is_same else ()

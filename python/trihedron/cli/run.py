@@ -35,12 +35,13 @@ _NOT_OPTIONS = {
 
 @dataclass
 class _Run:
-    """Arguments as typed, options in effect, inputs with their hashes; log, place, reference and file of the next step,
-    and logs that were excluded."""
+    """Arguments as typed, options in effect, inputs with their hashes; all logs; log, place, reference and file of the
+    next step, and logs that were excluded."""
 
     typed: tuple[str, ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
     inputs: list[tuple[str, str]] = field(default_factory=list)
+    logs: list[list[str]] = field(default_factory=list)
     log: str = "LOG"
     place: str = ""
     beside: str = ""
@@ -71,7 +72,8 @@ def note_input(recording: Recording) -> None:
 
 
 def note_log(source: Any) -> None:
-    """Store the first log that was read, with the options that say how to read it."""
+    """Store a log that was read, and the first with the options that say how to read it."""
+    _now().logs.append(_words(source))
     if _now().log == "LOG":
         name_log(source)
 
@@ -141,11 +143,13 @@ def _filled(command: str) -> str:
 
 
 def _on_a_new_log() -> str:
-    """The command as typed, with its output, on another log in place of the first."""
-    first, *rest = shlex.split(_now().log)
-    after = dict(pairwise((first, *rest)))
-    new = {after.get("--accel"): "NEW_ACCEL", after.get("--gyro"): "NEW_GYRO"}
-    new |= {} if first.startswith("--") else {first: "NEW_LOG"}
+    """The command as typed, with its output, on other logs in place of those that were read."""
+    new: dict[str, str] = {}
+    for k, words in enumerate(_now().logs, start=1):
+        which = f"_{k}" if len(_now().logs) > 1 else ""
+        after = dict(pairwise(("LOG" if words[0].startswith("--") else "--log", *words)))
+        names = (("--log", "NEW_LOG"), ("--accel", "NEW_ACCEL"), ("--gyro", "NEW_GYRO"))
+        new |= {after[flag]: f"{name}{which}" for flag, name in names if flag in after}
     return shlex.join(new.get(word, word) for word in shlex.split(again(_now().typed, _SHOWN)))
 
 

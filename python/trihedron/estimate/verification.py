@@ -64,6 +64,7 @@ def verify_calibration(
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, moves.angle_deg))
+    beyond_noise = (*_norm_findings(error, error_sigma, gravity_m_s2), *_angle_findings(moves))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -81,10 +82,9 @@ def verify_calibration(
         moves_left_out=moves.left_out,
         parameters=parameters,
         findings=(
-            *_norm_findings(error, error_sigma, gravity_m_s2),
-            *_angle_findings(moves),
+            *beyond_noise,
             *worse,
-            *_bias_findings(calibration.gyroscope, rest),
+            *_bias_findings(calibration.gyroscope, rest, is_alone=not beyond_noise),
             *shift_findings(parameters),
         ),
     )
@@ -128,10 +128,10 @@ def _worse_than_none(
     ]
 
 
-def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> Iterator[Finding]:
+def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray, *, is_alone: bool) -> Iterator[Finding]:
     """Finding where the gyro bias differs by more than ``FAR_BEYOND`` σ, of the poses' scatter and stated uncertainty.
 
-    Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif).
+    Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif). ``is_alone``: poses and moves agree.
     """
     if gyroscope is None or len(rest) < 2:
         return
@@ -140,7 +140,9 @@ def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> Ite
     if shift <= FAR_BEYOND * sigma:
         return
     times = shift / sigma if sigma > 0.0 else float("inf")
-    yield Finding.of(FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times)
+    yield Finding.of(
+        FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times, is_alone=is_alone
+    )
 
 
 def _is_larger(errors: FloatArray, others: FloatArray) -> bool:

@@ -50,6 +50,11 @@ class Ranked:
         return bool(self.suspicions) or not self.verification.is_passed
 
     @property
+    def is_clearly_behind(self) -> bool:
+        """The best is more than 2 σ better."""
+        return self.behind > 2.0 * self.behind_sigma
+
+    @property
     def static_rate_rms(self) -> float:
         """Calibrated rate in static poses [rad/s]: rms over the axes of the mean over poses; NaN without a gyro."""
         rest = self.verification.static_rate

@@ -11,7 +11,7 @@ from trihedron.records import Calibration, FindingCode, FitQuality, Recording, S
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
-from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables, undetermined
 from trihedron.report.calibration_pictures import (
     before_words,
     correlation_picture,
@@ -20,7 +20,7 @@ from trihedron.report.calibration_pictures import (
     uncalibrated_error,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.numbers import (
     duration,
     each_with_sigma,
@@ -32,13 +32,14 @@ from trihedron.report.numbers import (
     plain_number,
     power_of_ten,
     unit_in_print,
+    with_unit,
 )
 from trihedron.report.verification import USES
 from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = f"Test it on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
+NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -76,6 +77,11 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     errors = _errors(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
+    return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
+
+
+def scale_headlines(calibration: Calibration) -> list[Headline]:
+    """The uncertainty of every sensor's scale on its worst axis."""
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibration.sensors:
@@ -84,7 +90,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
             is_open = is_assumed and name == "accelerometer"
             beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
             uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
-    return [*held, *uncertain, *in_sample]
+    return uncertain
 
 
 def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
@@ -114,12 +120,15 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
-    errors = [(line.what, times) for line, times, is_held in _errors(calibration) if is_held]
-    times = [f"{what} {plain_number(times, 2)} times the noise" for what, times in errors if times < 1.0 / TINY]
-    above = f": {listed(times)} ({HELD_OUT})" if times else ""
+    said = [
+        f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
+        for line, times, is_held in _errors(calibration)
+        if is_held and times < 1.0 / TINY
+    ]
+    above = f": {listed(said)}, {HELD_OUT}" if said else ""
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
-    said = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
-    return " ".join([said, *effects])
+    whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
+    return " ".join([whole, *effects])
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

@@ -7,9 +7,10 @@ import numpy as np
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import next_pose
+from trihedron.report.calibration_fit import undetermined
 from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.numbers import how_many, plain_number, shown
 from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
@@ -45,7 +46,7 @@ def check_report(
 
 
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
-    out = []
+    out = [] if calibration is None else undetermined(serious_ones(calibration.findings))
     expected = {} if calibration is None else _expected_cells(calibration)
     for name, (scale, *_) in expected.items():
         if scale == NONE:

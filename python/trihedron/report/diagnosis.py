@@ -10,7 +10,7 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
-from trihedron.report.calibration_fit import figures_table
+from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
@@ -95,6 +95,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     found = getattr(diagnosis, "reference", None)
     strengths = strengths_picture(diagnosis)
+    grave = tuple(filter(None, (own_serious(diagnosis),)))
     # By a reference alone a model without a gyro, or a simulation, is not compared.
     is_compared = model != "" and (diagnosis.parameters != () or not by_reference_alone(diagnosis))
     if found is not None and strengths is not None:
@@ -106,7 +107,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         verdict=verdict_in_words(diagnosis) + _distrust(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        headlines=(*differing_headline(diagnosis), *headlines_of(diagnosis)),
+        headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),
         lead=strengths,
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),

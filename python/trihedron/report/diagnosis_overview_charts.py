@@ -96,7 +96,7 @@ def _strengths_chart(diagnosis: Diagnosis) -> Chart:
 def forest_picture(diagnosis: Diagnosis) -> Picture:
     """Parameters of the recording relative to those of the model, as a forest plot."""
     caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
-    caption += "the group differs."
+    caption += "the group differs by more than both uncertainties and the bias drift between sessions."
     return Picture("forest", caption, partial(_forest_chart, diagnosis.parameters))
 
 

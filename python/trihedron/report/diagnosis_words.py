@@ -69,7 +69,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
     surplus = _named(diagnosis, "model")
     still = [f"{listed(left)} still {_disagree(left)}"] if left else []
-    still += [f"{name} still {followed} (empirical relation)" for name, followed in ends.items() if followed]
+    still += [
+        f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
+    ]
     tail = "".join(f"; {one}" for one in still) or "; nothing else disagrees"
     said = []
     if missing:
@@ -124,7 +126,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return experiments[0] if experiments else again
     steps = []
     if diagnosis.parameters:
-        said = "the parameters that differ" if any(p.significant for p in diagnosis.parameters) else "the effects"
+        differs = ["the parameters that differ"] if any(p.significant for p in diagnosis.parameters) else []
+        said = listed([*differs, *(["the missing effects"] if _named(diagnosis, "recording") or not differs else [])])
         steps.append(
             f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`."
             if improved

@@ -39,12 +39,22 @@ CONSEQUENCE = (
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
+THEN_RUN = {
+    **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
+    FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
+    FindingCode.GYRO_G_SENSITIVITY: "Run `trihedron calibrate LOG --extended -o FILE --force`.",
+}
+"""The command of an action in the next step."""
 
 
 def action_in_words(finding: Finding) -> str:
-    """The action of a finding; where it adds motion, with the same command on a new log."""
-    new = " Record a new log with them, then: `... NEW_LOG`." if finding.code in IN_A_NEW_LOG else ""
-    return finding.action[:1].upper() + finding.action[1:] + new
+    """The action of a finding with its command, where it has one."""
+    return f"{finding.action[:1].upper()}{finding.action[1:]} {THEN_RUN.get(finding.code, '')}".rstrip()
+
+
+def begins_with(step: str, action: str) -> bool:
+    """Whether a next step states an action, whose commands may be filled there."""
+    return step[1:].startswith(action[1:].partition("`")[0])
 
 
 @dataclass(frozen=True)
@@ -166,7 +176,7 @@ class Document:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
         ``next_step``."""
         first, then = self.foremost, self.next_step
-        if first is None or not first.action or then[1:].startswith(first.action[1:]):
+        if first is None or not first.action or begins_with(then, first.action):
             return then
         action = action_in_words(first)
         if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:

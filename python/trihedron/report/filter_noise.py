@@ -15,7 +15,7 @@ from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
-from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print
+from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print, with_unit
 from trihedron.sanitise import escaped
 from trihedron.units import degrees_from_radians
 
@@ -61,7 +61,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     return Document(
         title="Noise for your filter",
         subtitle=escaped(found.source),
-        verdict=verdict_of(found.findings, _good(found), "Usable", "NOT TO BE TRUSTED"),
+        verdict=verdict_of(found.findings, _good(found), "Usable" + _predicted(found), "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
@@ -79,6 +79,16 @@ def _good(found: FilterNoise) -> str:
         if one.shares and not (share := _ranked(one)[0]).share.is_limit
     ]
     return f"OK: no problems found; {listed(largest)}." if largest else "OK: no problems found."
+
+
+def _predicted(found: FilterNoise) -> str:
+    """How well N and K predict each sensor's error over the longest horizon; empty without a cross-validation."""
+    said = []
+    for one in (sensor for sensor in found.sensors if sensor.consistency):
+        last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
+        sizes = [with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)]
+        said.append(f"{what} over {last.horizon_s:g} s predicted {sizes[0]}, was {sizes[1]}")
+    return f": {'; '.join(said)}" if said else ""
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:

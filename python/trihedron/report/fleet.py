@@ -17,7 +17,7 @@ from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Po
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.names import axis_in_print, id_in_print, label_of
-from trihedron.report.numbers import capital, how_many, plain_number, shown
+from trihedron.report.numbers import capital, how_many, listed, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
 MOST_NAMED = 4
@@ -72,9 +72,10 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
-    n_open = sum(log.verdict in OPEN for log in summary.logs)
-    if n_open:
-        verdict += f" The diagnosis of {how_many(n_open, 'log')} finds more than the model."
+    opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
+    if opened:
+        found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
+        verdict += f" Diagnosis: {listed(found)}."
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if summary.repeated and len(devices) > 1 and not strays:
@@ -92,7 +93,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         lead=lead,
         headlines=_headlines(summary),
         next_step="" if mixed else _next_step(summary, strays, moved),
-        stated_level="usable" if n_usable and not mixed and (n_usable < n or n_open or strays or moved) else None,
+        stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or strays or moved) else None,
     )
 
 
@@ -108,7 +109,7 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
     opened = [log.name for log in usable if log.verdict in OPEN]
     steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"record again {_first(again)}"] if again else []
-    steps += [f"diagnose {_first(opened)}"] if opened else []
+    steps += [f"see what effects gain in {_first(opened)}: `trihedron diagnose` each"] if opened else []
     steps += [f"look at {_first(strays)}"] if strays else []
     steps += ["use each device's own calibration (folder calibrations)"] if usable else []
     return capital("; ".join(steps)) + "." if steps else ""

@@ -18,7 +18,7 @@ from trihedron.records import (
     NormKalmanCalibration,
 )
 from trihedron.records.published import BY_FILTER
-from trihedron.report.calibration import FRAMES, parameter_table
+from trihedron.report.calibration import FRAMES, parameter_table, scale_headlines
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import (
@@ -50,18 +50,19 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         Section("Findings", (findings_block(calibration.findings),)),
         Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
     ]
+    _, residual = consistency = _headlines(outcome)
     return Document(
         title="Calibration by Kalman filter",
         subtitle=calibration.recording_source or "no recording named",
         verdict=verdict_of(
             calibration.findings,
             "OK: the innovations are as large and as white as the noise model predicts.",
-            "Usable",
+            f"Usable: {residual.what} {residual.value} {residual.unit} rms",
             "NOT TO BE TRUSTED",
         ),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
-        headlines=tuple(_headlines(outcome)),
+        headlines=(*consistency, *scale_headlines(calibration)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
         next_step="Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
         if calibration.is_trustworthy

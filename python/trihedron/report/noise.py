@@ -51,7 +51,7 @@ def noise_report(
         title="Noise of a static log",
         subtitle=noise.source,
         verdict=verdict_of(
-            findings, "OK: a sum of noise terms fits the whole spectrum.", "Usable", "NOT TO BE TRUSTED"
+            findings, "OK: a sum of noise terms fits the whole spectrum.", _usable(noise), "NOT TO BE TRUSTED"
         ),
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
@@ -67,6 +67,13 @@ def noise_report(
             Section("Kalibr", _kalibr(noise)),
         ),
     )
+
+
+def _usable(noise: Noise) -> str:
+    """The verdict with warnings: how far white noise is determined, on the worst axis."""
+    white = [axis.terms[TermName.WHITE] for axis in noise.axes]
+    sigma = max((one.sigma / one.value for one in white if one.is_present), default=0.0)
+    return f"Usable: white noise N to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)" if sigma else "Usable"
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
@@ -264,9 +271,10 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
-    caption += "(dashed); N is read off at 1 s"
+    caption += "(dashed); N is its line at 1 s"
     names = part_names(noise.curve, axes)
     caption += ", K at 3 s" if any(name.startswith("K ") for name in names) else ""
+    caption += ", B 1.5 times its flat line" if any(name.startswith("B ") for name in names) else ""
     caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
     found = any(axis.optimal_averaging() is not None for axis in axes)
     caption += "; the orange mark is the least deviation." if found else "."
@@ -274,8 +282,9 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
-    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted terms, "
-    caption += "beyond which the curve only scatters. The terms, each with its part of the curve, stand below."
+    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted sum, a longer "
+    caption += "mean is no better (no mark: it still falls at the end). The terms, each with its part of the "
+    caption += "curve, stand below."
     return Picture("sensors", caption, partial(sensors_chart, noise.curve, groups))
 
 

@@ -21,8 +21,8 @@ LEAST_SHARE = 1e-3
 """Smallest share of the variance, at any τ, of a part that is drawn: less is not visible in the sum."""
 NAME_DECADES = (1.2, 0.3)
 """Size of a name in decades of time and of deviation, for a panel of five by four decades."""
-MARGIN = 1.6
-"""Distance of a name from the ends of the panel, as a factor in time."""
+MARGIN = 10.0 ** (0.5 * NAME_DECADES[0])
+"""Distance of a name from the ends of the panel, as a factor in time: half a name."""
 
 Limits = tuple[float, float]
 TIME = Scale("averaging time τ [s]", "s", is_log=True)

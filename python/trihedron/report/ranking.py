@@ -38,12 +38,16 @@ def ranking_report(ranking: Ranking) -> Document:
     best = ranking.best
     rejected = [one.name for one in ranking.candidates if one.is_rejected]
     v = best.verification
+    alike = [one.name for one in ranking.candidates if not (one.is_rejected or one.is_clearly_behind)]
     verdict = f"{best.name} fits this log best"
+    if len(alike) > 1:
+        verdict = f"{listed(alike)} fit this log equally well (within 2 σ); {best.name} is first"
     verdict += f"; {listed(rejected)} {'is' if len(rejected) == 1 else 'are'} rejected" if rejected else ""
     verdict += f". {verified_in_words(v)}"
     if best.is_rejected:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
-    caption = "Errors of each calibration on this log, the best first."
+    caption = "Errors of each calibration on this log, the best first; the order is by both errors, each pose and move "
+    caption += "weighted by its uncertainty."
     judged_on = f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
     facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", judged_on))
     sections = [
@@ -69,7 +73,7 @@ def said_of(one: Ranked) -> str:
     said = [_mistake(found) for found in one.suspicions]
     if not said:
         said = [f.seen.rstrip(".") for f in by_weight(one.verification.findings) if f.severity is not Severity.NOTE][:2]
-    if not said and one.behind > 2.0 * one.behind_sigma:
+    if not said and one.is_clearly_behind:
         said = ["nothing found, but another fits better"]
     said = said or ["nothing found"]
     if one.without_bias:

@@ -74,7 +74,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
 
 
 def reference_headlines(found: AgainstReference) -> list[Headline]:
-    """The reference's own error, and the attitude error of the calibrated gyro."""
+    """The attitude error of the calibrated gyro, and the reference's own error."""
     error = found.error
     size = plain_number(degrees_from_radians(error.slow_rad[0]), 2)
     out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
@@ -83,7 +83,7 @@ def reference_headlines(found: AgainstReference) -> list[Headline]:
         beside = f"gyro alone, calibrated {last.stage}, cross-validated"
         beside += "".join(f"; {r.stage}: {plain_number(degrees_from_radians(r.error_rad))}°" for r in others)
         angle = plain_number(degrees_from_radians(last.error_rad))
-        out.append(Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
+        out.insert(0, Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
     return out
 
 

@@ -70,7 +70,8 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
-    """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability."""
+    """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability; where
+    none is detectable, also with its upper limit, which is wide for few recordings."""
     out = []
     for name in DRIFTING:
         axes = [one for one in model.repeated if one.parameter.id == name]
@@ -80,9 +81,12 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
         ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
         k = int(np.argmax(ahead))
         what, within = id_in_print(name), axes[k].within
+        value = f"± {plain_number(ahead[k], 2)}"
+        if within is not None and not within.sd:
+            value += f" to {plain_number(math.hypot(ahead[k], factor * within.high), 2)}"
         beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
         beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
-        out.append(Headline(f"{what} in the next recording", f"± {plain_number(ahead[k], 2)}", unit, beside))
+        out.append(Headline(f"{what} in the next recording", value, unit, beside))
     return tuple(out)
 
 

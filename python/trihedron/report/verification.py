@@ -38,8 +38,12 @@ def verification_report(
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
     caption = (
-        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow."
+        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow: "
     )
+    caption += (
+        "one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them together; an rms "
+    )
+    caption += "can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
@@ -68,8 +72,9 @@ def above_noise(v: Verification) -> list[Finding]:
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above_noise(v))
-    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else "Verified"
-    return verdict_of(v.findings, "Verified: errors are within noise and uncertainty.", usable, "NOT VERIFIED")
+    verified = "Verified: errors are within noise and uncertainty"
+    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else verified
+    return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
 
 
 def use_in_words(v: Verification, what: str) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated."
-_LOOK = "Look at the error of each pose in the whole report; `trihedron diagnose` names the effect."
+_UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated"
+_LOOK = "{is_drift:?Let the sensor warm up and record again|Look at the error of each pose in the whole report}; "
+_LOOK += "`trihedron diagnose LOG` tests which effects explain the error."
 _ADD_POSES = "Add poses with {advice:numbered}."
 _FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
 _FACES_OR_POSES += "{advice:numbered}."
@@ -15,10 +16,10 @@ ENTRIES = {
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
         "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
         "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
-        "{is_joint:?The fit includes a bias that differs between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per "
-        "axis{is_drift:?, of which a drift of {drift_m_s2:.2g mm/s²} over the session is part|}, and so do the "
-        "standard uncertainties|All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
-        _UNQUIET,
+        "{is_joint:?The bias differs between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per axis{is_drift:?, "
+        "with a drift of {drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|"
+        "All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
+        "{is_drift:?The sensor warmed up, or its supply drifted|" + _UNQUIET + "}.",
         _LOOK,
     ),
     (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
@@ -52,7 +53,7 @@ ENTRIES = {
         "nonlinearity|a scale that differs between + and -}} (p = {p:.1g}): S and b are off by up to "
         "{shift_m_s2:.2g mm/s²} at 1 g, {shift_sigma:.2g} σ of what noise alone would leave.",
         "An accelerometer that is not linear, or one driven near its range limit.",
-        "Run `trihedron diagnose`: it names the effect and calibrates with it.",
+        "Run `trihedron diagnose LOG`: it names the effect and calibrates with it.",
     ),
     (Code.NONLINEAR_RESIDUAL, "not-excluded", WARNING): Words(
         "The gravity error in static poses exceeds noise: bias repeatability or nonlinearity. Nonlinearity may put the "

@@ -71,9 +71,10 @@ _VERIFIED = {
     ),
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
-        "scatter of the poses and the stated uncertainty allow: its bias has changed.",
+        "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
         "A bias with the wrong sign or unit, of another device, or of another temperature.",
-        "Do not subtract this bias; measure it in a static pose before use.",
+        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that file, unit and device "
+        "belong together; if they do, calibrate again}.",
     ),
 }
 
@@ -101,7 +102,7 @@ _USE = {
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
         "This finding was made when it was calibrated; it concerns everything the calibration is applied to.",
-        "Calibrate again as its findings say, or apply another calibration.",
+        "{action} Calibrate again, or apply another calibration.",
     ),
     (Code.EFFECT_NOT_APPLIED, "of-session", NOTE): Words(
         "The {effect:ids} of the extended calibration was not compensated: {why}.",
@@ -124,8 +125,8 @@ _USE = {
         "Calibrate again, or accept a wider limit.",
     ),
     (Code.SAME_RECORDING, "", SERIOUS): Words(
-        "This is the recording that the calibration was made from: a verification with it proves nothing.",
-        "The same file was named twice.",
+        "The calibration was made from this recording: a verification with it proves nothing.",
+        "The same file, or one of several that were calibrated together.",
         "Verify on another session; the calibration report already has cross-validated errors.",
     ),
     (Code.OUTSIDE_VALID_RANGE, "", SERIOUS): Words(

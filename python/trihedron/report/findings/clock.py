@@ -104,7 +104,7 @@ _RATES = {
     (Code.RATE_ASSUMED, "gyro", SERIOUS): Words(
         "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
         "Only readings were logged.",
-        "Give --rate HZ. Gyro scale is inversely proportional to it: 1 % of rate is 1 % of scale.",
+        "Give --rate HZ: gyro scale, times and noise densities depend on it; 1 % of rate is 1 % of gyro scale.",
     ),
 }
 

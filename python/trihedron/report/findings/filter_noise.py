@@ -46,8 +46,8 @@ ENTRIES = {
         "N of the {sensor} is uncertain: between {lower:.3g} and {upper:.3g} (95 % interval), and a filter is too sure "
         "with the one and too cautious with the other.",
         "The reference's own error, or a residual calibration error, is larger than the sensor's noise.",
-        "The file holds N {in_file:.3g}; write {upper:.3g} in its place for a filter that must not be too sure; give a "
-        "static log of the unit (--static STATIC), a better reference or a longer log.",
+        "Give a static log of the unit (--static STATIC), a better reference or a longer log; for a filter that "
+        "must not be too sure replace N {in_file:.3g} by {upper:.3g}.",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",

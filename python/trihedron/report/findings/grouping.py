@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, Severity
-from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph
+from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import MINUS, capital, how_many, listed
 
@@ -57,7 +57,7 @@ def beyond_headline(finding: Finding, document: Document, above: str = "Stated a
     rest = finding.seen[len(clause) :].lstrip(" .;")
     is_stated = clause.lower() in document.verdict.lower()
     seen = f"{above}{capital(rest)}".rstrip() if is_stated else finding.seen
-    is_next = document.what_next[1:].startswith(finding.action[1:])
+    is_next = begins_with(document.what_next, finding.action)
     return replace(finding, seen=seen, action="" if is_next else finding.action)
 
 

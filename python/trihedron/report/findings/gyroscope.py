@@ -68,7 +68,7 @@ _MOVES = {
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
         "g-sensitivity of the gyro.",
-        "Calibrate with --extended, which fits it together with S and b.",
+        "Calibrate with --extended, which fits the dependence on gravity together with S and b.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),
@@ -102,8 +102,8 @@ _MOVES = {
         "{lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew; or another cause of "
-        "the error.",
-        "Log the sensor's own sample counter or time, and record again; `trihedron diagnose` looks for other causes.",
+        "the error, for which `trihedron diagnose` looks.",
+        "Log the sensor's own sample counter or time, and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
