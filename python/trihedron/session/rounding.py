@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
 import numpy as np
@@ -150,12 +151,13 @@ def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[in
     is_rest, is_next, is_beyond = (away < (steps + IN_STEP) * quantum for steps in range(3))
     at_rest, beyond = ranges_of(is_rest), ranges_of(is_beyond)
     for first, last in ranges_of(is_next):
-        inside = [(b - a, a, b) for a, b in at_rest if first <= a and b <= last]
+        # Each of these ranges lies within one of the next: they are found by their starts.
+        inside = at_rest[bisect_left(at_rest, (first,)) : bisect_left(at_rest, (last,))]
         if not inside:
             continue
-        n, begin, end = max(inside)
+        n, begin, end = max((b - a, a, b) for a, b in inside)
         # The signs of the moves before and after do not matter.
-        outer = next(one for one in beyond if one[0] <= first and last <= one[1])
+        outer = beyond[bisect_right(beyond, (first, math.inf)) - 1]
         left = _hidden(begin - first, first - outer[0]) if first > 0 else 0
         right = _hidden(last - end, outer[1] - last) if last < len(steady) else 0
         if n > min(left, right):  # otherwise passed through, or turned back inside
