@@ -203,6 +203,8 @@ PAIR_BEND = 8.0
 """Curvature, in LSB, that two equal samples are allowed; more is no evidence alone."""
 NOISE_JUMP = 5.0
 """Standard deviations of a reading that noise alone may step at both ends of a peak's top, over all peaks of a log."""
+LEVELLED = 3.0
+"""Standard errors of its curvature by which noise may level the top of a peak, the highest of a log."""
 MOST_RUNS = 1000
 """Runs that are tested, evenly spread where there are more."""
 
@@ -212,10 +214,10 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
 
     A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
     8 q/(n − 1)², n odd. One sample further it has fallen by half of that times n, two further by that times n + 1;
-    a tremor makes it steeper (``TOP``), rounding may add a step, and noise its own. The readings fall by more at *both*
-    ends of a clipped run; a rotation at a constant rate begins and ends steeply too, but varies about its extreme in
-    between. Two equal samples may lie on either side of any peak: they count only where the limit ``is_known``
-    otherwise, or two peaks end at it. Standstill at the end of a word counts as the limit too; on a code that is
+    a tremor makes it steeper (``TOP``), rounding may add a step, and noise levels it (``LEVELLED``). The readings fall
+    by more at *both* ends of a clipped run; a rotation at a constant rate begins and ends steeply too, but varies about
+    its extreme in between. Two equal samples may lie on either side of any peak: they count only where the limit
+    ``is_known`` otherwise, or two peaks end at it. Standstill at the end of a word counts as the limit too; on a code that is
     another channel's extreme as well it may be a table's constant rate in both directions.
     """
     column = end.column
@@ -235,8 +237,11 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
 
 
 def _falls_on_both_sides(column: FloatArray, first: int, stop: int, step: float, noise: float) -> bool:
-    count = stop - first
-    bend = TOP * 8.0 / ((count - 1) ** 2 - (1 - count % 2)) if count > 2 else PAIR_BEND
-    smooth = step * (1.0 + bend * np.array([0.5 * count, count + 1.0])) + NOISE_JUMP * noise
+    n = stop - first
+    bend = step * (TOP * 8.0 / ((n - 1) ** 2 - (1 - n % 2)) if n > 2 else PAIR_BEND)
+    if n > 2:
+        # Noise may level a peak: its curvature is uncertain by that of a least-squares parabola through n samples.
+        bend += LEVELLED * noise * np.sqrt(720.0 / (n * (n**2 - 1) * (n**2 - 4)))
+    smooth = step + bend * np.array([0.5 * n, n + 1.0]) + NOISE_JUMP * noise
     sides = (column[stop : stop + 2], column[max(first - 2, 0) : first][::-1])
     return all(np.any(np.abs(side - column[first]) > smooth[: len(side)]) for side in sides if np.isfinite(side).any())

@@ -202,7 +202,9 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
     found, out = answer.found, dict(answer.tested)
     out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in out}
     for key, one in found.tried.items():
-        out[key] = _candidate(one, found.against.get(key), words("held-out-worse") if key in found.dropped else "")
+        reason = words("relation-instead") if found.related.relations and one.score > 0.0 else ""
+        reason = words("held-out-worse") if key in found.dropped else reason
+        out[key] = _candidate(one, found.against.get(key), reason)
     for key, bias in answer.asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std

@@ -93,6 +93,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "quoted": "{sentence}",
         # why a candidate was not accepted
         "held-out-worse": "predicts held-out poses and moves no better",
+        "relation-instead": "the relation found explains more",
         "within-flicker": "no larger than 1/f noise that poses do not show",
         # why an effect was not compensated
         "effect-unknown": "this version does not know it",
