@@ -256,7 +256,7 @@ def test_an_untrusted_calibration_ends_in_status_2_with_its_reason(session, caps
     err = capsys.readouterr().err
     assert "not to be trusted" in err
     # The gravest reason: a verification with the calibration's own recording says nothing of it.
-    assert ("the recording that the calibration was made from" if words[0] == "verify" else "Scale 3 is not") in err
+    assert ("made from this recording" if words[0] == "verify" else "Scale 3 is not") in err
 
 
 def test_outputs_are_checked_before_the_inputs_are_read(tmp_path):

@@ -217,8 +217,8 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
     a tremor makes it steeper (``TOP``), rounding may add a step, and noise levels it (``LEVELLED``). The readings fall
     by more at *both* ends of a clipped run; a rotation at a constant rate begins and ends steeply too, but varies about
     its extreme in between. Two equal samples may lie on either side of any peak: they count only where the limit
-    ``is_known`` otherwise, or two peaks end at it. Standstill at the end of a word counts as the limit too; on a code that is
-    another channel's extreme as well it may be a table's constant rate in both directions.
+    ``is_known`` otherwise, or two peaks end at it. Standstill at the end of a word counts as the limit too; on a code
+    that is another channel's extreme as well it may be a table's constant rate in both directions.
     """
     column = end.column
     if not end.lasts or abs(end.value - end.middle) <= FAR * end.span:

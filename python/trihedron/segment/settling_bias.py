@@ -78,10 +78,10 @@ def _with_time_constant(
     rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift_size * np.eye(3)])])
     y = np.append(reading[used], np.zeros(3))
     left, without = (_squares_beside(y, columns) for columns in (rows, rows[:, 3:]))
-    size = np.linalg.lstsq(rows, y, rcond=None)[0][:3]
-    sigma = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[:3] * left / dof)
+    inverse = np.linalg.pinv(rows)[:3]
+    sigma = np.linalg.norm(inverse, axis=1) * np.sqrt(left / dof)
     p = fdtrc(3, dof, (without - left) / 3.0 / (left / dof))
-    return SettlingBias(np.asarray(size), sigma, tau, float(share[used].mean()), p)
+    return SettlingBias(inverse @ y, sigma, tau, float(share[used].mean()), p)
 
 
 def _squares_beside(y: FloatArray, columns: FloatArray) -> float:

@@ -92,7 +92,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "because": "{sentence:clause}",
         "quoted": "{sentence}",
         # why a candidate was not accepted
-        "held-out-worse": "predicts held-out poses and moves no better",
+        "held-out-worse": "lowers no cross-validated error",
         "relation-instead": "the relation found explains more",
         "within-flicker": "no larger than 1/f noise that poses do not show",
         # why an effect was not compensated
