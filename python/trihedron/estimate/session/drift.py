@@ -1,7 +1,8 @@
 """Biases that drift along a curve of time, a line or a warm-up, beside the random walk that every session allows.
 
 A walk decouples the poses that a warm-up connects: S and b of a sensor that warms up would be several times less
-certain than the session determines them (docs/model-session.md, 11.12e).
+certain than the session determines them. Few poses may not show one: both hypotheses then share the covariance
+(docs/model-session.md, 11.12e).
 """
 
 from __future__ import annotations
@@ -17,23 +18,32 @@ from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 from trihedron.session.model import NOTHING
 from trihedron.session.noise import ANYTHING, START_STRENGTHS
 
+UNLIKELY = 0.02
+"""Probability of a drift below which it is left out of account."""
+Curve = tuple[FloatArray | None, FloatArray | None, list[float]]
+"""Columns of three unknowns, one an axis, of force and rate in SI, and their prior sizes."""
 
-def drifting(observed: Observed, core: _core.SessionFit, sensor: int) -> Observed | None:
-    """The session with the likeliest curve of the bias of a sensor (0 the accelerometer, 1 the gyro) as three more
-    unknowns, one an axis; ``None`` where no curve is more likely than none. ``core`` is its fit without one."""
+
+def likeliest_curve(observed: Observed, core: _core.SessionFit, sensor: int) -> tuple[Curve, float] | None:
+    """The likeliest curve of the bias of a sensor (0 the accelerometer, 1 the gyro) and its probability, one half a
+    priori; ``None`` where it is negligible. ``core`` is the fit without one."""
     asked = [_columns(curve, sensor) for curve in _curves(observed)]
     # Also with noise as parts have it: a strong random walk absorbs a curve that low noise shows. Moves are believed as
     # in the fit, because their normalisation is part of the evidence.
     strengths = [core.strengths, (*START_STRENGTHS[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
     gains = [float(one[0].max()) for one in found]
-    best, choice = int(np.argmax(gains)), np.log(len(asked))
-    if gains[best] < choice:
+    best, choice = int(np.argmax(gains)), float(np.log(len(asked)))
+    if gains[best] - choice < np.log(UNLIKELY):
         return None
     (without, *_), (evidence, *_) = core.evidence([NOTHING, asked[best]], strengths, ANYTHING)
-    if evidence - max(without, core.log_marginal) < choice:
-        return None
-    *sides, sigma = asked[best]
+    probability = float(np.exp(-np.logaddexp(0.0, choice + max(without, core.log_marginal) - evidence)))
+    return (asked[best], probability) if probability > UNLIKELY else None
+
+
+def with_curve(observed: Observed, core: _core.SessionFit, curve: Curve) -> Observed:
+    """The session with a curve as three more unknowns; ``core`` is its fit without them."""
+    *sides, sigma = curve
     raw = [
         np.zeros((len(known), 3, 3)) if of is None else np.einsum("ij,njk->nik", np.linalg.inv(scale), of)
         for known, of, scale in zip(

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.drift import drifting
+from trihedron.estimate.session.drift import Curve, likeliest_curve, with_curve
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
@@ -98,16 +98,31 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     their size they biased a real accelerometer by five standard errors.
     """
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
+    possible = []
     for sensor in (0, 1):
-        found = drifting(observed, core, sensor)
-        if found is not None:
-            core = _again(found, core, (*START_STRENGTHS[:3], core.strengths[3]), ANYTHING)
-            observed = found
+        found = likeliest_curve(observed, core, sensor)
+        if found is not None and found[1] > 0.5:
+            observed = with_curve(observed, core, found[0])
+            core = _again(observed, core, (*START_STRENGTHS[:3], core.strengths[3]), ANYTHING)
+        elif found is not None:
+            possible.append(found)
     corner, scatter, between, (gravity, _) = core.strengths
     weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
-    return _solution(observed, weighted if is_expected else core)
+    solution = _solution(observed, weighted if is_expected else core)
+    for curve, probability in possible:
+        solution = _if_it_drifts(solution, curve, probability)
+    return solution
+
+
+def _if_it_drifts(solution: SessionSolution, curve: Curve, probability: float) -> SessionSolution:
+    """The solution with the covariance of both hypotheses about it, with and without a drift along ``curve``."""
+    observed, core = with_curve(solution.observed, solution.core, curve), solution.core
+    other = _solution(observed, _again(observed, core, core.strengths))
+    away = other.parameters - solution.parameters
+    drifting = other.covariance + np.outer(away, away)
+    return replace(solution, covariance=(1.0 - probability) * solution.covariance + probability * drifting)
 
 
 def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
