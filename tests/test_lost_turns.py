@@ -78,7 +78,7 @@ def knocked(w, rests, rate, per_rad_s, rng):
 
 @pytest.mark.parametrize(
     ("seeds", "least", "most"),
-    [(range(640005, 640007), 2, 0), pytest.param(range(640000, 640008), 6, 1, marks=pytest.mark.slow)],
+    [(range(640005, 640007), 2, 0), pytest.param(range(640000, 640008), 5, 1, marks=pytest.mark.slow)],
 )
 def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_not(seeds, least, most):
     """Axis after axis at one speed, 12 bits: residuals of moves are within the noise whatever the others lost."""
@@ -94,6 +94,7 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             lossy += is_lossy and is_said
             false += not is_lossy and is_said
     # 41 of 54 sessions: what three lost samples do to moves that others were left out of may be a hidden turn as well.
+    # Of eight, fewer than five are found by chance once in ten.
     assert lossy >= least
     # None of 30 sessions: a impact meets the curve of a loss by chance only.
     assert false <= most
