@@ -11,10 +11,11 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
-from trihedron.probability import chdtrc
+from trihedron.probability import chdtrc, fdtrc
 from trihedron.records.calibration import PARAMETER_NAMES, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import Words, words
+from trihedron.session.noise import NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
 MAX_SCALE_RATIO = 1.5
@@ -37,14 +38,16 @@ def findings_of(
     if not solution.is_converged:
         yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
     yield from _outlier_findings(outliers, measured, seen)
-    if solution.inflation[0] > 1.0:
+    dof = max(solution.moves_dof, 1.0)
+    chi2_per_dof = solution.moves_chi2 / dof
+    if fdtrc(dof, NOISE_DOF, chi2_per_dof) < FALSE_ALARM:
         # Widened uncertainties do not cover convergence to a wrong minimum: large tilt errors are serious.
         is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
         yield Finding.of(
             FindingCode.RESIDUAL_ABOVE_NOISE,
             "moves",
             severity=Severity.SERIOUS if is_astray else Severity.WARNING,
-            chi2_per_dof=solution.moves_chi2 / max(solution.moves_dof, 1.0),
+            chi2_per_dof=chi2_per_dof,
             dof=solution.moves_dof,
         )
     yield from _attitude_findings(measured, S)
