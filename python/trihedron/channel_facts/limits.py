@@ -238,10 +238,11 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
 
 def _falls_on_both_sides(column: FloatArray, first: int, stop: int, step: float, noise: float) -> bool:
     n = stop - first
-    bend = step * (TOP * 8.0 / ((n - 1) ** 2 - (1 - n % 2)) if n > 2 else PAIR_BEND)
+    bend = PAIR_BEND * step
     if n > 2:
         # Noise may level a peak: its curvature is uncertain by that of a least-squares parabola through n samples.
-        bend += LEVELLED * noise * np.sqrt(720.0 / (n * (n**2 - 1) * (n**2 - 4)))
+        levelled = LEVELLED * noise * np.sqrt(720.0 / (n * (n**2 - 1) * (n**2 - 4)))
+        bend = TOP * 8.0 * step / ((n - 1) ** 2 - (1 - n % 2)) + levelled
     smooth = step + bend * np.array([0.5 * n, n + 1.0]) + NOISE_JUMP * noise
     sides = (column[stop : stop + 2], column[max(first - 2, 0) : first][::-1])
     return all(np.any(np.abs(side - column[first]) > smooth[: len(side)]) for side in sides if np.isfinite(side).any())

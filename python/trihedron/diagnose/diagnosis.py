@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType
 
@@ -33,7 +33,7 @@ from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, Verdict
-from trihedron.records.domains import DomainTest, Where
+from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.records.finding import FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
@@ -196,23 +196,20 @@ def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alp
 def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
     """Every domain's test; ``rejected`` are ids of effects that did not improve the prediction of held-out moves: jolts
     look like lost samples."""
-    rows, within = (
-        _with_settling_bias(context, judge_rows(context.fitted, alpha)),
-        judge_within_poses(context.obs, alpha),
-    )
-    return (*rows, within, _judge_timing(context, alpha, rejected))
+    # A bias that settles inside the poses: the noise of their means had absorbed it.
+    settling = [one for one in context.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
+    shown: dict[Domain, float] = {"static-accel": settling[0].numbers["p_value"]} if settling else {}
+    rows = _disagreeing(judge_rows(context.fitted, alpha), shown)
+    return (*rows, judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, rejected))
 
 
-def _with_settling_bias(context: Context, rows: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """The domains, where static poses disagree if the accelerometer's bias settles inside them: the noise of their
-    means had absorbed it."""
-    of_segments = context.obs.segments.findings
-    p = min((one.numbers["p_value"] for one in of_segments if one.code is FindingCode.BIAS_SETTLING), default=1.0)
+def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, float]) -> tuple[DomainTest, ...]:
+    """The domains, where those of another test's ``p_values`` disagree: noise of any strength had absorbed it."""
     return tuple(
-        replace(d, disagrees=True, p_value=min(d.p_value, p), limit=None)
-        if d.domain == "static-accel" and p < 1.0
+        replace(d, disagrees=True, p_value=min(d.p_value, p_values[d.domain]), limit=None)
+        if d.domain in p_values and not d.disagrees
         else d
-        for d in rows
+        for d in domains
     )
 
 
@@ -253,14 +250,8 @@ def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[Do
 
 
 def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:
-    """The domains, where those in which a relation shows disagree: noise of any strength had absorbed it."""
-    score = {one.domain: one.score for one in found.relations}
-    return tuple(
-        replace(d, disagrees=True, p_value=min(d.p_value, float(np.exp(-0.5 * score[d.domain]))), limit=None)
-        if d.domain in score and not d.disagrees
-        else d
-        for d in domains
-    )
+    """The domains, where those in which a relation shows disagree."""
+    return _disagreeing(domains, {one.domain: float(np.exp(-0.5 * one.score)) for one in found.relations})
 
 
 def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:

@@ -135,12 +135,11 @@ def judge_log(
 
 
 def judge_bias(means: PoseMeans) -> list[Finding]:
-    """A bias that settles after moves: size at the start of a pose in parts of gravity, time constant, p-value."""
+    """A bias that settles after moves: its size at their end, time constant, p-value."""
     one = means.settling
     if one is None:
         return []
-    gravity = float(np.median(np.linalg.norm(means.mean[:, :3], axis=1)))
-    size, sigma = (x / gravity * 1e3 for x in (one.size, one.sigma))
+    size, sigma = 1e3 * one.size, 1e3 * one.sigma
     return [
         Finding.of(
             FindingCode.BIAS_SETTLING, x_mg=size[0], y_mg=size[1], z_mg=size[2], sigma_mg=sigma.max(), tau_s=one.tau_s,

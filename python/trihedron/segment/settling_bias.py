@@ -25,7 +25,7 @@ FEWEST_BLOCKS = 4
 
 @dataclass(frozen=True, eq=False)
 class SettlingBias:
-    """Bias change ``size`` (3,) [raw] at the end of a move with its ``sigma`` (3,), which decays with ``tau_s``; its
+    """Bias change ``size`` (3,) [|g|] at the end of a move with its ``sigma`` (3,), which decays with ``tau_s``; its
     mean over the poses is ``share`` of that. ``p_value`` that the bias of no pose settles."""
 
     size: FloatArray
@@ -78,7 +78,7 @@ def _with_time_constant(
     rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift_size * np.eye(3)])])
     y = np.append(reading[used], np.zeros(3))
     left, without = (_squares_beside(y, columns) for columns in (rows, rows[:, 3:]))
-    inverse = np.linalg.pinv(rows)[:3]
+    inverse = np.linalg.pinv(rows)[:3] / gravity
     sigma = np.linalg.norm(inverse, axis=1) * np.sqrt(left / dof)
     p = fdtrc(3, dof, (without - left) / 3.0 / (left / dof))
     return SettlingBias(inverse @ y, sigma, tau, float(share[used].mean()), p)

@@ -14,6 +14,7 @@ from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
+from trihedron.session.noise import NOISE_DOF
 
 ACROSS_VERTICAL = 2.0 / 3.0
 """Fraction of a rotation's squared error that gravity shows, averaged over rotation axes."""
@@ -24,8 +25,6 @@ MANY = 0.3
 Below it the excluded moves are true outliers."""
 EVEN = 1e-4
 """Scatter of the timestamps, in steps, up to which they may be computed from the row number."""
-NOISE_DOF = 100.0
-"""Degrees of freedom of the predicted noise, which is measured in the recording to about 7 %."""
 CERTAIN, DOUBTFUL = 1e-3, 0.05
 """p-value of χ² of the tilt errors below which losses are tested: where all moves are fitted, and where some are
 excluded. The nine elements of S absorb part of a loss in each move, moves with more losses are excluded, and the rest
