@@ -14,9 +14,20 @@ def minimum_jerk(x):
 
 
 def running_product(vectors):
-    """Rotations e_1, e_1 e_2, ... of rotation vectors (n, 3), by doubling."""
-    products, reach = Rotation.from_rotvec(vectors), 1
+    """Rotations e_1, e_1 e_2, ... of rotation vectors (n, 3), by doubling (SciPy's product is ten times slower)."""
+    products, reach = np.ascontiguousarray(Rotation.from_rotvec(vectors).as_quat().T), 1
     while reach < len(vectors) and np.any(vectors):
-        products = Rotation.concatenate([products[:reach], products[:-reach] * products[reach:]])
+        products = np.hstack([products[:, :reach], _product(products[:, :-reach], products[:, reach:])])
         reach *= 2
-    return products
+    return Rotation.from_quat(products.T)
+
+
+def _product(p, q):
+    """Quaternions p q (4, n), scalar last."""
+    (a, b, c, d), (x, y, z, w) = p, q
+    return np.stack([
+        a * w + d * x + b * z - c * y,
+        b * w + d * y + c * x - a * z,
+        c * w + d * z + a * y - b * x,
+        d * w - a * x - b * y - c * z,
+    ])  # fmt: skip

@@ -7,43 +7,65 @@ certain than the session determines them. Few poses may not show one: both hypot
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
-from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
+from trihedron.session.drift import TYPICAL
 from trihedron.session.model import NOTHING
-from trihedron.session.noise import ANYTHING, START_STRENGTHS
+from trihedron.session.noise import ANYTHING, START_STRENGTHS, Strengths
 
 UNLIKELY = 0.02
 """Probability of a drift below which it is left out of account."""
+WARM_UPS = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1)
+"""Time constants tried, as fractions of the session: faster ones alone, one or two poses may as well be disturbed;
+slower are a line. Where several are likely they share the covariance."""
 Curve = tuple[FloatArray | None, FloatArray | None, list[float]]
-"""Columns of three unknowns, one an axis, of force and rate in SI, and their prior sizes."""
+"""Columns of three unknowns, one an axis, of force and rate in SI, and their prior sizes; empty: none."""
+STEADY: Curve = (None, None, [])
 
 
-def likeliest_curve(observed: Observed, core: _core.SessionFit, sensor: int) -> tuple[Curve, float] | None:
-    """The likeliest curve of the bias of a sensor (0 the accelerometer, 1 the gyro) and its probability, one half a
-    priori; ``None`` where it is negligible. ``core`` is the fit without one."""
+@dataclass(frozen=True, eq=False)
+class Likely:
+    """A curve of the bias of a sensor (0 the accelerometer, 1 the gyro), its probability, and the likeliest strengths
+    of noise beside it."""
+
+    sensor: int
+    curve: Curve
+    probability: float
+    strengths: Strengths
+
+
+def likely_curves(observed: Observed, core: _core.SessionFit, sensor: int) -> list[Likely]:
+    """Curves of the bias of a sensor and none, likeliest first; a drift has one half a priori. ``core`` is the fit
+    without one."""
     asked = [_columns(curve, sensor) for curve in _curves(observed)]
     # Also with noise as parts have it: a strong random walk absorbs a curve that low noise shows. Moves are believed as
     # in the fit, because their normalisation is part of the evidence.
     strengths = [core.strengths, (*START_STRENGTHS[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
-    gains = [float(one[0].max()) for one in found]
-    best, choice = int(np.argmax(gains)), float(np.log(len(asked)))
-    if gains[best] - choice < np.log(UNLIKELY):
-        return None
-    (without, *_), (evidence, *_) = core.evidence([NOTHING, asked[best]], strengths, ANYTHING)
-    probability = float(np.exp(-np.logaddexp(0.0, choice + max(without, core.log_marginal) - evidence)))
-    return (asked[best], probability) if probability > UNLIKELY else None
+    choice = float(np.log(len(asked)))
+    if max(float(one[0].max()) for one in found) - choice < np.log(UNLIKELY):
+        return [Likely(sensor, STEADY, 1.0, core.strengths)]
+    answers = core.evidence([NOTHING, *asked], strengths, ANYTHING)
+    score = np.array([one[0] for one in answers]) - [0.0, *[choice] * len(asked)]
+    probability = np.exp(score - np.logaddexp.reduce(score))
+    likely = [
+        Likely(sensor, curve, float(p), one[1])
+        for curve, p, one in zip([STEADY, *asked], probability, answers, strict=True)
+        if p > UNLIKELY
+    ]
+    return sorted(likely, key=lambda one: -one.probability)
 
 
 def with_curve(observed: Observed, core: _core.SessionFit, curve: Curve) -> Observed:
-    """The session with a curve as three more unknowns; ``core`` is its fit without them."""
+    """The session with a curve as three more unknowns, if any; ``core`` is a fit of it."""
     *sides, sigma = curve
+    if not sigma:
+        return observed
     raw = [
         np.zeros((len(known), 3, 3)) if of is None else np.einsum("ij,njk->nik", np.linalg.inv(scale), of)
         for known, of, scale in zip(
@@ -60,14 +82,10 @@ def with_curve(observed: Observed, core: _core.SessionFit, curve: Curve) -> Obse
 
 
 def _curves(observed: Observed) -> list[FloatArray]:
-    """Shapes (n,) of a drift where effects act, zero on average over the static time, as the session's bias is.
-
-    Without the fastest warm-up: alone, one or two poses may as well be disturbed.
-    """
+    """Shapes (n,) of a drift where effects act, zero on average over the static time, as the session's bias is."""
     lasts_s, time_s = observed.pose_lasts_s, observed.effect_time_s
-    x = time_s - observed.pose_time_s[0]
-    length = float(observed.pose_time_s[-1] - observed.pose_time_s[0])
-    out = [x / length, *(np.exp(-x / (length * fraction)) for fraction in WARM_UP_FRACTIONS[1:])]
+    x = (time_s - observed.pose_time_s[0]) / float(observed.pose_time_s[-1] - observed.pose_time_s[0])
+    out = [x, *(np.exp(-x / fraction) for fraction in WARM_UPS)]
     return [curve - np.average(curve[: len(lasts_s)], weights=lasts_s) for curve in out]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.drift import Curve, likeliest_curve, with_curve
+from trihedron.estimate.session.drift import STEADY, Likely, likely_curves, with_curve
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
@@ -98,31 +98,36 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     their size they biased a real accelerometer by five standard errors.
     """
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
-    possible = []
+    steady, likely = observed, []
     for sensor in (0, 1):
-        found = likeliest_curve(observed, core, sensor)
-        if found is not None and found[1] > 0.5:
-            observed = with_curve(observed, core, found[0])
-            core = _again(observed, core, (*START_STRENGTHS[:3], core.strengths[3]), ANYTHING)
-        elif found is not None:
-            possible.append(found)
+        best, *others = likely_curves(observed, core, sensor)
+        likely.append((best, others))
+        if best.curve is not STEADY:
+            observed = with_curve(observed, core, best.curve)
+            core = _again(observed, core, best.strengths, ANYTHING)
     corner, scatter, between, (gravity, _) = core.strengths
     weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     solution = _solution(observed, weighted if is_expected else core)
-    for curve, probability in possible:
-        solution = _if_it_drifts(solution, curve, probability)
-    return solution
+    (accel, accel_others), (gyro, gyro_others) = likely
+    asked = [(one, gyro) for one in accel_others] + [(accel, one) for one in gyro_others]
+    return replace(solution, covariance=_shared(solution, steady, asked))
 
 
-def _if_it_drifts(solution: SessionSolution, curve: Curve, probability: float) -> SessionSolution:
-    """The solution with the covariance of both hypotheses about it, with and without a drift along ``curve``."""
-    observed, core = with_curve(solution.observed, solution.core, curve), solution.core
-    other = _solution(observed, _again(observed, core, core.strengths))
-    away = other.parameters - solution.parameters
-    drifting = other.covariance + np.outer(away, away)
-    return replace(solution, covariance=(1.0 - probability) * solution.covariance + probability * drifting)
+def _shared(solution: SessionSolution, steady: Observed, others: list[tuple[Likely, Likely]]) -> FloatArray:
+    """Covariance (24, 24) of the solution and of ``others`` beside it; ``steady`` is the session without curves."""
+    out, core = solution.covariance, solution.core
+    for pair in others:
+        observed = steady
+        for one in pair:
+            observed = with_curve(observed, core, one.curve)
+        one = min(pair, key=lambda one: one.probability)
+        fit = _again(observed, core, (*one.strengths[:3], core.strengths[3]))
+        other = _solution(observed, fit)
+        away = other.parameters - solution.parameters
+        out = (1.0 - one.probability) * out + one.probability * (other.covariance + np.outer(away, away))
+    return out
 
 
 def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
@@ -141,8 +146,10 @@ def _again(
     """The fit of a session started from another fit, perhaps without its last unknowns; noise strengths are given, or
     optimised ``within`` bounds."""
     state = state_of(core, observed.gravity_m_s2)
-    added = len(observed.effect_sigma) - len(state.effect)
-    return _fit(observed, replace(state, effect=np.append(state.effect, np.zeros(added))), strengths, within)
+    effect = np.zeros(len(observed.effect_sigma))
+    kept = min(len(effect), len(state.effect))
+    effect[:kept] = state.effect[:kept]
+    return _fit(observed, replace(state, effect=effect), strengths, within)
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
