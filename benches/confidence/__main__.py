@@ -23,6 +23,8 @@ from trihedron import calibrate
 
 STRONG = {"gyro_flicker": np.radians(20.0 / 3600.0), "accel_flicker": 0.3e-3 * G}
 NORMAL_95 = 1.96
+FAR = 4.5
+"""Error in standard errors of which the seed is named; one session in a few thousand by chance."""
 QUANTITIES = ("S_f", "b_f", "S_w", "b_w")
 
 # One factor of a session at a time: length of moves, bits, rate, poses, slow noise, losses. 16 bits, 100 Hz, 18 poses
@@ -110,6 +112,9 @@ def by_level(seeds):
             return made.force, made.rate, made.rate_hz, made.truth, made
 
         said = session(make, {}, seed)
+        for quantity, z in (said[1] or {}).items():
+            if said[0] == "trusted" and np.abs(z).max() > FAR:
+                print(f"seed {seed}: {quantity} {np.abs(z).max():.1f} σ", file=sys.stderr, flush=True)
         for name in ("all", *(f"{factor} {level}" for factor, level in levels.items())):
             rows.setdefault(name, []).append(said)
     return rows
