@@ -30,18 +30,16 @@ STEADY: Curve = (None, None, [])
 
 @dataclass(frozen=True, eq=False)
 class Likely:
-    """A curve of the bias of a sensor (0 the accelerometer, 1 the gyro), its probability, and the likeliest strengths
-    of noise beside it."""
+    """A curve of a bias, its probability among all that are likely, and the likeliest strengths of noise beside it."""
 
-    sensor: int
     curve: Curve
     probability: float
     strengths: Strengths
 
 
 def likely_curves(observed: Observed, core: _core.SessionFit, sensor: int) -> list[Likely]:
-    """Curves of the bias of a sensor and none, likeliest first; a drift has one half a priori. ``core`` is the fit
-    without one."""
+    """Curves of the bias of a sensor (0 the accelerometer, 1 the gyro) and none, likeliest first; a drift has one half
+    a priori. ``core`` is the fit without one."""
     asked = [_columns(curve, sensor) for curve in _curves(observed)]
     # Also with noise as parts have it: a strong random walk absorbs a curve that low noise shows. Moves are believed as
     # in the fit, because their normalisation is part of the evidence.
@@ -49,14 +47,15 @@ def likely_curves(observed: Observed, core: _core.SessionFit, sensor: int) -> li
     found = core.candidate_gains(asked, [1.0], strengths)
     choice = float(np.log(len(asked)))
     if max(float(one[0].max()) for one in found) - choice < np.log(UNLIKELY):
-        return [Likely(sensor, STEADY, 1.0, core.strengths)]
+        return [Likely(STEADY, 1.0, core.strengths)]
     answers = core.evidence([NOTHING, *asked], strengths, ANYTHING)
     score = np.array([one[0] for one in answers]) - [0.0, *[choice] * len(asked)]
-    probability = np.exp(score - np.logaddexp.reduce(score))
+    share = np.exp(score - score.max())
+    share *= share > UNLIKELY * share.sum()
     likely = [
-        Likely(sensor, curve, float(p), one[1])
-        for curve, p, one in zip([STEADY, *asked], probability, answers, strict=True)
-        if p > UNLIKELY
+        Likely(curve, float(p), one[1])
+        for curve, p, one in zip([STEADY, *asked], share / share.sum(), answers, strict=True)
+        if p > 0.0
     ]
     return sorted(likely, key=lambda one: -one.probability)
 

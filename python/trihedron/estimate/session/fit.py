@@ -100,8 +100,8 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     core = _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING)
     steady, likely = observed, []
     for sensor in (0, 1):
-        best, *others = likely_curves(observed, core, sensor)
-        likely.append((best, others))
+        likely.append(likely_curves(observed, core, sensor))
+        best = likely[sensor][0]
         if best.curve is not STEADY:
             observed = with_curve(observed, core, best.curve)
             core = _again(observed, core, best.strengths, ANYTHING)
@@ -110,23 +110,20 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     solution = _solution(observed, weighted if is_expected else core)
-    (accel, accel_others), (gyro, gyro_others) = likely
-    asked = [(one, gyro) for one in accel_others] + [(accel, one) for one in gyro_others]
-    return replace(solution, covariance=_shared(solution, steady, asked))
+    return replace(solution, covariance=_shared(solution, steady, likely))
 
 
-def _shared(solution: SessionSolution, steady: Observed, others: list[tuple[Likely, Likely]]) -> FloatArray:
-    """Covariance (24, 24) of the solution and of ``others`` beside it; ``steady`` is the session without curves."""
+def _shared(solution: SessionSolution, steady: Observed, likely: list[list[Likely]]) -> FloatArray:
+    """Covariance (24, 24) over all likely curves of either sensor, those of the solution first; ``steady`` is the
+    session without curves."""
     out, core = solution.covariance, solution.core
-    for pair in others:
-        observed = steady
-        for one in pair:
-            observed = with_curve(observed, core, one.curve)
-        one = min(pair, key=lambda one: one.probability)
-        fit = _again(observed, core, (*one.strengths[:3], core.strengths[3]))
-        other = _solution(observed, fit)
-        away = other.parameters - solution.parameters
-        out = (1.0 - one.probability) * out + one.probability * (other.covariance + np.outer(away, away))
+    for (best, *others), (beside, *_) in zip(likely, reversed(likely), strict=True):
+        out = best.probability * out
+        for one in others:
+            observed = with_curve(with_curve(steady, core, beside.curve), core, one.curve)
+            other = _solution(observed, _again(observed, core, (*one.strengths[:3], core.strengths[3])))
+            away = other.parameters - solution.parameters
+            out = out + one.probability * (other.covariance + np.outer(away, away))
     return out
 
 
