@@ -20,9 +20,9 @@ from trihedron.session.noise import ANYTHING, START_STRENGTHS, Strengths
 
 UNLIKELY = 0.02
 """Probability of a drift below which it is left out of account."""
-WARM_UPS = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1)
-"""Time constants tried, as fractions of the session: faster ones alone, one or two poses may as well be disturbed;
-slower are a line. Where several are likely they share the covariance."""
+WARM_UPS = (0.1, 0.18, 0.32, 0.56, 1.0)
+"""Time constants tried, four a decade, as fractions of the session: faster ones alone, one or two poses may as well be
+disturbed; slower are a line. Where several are likely they share the covariance."""
 Curve = tuple[FloatArray | None, FloatArray | None, list[float]]
 """Columns of three unknowns, one an axis, of force and rate in SI, and their prior sizes; empty: none."""
 STEADY: Curve = (None, None, [])
