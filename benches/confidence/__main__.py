@@ -1,4 +1,4 @@
-"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--design]``: do intervals hold?
+"""``python benches/confidence [NAME ...] [--sessions N] [--first SEED ...] [--design [--jobs N]]``: do intervals hold?
 
 One line per setting: sessions answered and trusted (no serious finding), marked, failed; over the trusted ones the
 share within 1.96 σ and rms z of S and b of both sensors, and the largest of all in σ. A share is outside where it
@@ -9,6 +9,7 @@ readings.
 import argparse
 import itertools
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -101,22 +102,28 @@ def line(name, rows):
     return f"| {name} | {counts} | {' | '.join(cells or ['–'] * 4)} | {worst:.1f} σ | {' '.join(outside)} |"
 
 
-def by_level(seeds):
+def of_design(seed):
+    """Levels of one session of the design, and what :func:`session` says of it."""
+    levels = design.drawn(seed)
+
+    def make(of):
+        made = design.session(of, **levels)
+        return made.force, made.rate, made.rate_hz, made.truth, made
+
+    said = session(make, {}, seed)
+    for quantity, z in (said[1] or {}).items():
+        if said[0] == "trusted" and np.abs(z).max() > FAR:
+            print(f"seed {seed}: {quantity} {np.abs(z).max():.1f} σ", file=sys.stderr, flush=True)
+    return levels, said
+
+
+def by_level(seeds, jobs):
     """Rows of every level of every factor of the design, each session in one of every factor."""
     rows = {}
-    for seed in seeds:
-        levels = design.drawn(seed)
-
-        def make(of, levels=levels):
-            made = design.session(of, **levels)
-            return made.force, made.rate, made.rate_hz, made.truth, made
-
-        said = session(make, {}, seed)
-        for quantity, z in (said[1] or {}).items():
-            if said[0] == "trusted" and np.abs(z).max() > FAR:
-                print(f"seed {seed}: {quantity} {np.abs(z).max():.1f} σ", file=sys.stderr, flush=True)
-        for name in ("all", *(f"{factor} {level}" for factor, level in levels.items())):
-            rows.setdefault(name, []).append(said)
+    with ProcessPoolExecutor(jobs) as pool:
+        for levels, said in pool.map(of_design, seeds):
+            for name in ("all", *(f"{factor} {level}" for factor, level in levels.items())):
+                rows.setdefault(name, []).append(said)
     return rows
 
 
@@ -126,12 +133,13 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=20, help="from every first seed")
     parser.add_argument("--first", type=int, nargs="+", default=[0], help="seeds of first sessions")
     parser.add_argument("names", nargs="*")
+    parser.add_argument("--jobs", type=int, default=2, help="processes of the design")
     parser.add_argument("--design", action="store_true", help="every factor at once, a row for each of its levels")
     given = parser.parse_args()
     print("| setting | trusted, marked, failed | S_f | b_f | S_ω | b_ω | worst | outside |\n" + "|---" * 8 + "|")
     seeds = [first + k for first in given.first for k in range(given.sessions)]
     if given.design:
-        for name, rows in sorted(by_level(seeds).items()):
+        for name, rows in sorted(by_level(seeds, given.jobs).items()):
             print(line(name, rows))
         return
     for name, options in SETTINGS.items():
