@@ -21,10 +21,12 @@ from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
+UNSEEN = 1.0
+"""Scatter from pose to pose, in standard errors of a pose mean, of 1/f noise below the white noise of the poses: none
+shows it."""
 LEAST_TIMES = 2.0
-"""Rms of the bias changes, in standard errors of a pose mean, above which a bias process is named. 1/f noise below the
-white noise inside poses causes changes of about one such error: at most 1.3 in 220 healthy sessions of three grades, up
-to 1.63 with 1/f noise of 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
+"""Rms of a drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise
+drifts too, up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
 FLICKER_WITHIN = 1.5
 """Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small."""
 
@@ -45,7 +47,7 @@ class BiasStrength:
     price: float
     """Selection penalty of a catalogue effect, in twice a log-likelihood; it applies to a named process too."""
     is_large: bool
-    """Whether the bias changes exceed those that undetected 1/f noise causes (``LEAST_TIMES``)."""
+    """Whether a drift exceeds that of 1/f noise (``LEAST_TIMES``)."""
 
     @property
     def p_value(self) -> float:
@@ -99,7 +101,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     without = again(model, model.terms, bounds_without(model, effect))
     gain = 2.0 * (model.log_evidence - without.log_evidence)
     size, std = _size(model, effect)
-    is_large = _times_error(model, effect) > LEAST_TIMES
+    is_large = not effect.walks or _times_error(model, effect.sensor) > LEAST_TIMES
     parameters, statement = effect.of_strength(size, std)
     # Noise strengths are in every hypothesis, so no selection penalty applies. Each axis beyond the first is one more
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
@@ -113,14 +115,11 @@ def _flicker(model: Hypothesis) -> FloatArray:
     """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
     obs = model.obs
     expected = np.array([obs.force_scatter, obs.rate_scatter])
-    return np.asarray(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0])
+    return np.maximum(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0], UNSEEN)
 
 
-def _times_error(model: Hypothesis, effect: BiasProcess) -> float:
+def _times_error(model: Hypothesis, sensor: int) -> float:
     """Rms of the bias about its mean over the poses, in standard errors of a pose mean, largest axis."""
-    sensor = effect.sensor
-    if not effect.walks:
-        return float(max(_scatter(model, sensor)))
     unit = model.obs.scatter_unit()[sensor] * model.context.si_per_raw(sensor)
     return float(np.max(model.fitted.bias(sensor).std(axis=0) / unit)) if model.obs.n_poses else 0.0
 
