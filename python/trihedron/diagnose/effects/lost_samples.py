@@ -1,5 +1,4 @@
-"""Losses of samples: intervals where the two sides join only if samples are inserted (eq. 8.16), and losses that quick
-motion hides from that join, whose count gravity determines (eq. 8.16b)."""
+"""Losses of samples: intervals where the two sides join only if samples are inserted (eq. 8.16)."""
 
 from __future__ import annotations
 
@@ -8,32 +7,29 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import percentile_filter
 
-from trihedron.arrays import FloatArray, IntArray
-from trihedron.diagnose.effects.direct import MUST_HALVE
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import move_residuals, wrt_lost_time
+from trihedron.diagnose.session.solve import move_residuals
 from trihedron.records import Recording, Segments
 from trihedron.session.model import SessionState
 
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
-AGREEMENT = 30.0
-"""Chi-square by which a smaller count may fit worse than the best: a large gap is no exact cubic."""
-LEAST_GAIN = 40.0
-"""Chi-square that a count of a hidden loss must gain: by chance once in 4·10⁹, once in 650 sessions."""
-OVER_USUAL, LEFT_SHARE = 5.0, 0.1
-"""The gain must be five times the usual chi-square of joins nearby (120 or more), and the remainder small: no loss is
-found in 48 healthy sessions."""
-NARROW = 3
-"""Samples on either side that a join uses in quick motion."""
-PLACE_S = 0.01
-"""Spacing of the places tried, s."""
-CUBIC, QUINTIC = 4, 6
-"""Coefficients."""
-MOST_IN_A_MOVE = 3
+LEAST_GAIN = 20.0
+"""Log-likelihood that missing samples must gain at a place: by chance once in 5·10⁸, more often where the motion is no
+stationary process (a jolt); gravity after the move decides."""
+ORDER = 10
+"""Order of the autoregression that predicts the motion from sample to sample."""
+SPECTRUM = 2**14
+"""Frequencies of its spectrum: many more than samples in a gap."""
+N_COARSE = 8
+"""Counts tried at every place; all are tried where one of these gains half of what is needed."""
+NOT_ZERO = 1e-9
+"""Share of white noise in the covariance of the motion, so that it has an inverse."""
+LEVEL = 10.0
+"""Variance of a window's mean over that of the motion: it is free."""
 FEWEST_OF_PARABOLA = 6
 """Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
@@ -53,41 +49,15 @@ def most_lost(obs: Observations) -> int:
     return max(MOST_LOST, round(LONGEST_LOSS_S * obs.recording.rate_hz))
 
 
-@lru_cache(maxsize=4)
-def _joints(w: int, order: int, most: int) -> FloatArray:
-    """(counts, 2w, 2w) residual projectors of a polynomial of ``order`` coefficients across n missing samples."""
-    projectors = []
-    for n in range(most + 1):
-        t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
-        q, _ = np.linalg.qr(np.vander(t - t.mean(), order))
-        projectors.append(np.eye(2 * w) - q @ q.T)
-    return np.stack(projectors)
-
-
-def _windows(obs: Observations, samples: IntArray, w: int) -> list[FloatArray]:
-    """(2w, k, axes) readings of each sensor, ``w`` on either side of the intervals that begin at ``samples`` (k,)."""
-    return [np.stack([x[samples + o] for o in range(1 - w, w + 1)]) for x in obs.whitened]
-
-
-def _trials(projectors: FloatArray, windows: list[FloatArray]) -> FloatArray:
-    """(k, counts, sensors) chi-square of a polynomial across every count of missing samples: a projector is its own
-    square."""
-    out = []
-    for one in windows:
-        left = projectors.reshape(-1, len(one)) @ one.reshape(len(one), -1)
-        left = left.reshape(len(projectors), *one.shape)
-        out.append(np.einsum("nikc,nikc->kn", left, left))
-    return np.stack(out, axis=2)
-
-
 @lru_cache(maxsize=8)
 def find_losses(obs: Observations) -> tuple[Loss, ...]:
-    """Intervals where the motion on either side joins smoothly only if samples are inserted (eq. 8.16).
+    """Intervals where the motion on either side joins only if samples are inserted (eq. 8.16), move after move.
 
-    For a trial count n one cubic is fitted to six samples before and six after, those after shifted by n steps. The
-    count that fits all channels best is accepted if no sensor contradicts it and the remaining chi-square is usual.
+    Over windows of six samples before and six after, in both sensors, likelihoods of an autoregression are compared: n
+    samples missing, or none. Its size is each window's own.
     """
-    losses = sorted((one for m in range(obs.n_moves) for one in _losses_of(obs, m)), key=lambda loss: -loss.gain)
+    models = [_model(obs, values) for values in obs.whitened]
+    losses = sorted((one for m in range(obs.n_moves) for one in _losses_of(obs, models, m)), key=lambda one: -one.gain)
     chosen: list[Loss] = []
     for loss in losses:
         if all(abs(loss.sample - other.sample) > 2 * HALF_WINDOW for other in chosen):
@@ -95,81 +65,66 @@ def find_losses(obs: Observations) -> tuple[Loss, ...]:
     return tuple(sorted(chosen, key=lambda loss: loss.sample))
 
 
-def _losses_of(obs: Observations, m: int) -> list[Loss]:
+def _losses_of(obs: Observations, models: list[tuple[FloatArray, FloatArray]], m: int) -> list[Loss]:
     (a, b), w, most = obs.move_ranges[m], HALF_WINDOW, most_lost(obs)
     k = a + np.arange(w - 1, b - a - w)
-    k = k[~clipped_samples(obs)[k]]
-    if len(k) == 0:
-        return []
-    stack = _joints(w, CUBIC, most)
-    windows = _windows(obs, k, w)
-    zero, dof = _trials(stack[:1], windows)[:, 0], 3 * (2 * w - CUBIC)
-    # Usual chi-square of joins in motion as quick as here: jitter and curvature are no losses.
-    near = [percentile_filter(one, 75, size=8 * w + 1, mode="nearest") for one in zero.T]
-    usual = np.maximum(np.stack(near, axis=1), dof)
-    # Only steps that stand out are searched; the quieter sensor may be too noisy to show the jump.
-    suspect = np.flatnonzero((zero > 3.0 * usual).any(axis=1))
-    if len(suspect) == 0:
-        return []
-    trial = _trials(stack, [v[:, suspect] for v in windows])
-    # Quick motion over a wide gap is no cubic: a quintic is used where the cubic leaves too much.
-    quick = (trial.min(axis=1) > 3.0 * usual[suspect]).any(axis=1)
-    if quick.any():
-        trial[quick] = _trials(_joints(w, QUINTIC, most), [v[:, suspect[quick]] for v in windows])
-    total = trial.sum(axis=2)
-    # Where the minimum is flat the smallest count is taken: the tilt error after the move gives the exact one.
-    best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
-    left, usual, zero = trial[np.arange(len(best)), best], usual[suspect], zero[suspect]
-    gains = zero - left
-    # More than a count gains where the signal is merely rough (vibration, jitter), and no sensor contradicts it.
-    clear = (gains > OVER_USUAL * usual).any(axis=1) & (left < LEFT_SHARE * zero + 3.0 * usual).all(axis=1)
-    found = np.flatnonzero(clear & (best > 0) & (best < most))
-    return [Loss(int(k[suspect[i]]), m, int(best[i]), float(gains[i].sum())) for i in found]
+    gaps = np.cumsum(np.diff(obs.time_s, prepend=obs.time_s[0]) > 1.5 / obs.recording.rate_hz)
+    k = k[~clipped_samples(obs)[k] & (gaps[k + w] == gaps[k + 1 - w])]
+    coarse = np.unique(np.r_[0, np.rint(np.geomspace(1, most, N_COARSE))]).astype(np.intp)
+    k = k[_gains(obs, models, k, coarse).max(axis=1) > 0.5 * LEAST_GAIN]
+    gains = _gains(obs, models, k, np.arange(most + 1))
+    best = gains.argmax(axis=1)
+    return [
+        Loss(int(sample), m, int(n), 2.0 * float(gain))
+        for sample, n, gain in zip(k, best, gains.max(axis=1), strict=True)
+        if gain > LEAST_GAIN and 0 < n < most
+    ]
 
 
-def hidden_losses(obs: Observations, state: SessionState, m: int, usual: float, limit: float) -> list[Loss]:
-    """Losses in one move that contradicts a session (``state``) beyond a chi-square of ``limit``, the largest first.
-
-    A place and a count score by how well both sensors join there and by the misfit of gravity and velocity after the
-    move, each in units of its usual chi-square: that of joins in this move, and ``usual`` of the other moves.
-    """
-    found: list[Loss] = []
-    gain, places = _of_joints(obs, m)
-    for _ in range(MOST_IN_A_MOVE if len(places) else 0):
-        held = {one.sample: one.count for one in found}
-        moved = with_inserted(obs, m, held)
-        before = move_residuals(moved, state)[0]
-        misfit = float(before @ before)
-        if misfit <= limit:
-            break
-        free = np.array([all(abs(k - other) > 2 * NARROW for other in held) for k in places])
-        after = places - obs.move_ranges[m][0] + sum(count * (places > sample) for sample, count in held.items())
-        by_time = wrt_lost_time(moved, state, 0)
-        by_sample = 0.5 * (by_time[after] + by_time[after + 1]) / obs.recording.rate_hz
-        counts = np.arange(gain.shape[1])
-        left = before + counts[None, :, None] * by_sample[:, None, :]
-        score = gain + (misfit - (left**2).sum(axis=2)) / usual
-        score[~free] = -np.inf
-        at, n = np.unravel_index(int(score.argmax()), score.shape)
-        loss = Loss(int(places[at]), m, int(n), float(score[at, n]))
-        without = residual_after(obs, state, m, held | {loss.sample: loss.count})
-        if gain[at, n] < LEAST_GAIN or float(without @ without) > MUST_HALVE * misfit:
-            break  # nonlinear scale or a range limit: a better misfit alone does not prove a gap
-        found.append(loss)
-    return found
+def _gains(
+    obs: Observations, models: list[tuple[FloatArray, FloatArray]], samples: IntArray, counts: IntArray
+) -> FloatArray:
+    """(samples, counts) log-likelihood that missing samples behind each of ``samples`` gain, the first count none."""
+    out = np.zeros((len(samples), len(counts)))
+    for (inverse, log_det), values in zip(models, obs.whitened, strict=True):
+        window = np.stack([values[samples + o] for o in range(1 - HALF_WINDOW, HALF_WINDOW + 1)])
+        n, _, axes = window.shape
+        flat = (window - window.mean(axis=0)).reshape(n, -1)
+        for c, count in enumerate(counts):
+            squares = ((inverse[count] @ flat) ** 2).sum(axis=0).reshape(-1, axes).sum(axis=1)
+            out[:, c] -= 0.5 * axes * (n * np.log(squares) + log_det[count])
+    return out - out[:, :1]
 
 
-def _of_joints(obs: Observations, m: int) -> tuple[FloatArray, IntArray]:
-    """(places, counts) chi-square that a count gains over zero at every place of a move, and the places (samples)."""
-    a, b = obs.move_ranges[m]
-    stride = max(1, round(PLACE_S * obs.recording.rate_hz))
-    k = a + np.arange(NARROW - 1, b - a - NARROW, stride)
-    k = k[~clipped_samples(obs)[k]]
-    if not len(k):
-        return np.zeros((0, 1)), k
-    costs = _trials(_joints(NARROW, CUBIC, most_lost(obs)), _windows(obs, k, NARROW))
-    ordinary = np.maximum(np.percentile(costs[:, :1], 75, axis=0) / (3 * (2 * NARROW - CUBIC)), 1.0)
-    return ((costs[:, :1] - costs) / ordinary).sum(axis=2), k
+def _model(obs: Observations, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of one sensor's motion in windows with 0, 1, ... samples missing in their middle: the inverse Cholesky factor
+    (counts, 2w, 2w) of its covariance, its mean free, and the logarithm of the determinant (counts,)."""
+    covariance = _autocovariance([values[a:b] for a, b in obs.move_ranges])
+    w, inverse, log_det = HALF_WINDOW, [], []
+    for n in range(most_lost(obs) + 1):
+        at = np.r_[np.arange(w), np.arange(w) + w + n]
+        lag = covariance[np.abs(at[:, None] - at)]
+        half = np.linalg.cholesky(lag + covariance[0] * (LEVEL + NOT_ZERO * np.eye(2 * w)))
+        inverse.append(np.linalg.inv(half))
+        log_det.append(2.0 * float(np.log(np.diag(half)).sum()))
+    return np.stack(inverse), np.array(log_det)
+
+
+def _autocovariance(moves: list[FloatArray]) -> FloatArray:
+    """(lags,) autocovariance of the autoregression that Burg's method fits to all moves and axes together (Burg 1975),
+    every move in units of its own steps."""
+    forward = [(one - one.mean(axis=0)) / (np.sqrt(np.mean(np.diff(one, axis=0) ** 2)) + TINY) for one in moves]
+    backward = forward
+    coefficients = np.ones(1)
+    for _ in range(ORDER):
+        pairs = [(f[1:], b[:-1]) for f, b in zip(forward, backward, strict=True) if len(f) > 1]
+        power = sum(float((f**2).sum() + (b**2).sum()) for f, b in pairs)
+        reflection = -2.0 * sum(float((f * b).sum()) for f, b in pairs) / max(power, TINY)
+        forward = [f + reflection * b for f, b in pairs]
+        backward = [b + reflection * f for f, b in pairs]
+        longer = np.append(coefficients, 0.0)
+        coefficients = longer + reflection * longer[::-1]
+    return np.fft.irfft(1.0 / np.abs(np.fft.rfft(coefficients, SPECTRUM)) ** 2, SPECTRUM)
 
 
 def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> FloatArray:
