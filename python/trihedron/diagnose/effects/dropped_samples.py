@@ -90,16 +90,16 @@ class _Move:
         return float(residual @ residual)
 
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
-        """Losses with the counts that gravity determines; losses that do not reduce the misfit are removed."""
-        own = sorted(losses, key=lambda one: -one.gain)
-        for _ in range(2 if len(own) > 1 else 1):  # several in one move are counted in turn
-            for k in range(len(own)):
-                own[k] = self._best(own, k)
-        for one in sorted(own, key=lambda one: one.gain):
-            others = [other for other in own if other is not one]
-            best = self.misfit(own)
-            if self.misfit(others) - best < MIN_FALL * max(best / 5.0, self.usual) and self.sigma(own, one) < one.count:
-                own = others
+        """Losses with the counts that gravity determines, the clearest first; those that do not reduce the misfit are
+        left out."""
+        own: list[Loss] = []
+        for one in sorted(losses, key=lambda one: -one.gain):
+            tried = [*own, one]
+            for k in reversed(range(len(tried))):  # the new one, then those beside it
+                tried[k] = self._best(tried, k)
+            best = self.misfit(tried)
+            if self.misfit(own) - best >= MIN_FALL * max(best / 5.0, self.usual):
+                own = tried
         return own
 
     def _best(self, own: list[Loss], k: int) -> Loss:
