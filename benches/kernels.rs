@@ -3,7 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
-use trihedron::allan::{Column, Kind, octave_clusters, variances};
+use trihedron::allan::{Column, Kind, variances};
 use trihedron::attitude::{Form, IDENTITY, Samples};
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
 use trihedron::norm_invariant::{Frame, Readings, Settings, fit};
@@ -137,7 +137,10 @@ fn allan(c: &mut Criterion) {
         channels: 1,
         channel: 0,
     };
-    let clusters = octave_clusters(data.len() / 8, 4);
+    let clusters: Vec<usize> = (0..16)
+        .map(|octave| 1 << octave)
+        .take_while(|m| *m <= data.len() / 8)
+        .collect();
     let mut group = c.benchmark_group("allan");
     group.throughput(Throughput::Elements((data.len() * clusters.len()) as u64));
     for kind in [

@@ -95,15 +95,7 @@ pub fn exp(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// Left Jacobian of [`exp`]: `exp(v + δ) ≈ exp(J δ) exp(v)`.
-#[must_use]
-pub fn left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
-    let (_, b, c) = series(v.norm_squared());
-    let k = skew(v);
-    Matrix3::identity() + k * b + k * k * c
-}
-
-/// [`exp`] and [`left_jacobian`] of one vector, from one series.
+/// [`exp`] of a vector and its left Jacobian, `exp(v + δ) ≈ exp(J δ) exp(v)`, from one series.
 #[must_use]
 pub fn exp_and_left_jacobian(v: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let (a, b, c) = series(v.norm_squared());

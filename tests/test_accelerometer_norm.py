@@ -1,14 +1,11 @@
 """Method 2: truth comes back inside its uncertainties, and what the poses do not show is not claimed."""
 
-import doctest
-import importlib
-
 import numpy as np
 import pytest
 from scipy import stats
 
 from trihedron import _core
-from trihedron.estimate.accelerometer.norm import calibrate_norm, ellipsoid
+from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.verdict import SIGNIFICANCE, held_out_findings
 from trihedron.estimate.verification import norm_error
 from trihedron.records import FindingCode, SensorCalibration, Severity
@@ -160,13 +157,6 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n):
     # An entry that is nearly nothing moves by as little of the largest ones.
     np.testing.assert_allclose(near.covariance, careful.covariance, atol=1e-6 * np.abs(careful.covariance).max())
     assert abs(near.chi2 / careful.chi2 - 1.0) < 1e-6
-
-
-def test_the_documented_call_of_the_ellipsoid_gives_its_own_answer():
-    found = doctest.testmod(importlib.import_module("trihedron.estimate.accelerometer.norm"))
-    assert (found.attempted, found.failed) == (6, 0)
-    with pytest.raises(ValueError, match="nine"):
-        ellipsoid(np.r_[np.eye(3), -np.eye(3)], 9.81)
 
 
 @pytest.mark.parametrize(("n", "dof"), [(10, 5), (30, 21)])

@@ -104,7 +104,6 @@ out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero,
 for symmetric in (False, True):
     fit = _core.fit_norm(readings, 1e-6 * np.eye(3)[None], _core.NormSettings(9.8, symmetric=symmetric))
     out += [fit.S, fit.b, fit.covariance / fit.covariance.max(), fit.residuals]
-    out += list(_core.fit_ellipsoid(readings, 9.8, symmetric))
 print(json.dumps(np.concatenate([np.ravel(part) for part in out]).tolist()))
 """
 

@@ -204,13 +204,11 @@ def contiguous_calls() -> dict[str, tuple]:
     rng = np.random.default_rng(7)
     vectors, unit = rng.standard_normal((50, 3)), rng.standard_normal((60, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
-    readings = 9.8 * unit @ np.array([[1.02, 0, 0], [0.01, 0.97, 0], [-0.02, 0.03, 1.0]]).T + [0.1, -0.2, 0.3]
     windows = np.array([[10, 60], [80, 150]], dtype=np.int64)
     calls = {
         "rotation_from_vector": (vectors,),
         "vector_from_rotation": (_core.rotation_from_vector(vectors),),
         "block_statistics": (rng.standard_normal((400, 3)), 8),
-        "fit_ellipsoid": (readings, 9.8, False),
         "integrate_raw_rate": (np.arange(200) / 100.0, rng.standard_normal((200, 3)), windows, 1),
         "simulate_first_order": (rng.standard_normal((100, 3)), 0.01, [0.1, 0.2, 0.3]),
     }

@@ -56,7 +56,10 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     asked = [(*columns, one.sizes.tolist())]
     ((seen, _, _),) = core.candidate_gains(asked, [1.0], [core.strengths])
     # What the fit's unknowns imitate is projected out; the rest is a Gaussian with a prior of the sizes.
-    projected = core.project(np.ascontiguousarray(core.columns(*columns))) * one.sizes
+    own = core.columns(*columns)
+    J = core.jacobian()
+    J = J / np.linalg.norm(J, axis=0)
+    projected = (own - J @ np.linalg.lstsq(J, own, rcond=None)[0]) * one.sizes
     normal, gradient = projected.T @ projected, projected.T @ core.residual
     inner = np.eye(len(normal)) + normal
     gain = 0.5 * gradient @ np.linalg.solve(inner, gradient) - 0.5 * np.linalg.slogdet(inner)[1]

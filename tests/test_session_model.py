@@ -93,10 +93,6 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     # Two factorisations of one matrix of condition 1e6: ten digits are left, the ridge takes the rest.
     np.testing.assert_allclose(fitted.covariance(), covariance[:18, :18], rtol=1e-6, atol=0)
     np.testing.assert_allclose(fitted.leverage, np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
-    columns = np.random.default_rng(1).standard_normal((len(r), 3))
-    np.testing.assert_allclose(
-        fitted.core.project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
-    )
     folds = folds_of(fitted)
     found = predict_held_out(fitted, folds)
     for k, held in enumerate(folds):

@@ -182,29 +182,3 @@ pub fn from_running_sum(p: &[f64], clusters: &[usize], kind: Kind) -> Curve {
         weight,
     }
 }
-
-/// Cluster sizes from 1 to the longest with a term, `per_octave` to the octave, nested so that `m` and `2m` both occur.
-#[must_use]
-pub fn octave_clusters(longest: usize, per_octave: usize) -> Vec<usize> {
-    let mut sizes = Vec::new();
-    let mut step = 0_i32;
-    let per_octave = i32::try_from(per_octave.max(1)).unwrap_or(1);
-    loop {
-        let m = 2.0_f64
-            .powf(f64::from(step) / f64::from(per_octave))
-            .round();
-        if m > longest as f64 {
-            return sizes;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "1 ≤ m ≤ longest"
-        )]
-        let m = m as usize;
-        if sizes.last() != Some(&m) {
-            sizes.push(m);
-        }
-        step += 1;
-    }
-}

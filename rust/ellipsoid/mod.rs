@@ -6,7 +6,7 @@
 mod moments;
 mod standard;
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use crate::error::{Error, Result};
 use crate::sensor_model::{Frame, Model};
@@ -191,73 +191,6 @@ pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let centre = Vector3::new(x[0], x[1], x[2]);
     let squared = x[3] + centre.norm_squared();
     (squared > 0.0).then(|| (centre, squared.sqrt()))
-}
-
-/// Model from raw readings by an ellipsoid: unconstrained, then ellipsoid-constrained if the first quadric is none.
-///
-/// # Errors
-/// When the readings do not determine an ellipsoid, naming the directions that are missing.
-pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Result<Model> {
-    if !(gravity.is_finite() && gravity > 0.0) {
-        return Err(Error::bad_input(format!(
-            "gravity must be a positive number in m/s², got {gravity}"
-        )));
-    }
-    let standard = Standardisation::of(readings)?;
-    let by_moments = by_moments(readings, &standard);
-    let model = match by_moments.and_then(|quadric| quadric.model(gravity, frame)) {
-        Some(model) => model,
-        None => by_rows(readings, &standard, gravity, frame)?,
-    };
-    let model = standard.undo(&model);
-    if model.s.iter().chain(model.b.iter()).all(|v| v.is_finite()) {
-        Ok(model)
-    } else {
-        Err(Error::not_determined(
-            "the ellipsoid through the static poses has no finite size: check the readings",
-        ))
-    }
-}
-
-/// Fit from rows, for when sums lose too many digits or their quadric is no ellipsoid.
-fn by_rows(
-    readings: &[Vector3<f64>],
-    standard: &Standardisation,
-    gravity: f64,
-    frame: Frame,
-) -> Result<Model> {
-    let u: Vec<_> = readings.iter().map(|a| standard.apply(a)).collect();
-    fit_quadric(&u)?
-        .model(gravity, frame)
-        .or_else(|| {
-            fit_ellipsoid(&u)
-                .ok()
-                .and_then(|quadric| quadric.model(gravity, frame))
-        })
-        .ok_or_else(|| {
-            Error::not_determined(format!(
-                "the quadric through the static poses is not an ellipsoid: {}",
-                missing_directions(&u)
-            ))
-        })
-}
-
-/// [`fit_quadric`] in two passes over the readings without storing rows: the sums, then one step of refinement, which
-/// restores the digits that sums of squares lose. `None` where they would lose too many.
-fn by_moments(readings: &[Vector3<f64>], standard: &Standardisation) -> Option<Quadric> {
-    let moments = Moments::of(readings, standard);
-    let first = moments.quadric()?;
-    let mut rest = SVector::<f64, 9>::zeros();
-    for reading in readings {
-        let u = standard.apply(reading);
-        let missing = 1.0 - u.dot(&(first.a * u)) - 2.0 * first.h.dot(&u);
-        rest += SVector::from(row(&u)) * missing;
-    }
-    let more = quadric(moments.correction(&rest)?.as_slice());
-    Some(Quadric {
-        a: first.a + more.a,
-        h: first.h + more.h,
-    })
 }
 
 /// Names the half axes to which no reading points within 55° (the angle from an axis to the corner of a cube).

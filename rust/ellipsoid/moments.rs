@@ -68,11 +68,6 @@ impl Moments {
         solve(&self.gram, &self.sum).map(|x| quadric(x.as_slice()))
     }
 
-    /// Correction of the quadric's coefficients for residuals `1 - H x`, of which `Hᵀ(1 - H x)` is given.
-    pub(crate) fn correction(&self, rest: &SVector<f64, COLUMNS>) -> Option<SVector<f64, COLUMNS>> {
-        solve(&self.gram, rest)
-    }
-
     /// Centre and radius of the sphere through the readings; `None` as above.
     pub(crate) fn sphere(&self) -> Option<(Vector3<f64>, f64)> {
         let mut gram = SMatrix::<f64, 4, 4>::zeros();

@@ -96,19 +96,6 @@ pub struct Certainty {
     pub directions: DMatrix<f64>,
 }
 
-impl Certainty {
-    /// Largest over smallest singular value; infinite when a direction is not determined.
-    #[must_use]
-    pub fn condition(&self) -> f64 {
-        let n = self.singular_values.len();
-        if self.rank < n {
-            f64::INFINITY
-        } else {
-            self.singular_values[0] / self.singular_values[n - 1]
-        }
-    }
-}
-
 /// SVD of a Jacobian (or its R factor) scaled to unit columns: covariance, rank, weak directions.
 #[must_use]
 pub fn certainty(r_factor: &DMatrix<f64>, rank_tolerance: f64) -> Certainty {

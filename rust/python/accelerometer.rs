@@ -6,7 +6,6 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_vectors, flat3, matrices3, rows, rows3};
-use crate::ellipsoid;
 use crate::norm_invariant::{self, Fit, Frame, Model, Readings, Settings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -15,7 +14,6 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_ellipsoid, module)?)?;
     Ok(())
 }
 
@@ -191,24 +189,4 @@ fn fit_norm_held_out<'py>(
             .collect::<Vec<f64>>())
     })?;
     rows(py, &flat, 3)
-}
-
-/// `S` and `b` of a model.
-type SAndB<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
-
-#[pyfunction]
-fn fit_ellipsoid<'py>(
-    py: Python<'py>,
-    readings: PyReadonlyArray2<'py, f64>,
-    gravity_m_s2: f64,
-    symmetric: bool,
-) -> PyResult<SAndB<'py>> {
-    let readings = flat3("readings", &readings)?;
-    let model = super::run(py, || {
-        ellipsoid::calibrate(as_vectors(&readings), gravity_m_s2, frame(symmetric))
-    })?;
-    Ok((
-        rows(py, model.s.transpose().as_slice(), 3)?,
-        model.b.as_slice().to_pyarray(py),
-    ))
 }

@@ -76,14 +76,6 @@ impl Rows {
         self.residual.is_empty()
     }
 
-    /// Multiplies residuals and derivatives by a factor.
-    pub fn scale_mut(&mut self, factor: f64) {
-        self.residual *= factor;
-        self.border *= factor;
-        self.here *= factor;
-        self.next *= factor;
-    }
-
     /// `J x` for columns `x` `(n, k)`.
     #[must_use]
     pub fn times(&self, layout: Layout, x: &DMatrix<f64>) -> DMatrix<f64> {

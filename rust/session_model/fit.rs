@@ -53,10 +53,6 @@ pub struct Fit {
     pub stop: Stop,
     /// Total number of linearisations.
     pub iterations: usize,
-    /// Length of the undamped step at that state, in standard errors of all rows together.
-    pub step: f64,
-    /// Left side of the orthogonality test GN4.
-    pub gradient: f64,
 }
 
 impl Fit {
@@ -193,8 +189,6 @@ pub(super) fn fit_from(
                 factor,
                 stop: ended.stop,
                 iterations,
-                step: ended.step,
-                gradient: ended.gradient,
             });
         }
     }

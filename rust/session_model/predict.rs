@@ -57,25 +57,6 @@ impl Fit {
             .collect()
     }
 
-    /// Columns `(rows, k)` minus their projection onto the unknowns of the fit.
-    #[must_use]
-    pub fn project(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let layout = self.layout();
-        let firsts = self.first_rows();
-        let mut side = DMatrix::zeros(layout.n(), columns.ncols());
-        for (group, &first) in self.groups.iter().zip(&firsts) {
-            let part = columns.rows(first, group.rows.len()).into_owned();
-            group.rows.add_transposed(layout, &part, &mut side);
-        }
-        let x = self.factor.solve(&side);
-        let mut out = columns.clone();
-        for (group, &first) in self.groups.iter().zip(&firsts) {
-            let mut part = out.rows_mut(first, group.rows.len());
-            part -= group.rows.times(layout, &x);
-        }
-        out
-    }
-
     /// `(24, 24)` covariance of `(S_a, b_a, S_ω, b_ω)` row by row, on raw readings whose centres were `origins`
     /// (accelerometer, gyro), and `b_ω` itself.
     ///

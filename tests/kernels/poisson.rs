@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use trihedron::poisson::{
     MoveRange, PreparedMove, RateModel, RateNoise, Turn, prepare, step_weights,
 };
-use trihedron::rotation::{exp, left_jacobian, log, skew};
+use trihedron::rotation::{exp, exp_and_left_jacobian, log, skew};
 use trihedron::simd::Instructions;
 
 const MODELS: [RateModel; 3] = [RateModel::Constant, RateModel::Linear, RateModel::Coning];
@@ -242,7 +242,7 @@ fn slowly(
         let phi0 = s * m0 + (b[0] * (1.0 - part) + b[1] * part) * h;
         let phi1 = s * m1 + (b[1] - b[0]) * (h * h / 12.0 / span);
         let phi = phi0 + phi0.cross(&phi1);
-        let to_start = turn.rotation.transpose() * left_jacobian(&phi);
+        let to_start = turn.rotation.transpose() * exp_and_left_jacobian(&phi).1;
         let (p, q) = (
             to_start * (Matrix3::identity() - skew(&phi1)),
             to_start * skew(&phi0),

@@ -4,9 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-    PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
+    PyReadonlyArray3, ToPyArray,
 };
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -14,12 +13,11 @@ use super::evidence::{Answer, Candidate, Glance, seen, tuned};
 use super::read_out::{Blocks, Rows, flagged, labels, moves, path, stacked};
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
-use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
+use crate::python::arrays::{matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;
 
-type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// `S_a`, `b_a`, `S_w`, covariance.
 type Rest<'py> = (
@@ -127,12 +125,6 @@ impl SessionFit {
         self.fit.iterations
     }
 
-    /// `(undamped step in standard errors of all rows, orthogonality of the residual)`.
-    #[getter]
-    fn convergence(&self) -> (f64, f64) {
-        (self.fit.step, self.fit.gradient)
-    }
-
     /// `(rows,)` whitened residuals.
     #[getter]
     fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -194,25 +186,6 @@ impl SessionFit {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
         stacked(py, &parts, effects.k)
-    }
-
-    /// Columns `(rows, k)` minus their projection onto the unknowns of the fit.
-    fn project<'py>(
-        &self,
-        py: Python<'py>,
-        columns: Array2<'py>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        if columns.shape()[0] != self.fit.n_rows() {
-            return Err(PyValueError::new_err(format!(
-                "columns must have {} rows, got {}",
-                self.fit.n_rows(),
-                columns.shape()[0]
-            )));
-        }
-        let columns = dmatrix(&columns);
-        let fit = Arc::clone(&self.fit);
-        let out = run(py, || Ok(fit.project(&columns)))?;
-        matrix(py, &out)
     }
 
     /// Log-evidence of every hypothesis (force, rate, prior sizes of further effects), all but noise strengths

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,50 +18,6 @@ from trihedron.records.finding import Finding
 from trihedron.records.words import words
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
-
-
-def ellipsoid(
-    means: npt.ArrayLike, gravity_m_s2: float, frame: Literal["lower", "symmetric"] = "lower"
-) -> tuple[FloatArray, FloatArray]:
-    """S and b of the ellipsoid through the readings (eq. 18, 19): poses have equal weights, no uncertainty.
-
-    ``trihedron.calibrate`` starts from it and minimises ``|S a' + b| - |g|`` by least squares, weighted by the noise of
-    every pose.
-
-    Parameters
-    ----------
-    means : (n, 3)
-        Mean raw reading of every pose, n >= 9 (``Segments.accelerometer_mean``).
-    gravity_m_s2 : float
-        |g| [m/s²].
-    frame : "lower" or "symmetric"
-        Body frame, which poses leave free up to a rotation: S lower-triangular (X along accelerometer X), or S
-        symmetric.
-
-    Returns
-    -------
-    S : (3, 3)
-        m/s² per raw unit.
-    b : (3,)
-        m/s².
-
-    Raises
-    ------
-    ValueError
-        Too few poses, or poses that lie on no ellipsoid; the message names the directions that are missing.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> rng = np.random.default_rng(1)
-    >>> poses = rng.standard_normal((12, 3))
-    >>> poses *= 9.81 / np.linalg.norm(poses, axis=1, keepdims=True)
-    >>> S, b = ellipsoid((poses - [0.3, -0.2, 0.5]) / 0.01, 9.81)
-    >>> S.round(6).diagonal().tolist(), b.round(6).tolist()
-    ([0.01, 0.01, 0.01], [0.3, -0.2, 0.5])
-    """
-    return _core.fit_ellipsoid(inputs.pose_means(means, 1.0)[0], inputs.gravity(gravity_m_s2), frame == "symmetric")
-
 
 METHOD = "norm of gravity in static poses"
 
