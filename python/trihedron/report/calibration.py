@@ -35,7 +35,7 @@ from trihedron.report.numbers import (
     with_unit,
 )
 from trihedron.report.verification import USES
-from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
@@ -77,7 +77,18 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     errors = _errors(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
-    return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
+    grave = undetermined(serious_ones(calibration.findings))
+    return [*grave, *held, *scale_headlines(calibration), *in_sample, *_drift_headlines(calibration)]
+
+
+def _drift_headlines(calibration: Calibration) -> list[Headline]:
+    """How far the bias of the gyro moves within the recording, where it does: b is then its mean."""
+    out = []
+    for drift in (f.numbers for f in calibration.findings if f.code is FindingCode.GYRO_BIAS_DRIFT and f.numbers):
+        size, axis = degrees_from_radians(drift["change_rad_s"]), XYZ[int(drift["axis"]) - 1]
+        beside = f"largest change between poses ({axis}), {plain_number(drift['times'], 2)} times its noise"
+        out.append(Headline("gyro bias changes by", plain_number(size, 2), "°/s", beside))
+    return out
 
 
 def scale_headlines(calibration: Calibration) -> list[Headline]:
@@ -118,14 +129,22 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
     return HELD_OUT if is_held else f"{IN_SAMPLE} only ({how_many(quality.dof, 'degree')} of freedom)"
 
 
-def verdict(calibration: Calibration) -> str:
-    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+def errors_in_words(calibration: Calibration) -> str:
+    """Cross-validated errors, and how many times the noise they are; empty without any."""
     said = [
         f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
         for line, times, is_held in _errors(calibration)
         if is_held and times < 1.0 / TINY
     ]
-    above = f": {listed(said)}, {HELD_OUT}" if said else ""
+    return f"{listed(said)}, {HELD_OUT}" if said else ""
+
+
+def verdict(calibration: Calibration) -> str:
+    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+    said = errors_in_words(calibration)
+    above = f": {said}" if said else ""
+    if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
+        above += "; the gyro was not calibrated"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
     return " ".join([whole, *effects])
