@@ -77,18 +77,14 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
     errors = _errors(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
-    grave = undetermined(serious_ones(calibration.findings))
-    return [*grave, *held, *scale_headlines(calibration), *in_sample, *_drift_headlines(calibration)]
+    return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
 
 
-def _drift_headlines(calibration: Calibration) -> list[Headline]:
+def _drift(calibration: Calibration) -> str:
     """How far the bias of the gyro moves within the recording, where it does: b is then its mean."""
-    out = []
-    for drift in (f.numbers for f in calibration.findings if f.code is FindingCode.GYRO_BIAS_DRIFT and f.numbers):
-        size, axis = degrees_from_radians(drift["change_rad_s"]), XYZ[int(drift["axis"]) - 1]
-        beside = f"largest change between poses ({axis}), {plain_number(drift['times'], 2)} times its noise"
-        out.append(Headline("gyro bias changes by", plain_number(size, 2), "°/s", beside))
-    return out
+    moved = [f.numbers for f in calibration.findings if f.code is FindingCode.GYRO_BIAS_DRIFT and f.numbers]
+    sizes = [plain_number(degrees_from_radians(one["change_rad_s"]), 2) for one in moved]
+    return "".join(f"; it changes by up to {size} °/s" for size in sizes)
 
 
 def scale_headlines(calibration: Calibration) -> list[Headline]:
@@ -119,7 +115,8 @@ def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
     angles = [] if moved is None else angles_of(moved)
     if moved is not None and angles:
         is_held, floor, rms = len(angles) > 1, move_floor(moved), angles[-1][1]
-        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}; noise alone {plain_number(floor)}°"
+        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}{_drift(calibration)}; "
+        beside += f"noise alone {plain_number(floor)}°"
         line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
     return out

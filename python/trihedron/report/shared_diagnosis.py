@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
+from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
@@ -172,7 +172,7 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
             Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
         name = parameter_in_print(common.name)
-        x = Scale(f"{name} [{unit}]", unit, includes=(0.0,))
+        x = Scale(f"{name} [{unit}]", unit, includes=around_zero(value))
         panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
 
@@ -183,8 +183,7 @@ def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
     score = np.array([one.score for one in candidates])
     tips = [f"{id_in_print(one.id)}: score {plain_number(one.score)}" for one in candidates]
     bars = Bars(score, place, BAR, tips, "tried in all recordings together", "soft", is_across=True)
-    # The axis extends beyond 0, so that positive scores have space even if there are none.
-    x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
+    x = Scale("score", includes=around_zero(score))
     names = tuple(id_in_print(one.id) for one in candidates)
     marks = (bars, Level(x=0.0, name="gains from here on"))
     return Chart((Panel(x, Scale("", names=names), marks, height_px=ROW_PX * (len(names) + 1)),))
