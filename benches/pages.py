@@ -1,14 +1,16 @@
-"""The first screen of every kind of page, photographed for docs/reports.md, and how large the pages are.
+"""The first screen of every kind of page, photographed for docs/reports.md, and how large the pages are; single figures
+for docs/procedure.md and, of the public recordings in FOLDER (not part of the repository), for docs/evidence.md.
 
-    python benches/pages.py
+    python benches/pages.py [FOLDER]
 
-Everything is simulated with fixed seeds; needs Chromium and the extra ``test``. One minute.
+All else is simulated with fixed seeds; needs Chromium and the extra ``test``. Two minutes.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -97,7 +99,43 @@ def pages(folder: Path) -> dict[str, Path]:
     return {**found, "fleet": folder / "fleet" / "fleet.html"}
 
 
-def photograph(found: dict[str, Path]) -> None:
+def figures(folder: Path, recordings: Path | None) -> dict[str, tuple[Path, str]]:
+    """Pages and ids of single figures by name: of a session of 18 poses, of six faces, of recordings."""
+    main(["simulate", "six-faces", "-o", "six-faces.csv", "--seed", "1"])
+    asked = {
+        "procedure_signals": (["tuesday/log.csv", *GRAVITY], "signals"),
+        "procedure_sphere": (["tuesday/log.csv", *GRAVITY], "poses"),
+        "procedure_six_faces": (["six-faces.csv", *GRAVITY], "poses"),
+    }
+    if recordings is not None:
+        xsens, phone = recordings / "xsens_mti", str(recordings / "phone" / "rec_3_gyro_dynamic__")
+        pair = [
+            "--accel",
+            str(xsens / "xsens_acc.txt"),
+            "--gyro",
+            str(xsens / "xsens_gyro.txt"),
+            "--gravity",
+            "9.81744",
+        ]
+        both = ["--accel", phone + "Acceleration.csv", "--gyro", phone + "AngularVelocity.csv", "--gravity", "9.7974"]
+        array = [str(recordings / "mimu4444" / "exp_3.npz"), "--instance", "1", "--gravity", "9.8184"]
+        unit = [str(recordings / "mpu9150" / "imu0.log"), "--rate", "100", "--gravity", "9.8"]
+        asked |= {
+            "gallery_xsens_mti_residuals": (pair, "residuals"),
+            "gallery_xsens_mti_moves": (pair, "moves"),
+            "gallery_mpu9150_residuals": (unit, "residuals"),
+            "gallery_phone_residuals": (both, "residuals"),
+            "gallery_mimu4444_moves": (array, "moves"),
+        }
+    found = {}
+    for name, (words, figure) in asked.items():
+        path = folder / f"{name}.html"
+        main(["calibrate", *words, "--report", str(path)])
+        found[name] = (path, figure)
+    return found
+
+
+def photograph(found: dict[str, Path], parts: dict[str, tuple[Path, str]]) -> None:
     """Shots into docs/figures, sizes to stdout."""
     chromium = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
     with sync_playwright() as tool:
@@ -109,11 +147,17 @@ def photograph(found: dict[str, Path]) -> None:
                 view.screenshot(path=FIGURES / f"page_{name}{'' if scheme == 'light' else '_phone'}.png")
                 view.close()
             print(f"{name:16s}{path.stat().st_size / 1000:6.0f} kB")
+        view = browser.new_page(viewport={"width": 900, "height": 860})
+        for name, (path, figure) in parts.items():
+            view.goto(path.resolve().as_uri())
+            view.add_style_tag(content=".tools { visibility: hidden }")
+            view.locator(f"#{figure}").screenshot(path=FIGURES / f"{name}.png")
         browser.close()
 
 
 if __name__ == "__main__":
+    given = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else None
     with tempfile.TemporaryDirectory() as place:
         # Names in the pages are those of a working folder.
         os.chdir(place)
-        photograph(pages(Path()))
+        photograph(pages(Path()), figures(Path(), given))

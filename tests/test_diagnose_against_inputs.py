@@ -8,6 +8,8 @@ import trihedron
 from small_session import G, made_once
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
+from trihedron.report import diagnosis_report
+from trihedron.report.document import Picture
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 
@@ -56,3 +58,6 @@ def test_gravity_is_that_of_the_scenario_unless_given():
     assert found.gravity_source == "that of the scenario"
     assert not [p for p in found.parameters if p.significant and p.id in ("accel-scale", "gravity")]
     assert gravity_of_scenario(scenario_by_name("hand-session")) is None
+    # Its readings are drawn over those of the log, which a reader looks for first.
+    pictures = [b.name for s in diagnosis_report(found).sections for b in s.blocks if isinstance(b, Picture)]
+    assert "traces" in pictures

@@ -142,10 +142,10 @@ def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(
     assert document.level == {"serious": "bad", "warning": "usable", "note": "good"}[severity.value]
 
 
-def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command():
+def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_which_replaces_its_file():
     begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
     note_log(LogSource(log=Path("my log.csv"), rate=50.0))
-    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json`"
+    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json --force`"
     begin(("calibrate", "a.csv", "b.csv", "--rate", "50"))
     for name in ("a.csv", "b.csv"):
         note_log(LogSource(log=Path(name), rate=50.0))
@@ -168,12 +168,30 @@ def test_a_model_that_agrees_is_kept_and_a_log_by_itself_is_calibrated():
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
     weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
     effect = SimpleNamespace(id="disturbed-pose", confounded_with=(), model={"applies_to_other_recordings": False})
-    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,))
+    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), domains=())
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
     found.calibration = SimpleNamespace(findings=(weak,))
     assert next_step_in_words(found).startswith("Add poses.")
+
+
+def test_what_differs_from_a_ready_made_scenario_is_set_in_a_scenario_of_ones_own():
+    found = SimpleNamespace(verdict="parameters-differ", parameters=(SimpleNamespace(significant=True),), effects=())
+    named, own = next_step_in_words(found, "hand-session"), next_step_in_words(found, "mine.toml")
+    assert named.index("--template sensor.toml") < named.index("--against sensor.toml --improved")
+    assert "--template" not in own
+
+
+def test_a_diagnosis_says_whether_s_and_b_may_be_used_without_its_effects():
+    calibrated = read_calibration(made_once() / "c.json")
+    effect = SimpleNamespace(id="quantisation", confounded_with=(), model={"applies_to_other_recordings": True})
+    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), calibration=calibrated)
+    found.domains = (SimpleNamespace(domain="static-accel", disagrees=False),)
+    assert "S and b may be used without effects" in next_step_in_words(found)
+    found.domains[0].disagrees = True
+    (line,) = (one for one in calibration_report(calibrated).headlines if one.what == "gravity error in static poses")
+    assert f"gravity error in static poses {line.value} mm/s²" in next_step_in_words(found)
 
 
 def test_a_calibration_file_that_is_printed_again_is_not_stored_again(capsys):

@@ -10,7 +10,7 @@ from trihedron.records import Finding, FindingCode, Recording, Severity, Verific
 from trihedron.records.diagnosis import Candidate
 from trihedron.records.domains import DomainTest
 from trihedron.report.calibration_charts import residual_chart
-from trihedron.report.chart import Bars, Note, Panel, Scale
+from trihedron.report.chart import Bars, Note, Panel, Points, Scale
 from trihedron.report.diagnosis_models import candidates_table
 from trihedron.report.diagnosis_numbers import differing_noise
 from trihedron.report.diagnosis_overview_charts import EXPLAINED, strengths_picture, traces_chart
@@ -19,8 +19,9 @@ from trihedron.report.effect_charts import rest_panels
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
+from trihedron.report.kalman_charts import innovations_chart
 from trihedron.report.layout import Places, _box, _covered, apart, ticks
-from trihedron.report.names import id_in_print, parameter_in_print
+from trihedron.report.names import id_in_print, parameter_in_print, variable_in_print
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.verification import verification_report
 
@@ -117,13 +118,35 @@ def test_a_bias_of_a_static_log_is_drawn_over_temperature_with_its_curve_through
     parameters = [SimpleNamespace(name=name, value=value) for name, value in values.items()]
     series = {"time_s": [], "temperature_degc": heat.tolist(), "value": (bias - about).tolist(), "pose": pose.tolist()}
     model = {"variant": "static-curve", "curve": series | {"unit": "m/s^2"}}
-    panels = rest_panels(SimpleNamespace(model=model, parameters=parameters))
-    assert [panel.title for panel in panels] == ["X", "Y", "Z"]
+    panels = rest_panels(SimpleNamespace(id="accel-thermal-bias", model=model, parameters=parameters))
+    assert [panel.title for panel in panels] == [f"accelerometer {axis}" for axis in "XYZ"]
     for panel in panels:
         _, dots, curve = panel.marks
         assert len(dots.x) <= 200
         # Three neighbours are averaged: a parabola is above its chord by less than a thousandth of its height.
         np.testing.assert_allclose(dots.y, np.interp(dots.x, curve.x, curve.y), atol=2e-3 * np.ptp(curve.y))
+
+
+@pytest.mark.parametrize(
+    ("variable", "words"),
+    [
+        ("w_z", "angular rate Z"),
+        ("|w|^2", "|angular rate|²"),
+        ("w_x f_y", "angular rate X × specific force Y"),
+        ("previous u_x", "previous specific force X"),
+        ("last rotation about y", "last rotation about Y"),
+        ("vector fixed in the world frame", "vector fixed in the world frame"),
+    ],
+)
+def test_a_variable_of_a_relation_is_named_in_print(variable, words):
+    assert variable_in_print(variable) == words
+
+
+def test_innovations_are_drawn_as_large_as_they_are():
+    nis = np.array([0.5, 60.0, 2.0])
+    drawn = innovations_chart([SimpleNamespace(nis=nis, is_settled=np.ones(3, dtype=bool))])
+    (dots,) = (mark for mark in drawn.panels[0].marks if isinstance(mark, Points))
+    np.testing.assert_array_equal(dots.y, nis)
 
 
 def test_what_differs_by_one_number_from_axis_to_axis_is_said_once():

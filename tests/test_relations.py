@@ -61,6 +61,6 @@ def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():
     assert relation.depends_on == ("sign of the last rotation about y",)
     assert relation.share > 0.1  # one axis of three follows it
     said = " ".join(to_text(diagnosis_report(result)).split())
-    assert "the misfit follows sign of the last rotation about y." in said
+    assert "the misfit follows sign of the last rotation about Y." in said
     (size,) = (c for c in relation.coefficients if c.name.startswith("y"))
     assert abs(size.value - 0.03 * DEG) < 4.0 * size.std

@@ -1,5 +1,7 @@
 """Several recordings of one unit: their evidence for an effect of one size adds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -11,6 +13,8 @@ from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, Term
 from trihedron.diagnose.session.state import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.report.shared_diagnosis import shared_diagnosis_report
 
 STRENGTHS = ((1.0, 1.0), (1.0,) * 4, (1.0, 1.0), (1.0, 1.0))
 
@@ -80,6 +84,14 @@ def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     found = sessions(0.0, 0.0)
     assert found.effects == ()
     assert "share no missing effect" in str(found)
+    # One that is red by itself is named, and makes the whole red.
+    serious = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "The poses determine 4 parameters.", "", "Add.")
+    first, second = found.calibrations
+    red = replace(found, calibrations=(first, replace(second, findings=(serious,))))
+    document = shared_diagnosis_report(red)
+    assert document.level == "bad"
+    assert "NOT TO BE TRUSTED: The poses determine 4 parameters." in document.verdict
+    assert document.next_step.startswith("Record ")
     with pytest.raises(ValueError, match="two or more"):
         trihedron.diagnose_sessions([simulated("", 11, 14)[0]], gravity_m_s2=9.81)
 

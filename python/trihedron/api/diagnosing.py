@@ -172,6 +172,7 @@ def _of_poses(
         calibration=used,
         updated=updated,
         own_effects=own_effects,
+        simulated=None if simulated is None or simulated.scenario is None else simulated.recording,
         segments=segments,
         recording=recording,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
@@ -60,4 +61,5 @@ def diagnose_sessions(
         except INPUT_ERRORS as error:
             raise InputError(f"{recording.source}: {error}") from None
         given.append((recording, resegment(recording, result.segments), result.calibration))
-    return diagnose_recordings(given, alpha=alpha, progress=progress)
+    found = diagnose_recordings(given, alpha=alpha, progress=progress)
+    return replace(found, calibrations=tuple(calibration for _, _, calibration in given))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +15,7 @@ from trihedron.estimate.sessions.spread import next_session, repeated_parameters
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
 from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration
+from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import PARAMETERS, By, Change, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
@@ -159,9 +159,11 @@ _KINDS = ("bias", "scale", "misalignment", "alignment")
 
 def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     """Findings: excluded sessions, changes, few sessions, range of temperature."""
+    used = [session.name for session in model.sessions]
+    names = distinct_names([*used, *(path for path, _ in model.left_out)])[len(used) :]
     out = [
-        Finding.of(FindingCode.SESSION_LEFT_OUT, name=Path(name).name, why=words("because", sentence=why), path=name)
-        for name, why in model.left_out
+        Finding.of(FindingCode.SESSION_LEFT_OUT, name=name, why=words("because", sentence=why), path=path)
+        for name, (path, why) in zip(names, model.left_out, strict=True)
     ]
     n = len({session.group for session in model.sessions}) if model.by in ("date", "device") else len(model.sessions)
     if n < FEW and model.thermal is None:
@@ -185,7 +187,7 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
         device=change.group,
         is_of_device=model.by == "device",
         amount=_amount(change),
-        where=Path(change.where).name,
+        where=change.where,
         p_adjusted=change.p_adjusted,
         numbers={f"{name}_size": size for name, size in zip(change.names, change.size, strict=True)},
     )

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
 _SHOWN = ("--json", "--report", "--full", "--force")
+_WRITTEN = ("-o", "--output", "--updated", "--improved")
 _ON_A_NEW_LOG = "`... NEW_LOG`"
 _OF_DIAGNOSE = ("--alpha",)
 _WITHOUT_VALUE = ("--full", "--force")
@@ -150,7 +151,10 @@ def _on_a_new_log() -> str:
         after = dict(pairwise(("LOG" if words[0].startswith("--") else "--log", *words)))
         names = (("--log", "NEW_LOG"), ("--accel", "NEW_ACCEL"), ("--gyro", "NEW_GYRO"))
         new |= {after[flag]: f"{name}{which}" for flag, name in names if flag in after}
-    return shlex.join(new.get(word, word) for word in shlex.split(again(_now().typed, _SHOWN)))
+    words = [new.get(word, word) for word in shlex.split(again(_now().typed, _SHOWN))]
+    # This run has written the files that the next one replaces.
+    is_written = any(word.partition("=")[0] in _WRITTEN for word in words)
+    return shlex.join([*words, *(["--force"] if is_written else [])])
 
 
 def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:

@@ -168,6 +168,8 @@ class DiagnosisResult(Diagnosis, Presented):
         The recording's own calibration where one was given and the recording determines another.
     reference : AgainstReference or None
         The fit to the reference motion beside the log.
+    simulated : Recording or None
+        Readings of a given scenario moved as the recording was.
     own_effects : tuple of AcceptedEffect
         All effects of the recording, also those that the given model has too.
     findings, gravity_source : tuple of Finding, str
@@ -186,6 +188,7 @@ class DiagnosisResult(Diagnosis, Presented):
     updated: Calibration | None = None
     reference: AgainstReference | None = None
     own_effects: tuple[AcceptedEffect, ...] = ()
+    simulated: Recording | None = None
     gravity_source: str = ""
     model_is_given: bool = False
     findings: tuple[Finding, ...] = ()

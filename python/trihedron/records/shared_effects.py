@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from trihedron.records.calibration import Calibration
 from trihedron.records.diagnosis import Diagnosis, EffectParameter
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
@@ -49,6 +50,8 @@ class SharedDiagnosis(Printed):
     diagnoses: tuple[Diagnosis, ...]
     effects: tuple[SharedEffect, ...]
     candidates: tuple[SharedCandidate, ...]
+    calibrations: tuple[Calibration, ...] = ()
+    """The calibration of each recording by itself, with which its diagnosis began."""
 
     @property
     def of_single_recordings(self) -> tuple[tuple[str, ...], ...]:

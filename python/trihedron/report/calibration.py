@@ -35,7 +35,7 @@ from trihedron.report.numbers import (
     with_unit,
 )
 from trihedron.report.verification import USES
-from trihedron.units import mm_s2_from_m_s2, mrad_from_radians
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
@@ -80,6 +80,13 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
 
 
+def _drift(calibration: Calibration) -> str:
+    """How far the bias of the gyro moves within the recording, where it does: b is then its mean."""
+    moved = [f.numbers for f in calibration.findings if f.code is FindingCode.GYRO_BIAS_DRIFT and f.numbers]
+    sizes = [plain_number(degrees_from_radians(one["change_rad_s"]), 2) for one in moved]
+    return "".join(f"; it changes by up to {size} °/s" for size in sizes)
+
+
 def scale_headlines(calibration: Calibration) -> list[Headline]:
     """The uncertainty of every sensor's scale on its worst axis."""
     is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
@@ -108,7 +115,8 @@ def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
     angles = [] if moved is None else angles_of(moved)
     if moved is not None and angles:
         is_held, floor, rms = len(angles) > 1, move_floor(moved), angles[-1][1]
-        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}; noise alone {plain_number(floor)}°"
+        beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}{_drift(calibration)}; "
+        beside += f"noise alone {plain_number(floor)}°"
         line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
     return out
@@ -118,14 +126,22 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
     return HELD_OUT if is_held else f"{IN_SAMPLE} only ({how_many(quality.dof, 'degree')} of freedom)"
 
 
-def verdict(calibration: Calibration) -> str:
-    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+def errors_in_words(calibration: Calibration) -> str:
+    """Cross-validated errors, and how many times the noise they are; empty without any."""
     said = [
         f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
         for line, times, is_held in _errors(calibration)
         if is_held and times < 1.0 / TINY
     ]
-    above = f": {listed(said)}, {HELD_OUT}" if said else ""
+    return f"{listed(said)}, {HELD_OUT}" if said else ""
+
+
+def verdict(calibration: Calibration) -> str:
+    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+    said = errors_in_words(calibration)
+    above = f": {said}" if said else ""
+    if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
+        above += "; the gyro was not calibrated"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
     return " ".join([whole, *effects])

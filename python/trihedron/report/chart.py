@@ -219,6 +219,11 @@ def _from_base(ends: FloatArray, mark: Bars) -> list[FloatArray]:
     return [ends, np.zeros(1) if mark.base is None else mark.base]
 
 
+def around_zero(values: FloatArray) -> tuple[float, float]:
+    """What an axis includes so that 0 lies inside the panel, also where all values have one sign."""
+    return 0.0, -0.1 * float(values[np.argmax(np.abs(values))])
+
+
 def _reach(values: list[FloatArray], scale: Scale) -> tuple[float, float]:
     every = np.concatenate([*(np.ravel(v) for v in values), np.array(scale.includes, dtype=np.float64)])
     every = every[np.isfinite(every) & ((every > 0) | (not scale.is_log))]

@@ -6,7 +6,7 @@ from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis, Relation
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
-from trihedron.report.names import id_in_print, ids_in_print
+from trihedron.report.names import id_in_print, ids_in_print, variable_in_print
 from trihedron.report.numbers import (
     MINUS,
     engineering_exponent,
@@ -109,11 +109,11 @@ def candidates_table(diagnosis: Diagnosis) -> Table:
 def relation_facts(relation: Relation) -> Facts:
     """An empirical relation with its coefficients, and what would confirm it."""
     shown = relation.coefficients[:MOST_COEFFICIENTS]
-    words = [f"{c.name} {value_in_words(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
+    words = [f"{variable_in_print(c.name)} {value_in_words(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
     more = len(relation.coefficients) - len(shown)
     rows = [
         ("empirical relation", relation.statement),
-        ("", f"{relation.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
+        ("", f"{variable_in_print(relation.form)}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
     ]
     if relation.resembles:
         rows.append(("", f"Similar to {ids_in_print(relation.resembles)}; similarity is no proof."))

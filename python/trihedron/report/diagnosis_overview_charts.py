@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_numbers import in_print
 from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
@@ -132,7 +132,7 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     colour: Colour = "accent" if members[0].significant else "c1"
     name = "differs" if members[0].significant else "agrees"
     dots = Points(value, place, tips, TWO_SIGMA * sigma, f"recording, {name}", colour, is_across=True)
-    x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=(0.0,))
+    x = Scale(f"recording − model [{unit}]" if unit else "recording − model", unit, includes=around_zero(value))
     names = tuple(axis_in_print(p.name) for p in members)
     marks = (Level(x=0.0, name="model"), dots)
     return Panel(x, Scale("", names=names), marks, title=title, height_px=ROW_PX * (len(members) + 1))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from shlex import quote
 
 from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.finding import FindingCode
+from trihedron.report.calibration import errors_in_words
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level, action_in_words
-from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print
+from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
     listed,
@@ -92,7 +94,7 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
         text += f" ({listed(named)} {verbs} little)"
     if diagnosis.relations:
         # Those of the largest relation first.
-        names = list(dict.fromkeys(name for one in diagnosis.relations for name in one.depends_on))
+        names = list(dict.fromkeys(variable_in_print(name) for one in diagnosis.relations for name in one.depends_on))
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
         text += f": the misfit follows {listed(names[:MOST_NAMED])}{more}"
     numbers = differing_in_short(diagnosis)
@@ -123,7 +125,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     if diagnosis.verdict == "unexplained":
         experiments = [one.experiment for one in diagnosis.relations if one.experiment]
         again = "Record again: what returns belongs to the sensor, what does not to the session."
-        return experiments[0] if experiments else again
+        return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
     steps = []
     if diagnosis.parameters:
         differs = ["the parameters that differ"] if any(p.significant for p in diagnosis.parameters) else []
@@ -139,10 +141,22 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         begun = "Then separate" if steps else "Separate"
         steps.append(f"{begun} {first} from {others}: {rivals.separating_experiment}.")
     if steps:
-        return " ".join(steps)
+        return " ".join(steps) + _by_themselves(diagnosis)
     if not any(effect.model.get("applies_to_other_recordings") for effect in diagnosis.effects):
-        return f"No effect is stored: each belongs to this session. {use}"
-    return "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
+        return f"No effect is stored: each belongs to this session. {use}{_by_themselves(diagnosis)}"
+    store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
+    return store + _by_themselves(diagnosis)
+
+
+def _by_themselves(diagnosis: Diagnosis) -> str:
+    """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
+    if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
+        return ""
+    if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
+        return " S and b may be used without effects: errors of poses and rotations are within noise."
+    own = getattr(diagnosis, "calibration", None)
+    errors = "" if own is None else errors_in_words(own)
+    return f" S and b without effects may be used where these errors are acceptable: {errors}." if errors else ""
 
 
 def _taken_by(model: str) -> str:
@@ -151,8 +165,12 @@ def _taken_by(model: str) -> str:
         return "`... --improved improved.toml` writes your scenario with them"
     if model.endswith(".json"):
         return "`... --updated updated.json` writes the calibration of this log"
-    said = "set them in your simulation; a scenario is rewritten by "
-    return said + "`trihedron diagnose LOG --against SCENARIO.toml --improved improved.toml`"
+    # A simulated log has an ending; a ready-made scenario is a name.
+    where = "your simulation, or in " if PurePath(model).suffix or not model else ""
+    return (
+        f"set them in {where}a scenario of your own (`trihedron simulate --template sensor.toml`), by "
+        "`trihedron diagnose LOG --against sensor.toml --improved improved.toml`"
+    )
 
 
 def level_of(diagnosis: Diagnosis) -> Level:
@@ -207,7 +225,7 @@ def follows(diagnosis: Diagnosis, after: DomainTest) -> str:
     if not after.disagrees or after.limit is not None or after.domain in OF_SAMPLES:
         return ""
     alike = [one for one in diagnosis.relations if one.held_out and one.held_out.domain == after.domain]
-    names = dict.fromkeys(name for one in alike for name in one.depends_on)
+    names = dict.fromkeys(variable_in_print(name) for one in alike for name in one.depends_on)
     return f"follows {listed(list(names))}" if names else ""
 
 

@@ -22,6 +22,7 @@ CONSEQUENCE = (
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
+    FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,
     FindingCode.CALIBRATION_DOUBTED,
     FindingCode.WORSE_THAN_UNCALIBRATED,
@@ -42,6 +43,8 @@ IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 THEN_RUN = {
     **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
+    FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
+    "calibration.json LOG -o corrected.csv`.",
     FindingCode.GYRO_G_SENSITIVITY: "Run `trihedron calibrate LOG --extended -o FILE --force`.",
 }
 """The command of an action in the next step."""
@@ -138,8 +141,8 @@ class Document:
     """A whole report. The first section is the one that fits one screen.
 
     ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
-    without a serious finding, in place of that from ``is_trustworthy`` and the warnings; ``provenance`` is how the
-    report was made; ``next_step`` is the advice for the use of the result.
+    without a serious finding, in place of that from ``is_trustworthy`` (good only without warnings);
+    ``provenance`` is how the report was made; ``next_step`` is the advice for the use of the result.
     """
 
     title: str
@@ -158,9 +161,9 @@ class Document:
         """The verdict's colour: that of the gravest finding at least."""
         if any(finding.severity is Severity.SERIOUS for finding in self.findings):
             return "bad"
-        if self.stated_level is not None:
+        if self.stated_level in ("usable", "bad"):
             return self.stated_level
-        if not self.is_trustworthy:
+        if not self.is_trustworthy and self.stated_level is None:
             return "bad"
         is_warned = any(finding.severity is Severity.WARNING for finding in self.findings)
         return "usable" if is_warned else "good"

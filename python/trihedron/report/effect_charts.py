@@ -245,7 +245,9 @@ def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
             Line(along, curve, "curve, at constant temperature", "ink"),
         )
         y = Scale(f"bias, about its mean [{unit}]", unit)
-        panels.append(Panel(Scale("temperature [°C]", "°C"), y, marks, title=axis, height_px=220))
+        panels.append(
+            Panel(Scale("temperature [°C]", "°C"), y, marks, title=f"{_sensor_of(effect)} {axis}", height_px=220)
+        )
     return panels
 
 
@@ -258,7 +260,12 @@ def _over_time(effect: AcceptedEffect) -> Panel:
         value, half = (factor * np.asarray(series[name][k], dtype=np.float64) for name in ("value", "sigma"))
         marks.append(Band(time_s, value - TWO_SIGMA * half, value + TWO_SIGMA * half, "2 σ of the curve"))
         marks.append(Line(time_s, value, axis, AXIS_COLOURS[k]))
-    return Panel(Scale("time [s]", "s"), Scale(f"bias, about its mean [{unit}]", unit), tuple(marks), height_px=220)
+    y = Scale(f"bias, about its mean [{unit}]", unit)
+    return Panel(Scale("time [s]", "s"), y, tuple(marks), title=_sensor_of(effect), height_px=220)
+
+
+def _sensor_of(effect: AcceptedEffect) -> str:
+    return "gyro" if effect.id.startswith("gyro") else "accelerometer"
 
 
 def _polynomial(apart: FloatArray, slopes: list[float]) -> FloatArray:

@@ -12,7 +12,7 @@ from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, 
 from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table, action_in_words
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
 from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print, with_unit
@@ -56,7 +56,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     caption += "with it: predicted from N and K, and actual; cross-validated."
     picture = Picture("horizon", caption, partial(horizon_chart, found))
     # Where a calibration removes most of the error, it comes first.
-    uncalibrated = (f.action for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
+    uncalibrated = (action_in_words(f) for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",

@@ -56,17 +56,19 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
+    n_usable = sum(map(_is_usable, summary.logs))
     lead = None
     if n_done:
         caption = (
             "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the median "
         )
         caption += "of devices."
+        if n_usable < n_done:
+            caption += " Logs that are not to be trusted stand under Distributions."
         lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
         caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    n_usable = sum(map(_is_usable, summary.logs))
     verdict = f"{n_usable} of {how_many(n, 'log')} usable, {how_many(len(devices), 'device')}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
@@ -75,7 +77,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
-        verdict += f" Diagnosis: {listed(found)}."
+        named = _first([id_in_print(effect.id) for effect in summary.effects])
+        verdict += f" Diagnosis: {listed(found)}{f' ({named})' if named else ''}."
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if summary.repeated and len(devices) > 1 and not strays:
@@ -105,8 +108,8 @@ def _named(devices: list[str]) -> str:
 
 def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
     usable = [log for log in summary.logs if _is_usable(log)]
-    again = [log.name for log in summary.logs if not _is_usable(log)]
-    opened = [log.name for log in usable if log.verdict in OPEN]
+    again = [f"{_called(log, summary)}{_why(log)}" for log in summary.logs if not _is_usable(log)]
+    opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
     steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"record again {_first(again)}"] if again else []
     steps += [f"see what effects gain in {_first(opened)}: `trihedron diagnose` each"] if opened else []
@@ -117,6 +120,16 @@ def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> st
 
 def _is_usable(log: FleetLog) -> bool:
     return log.status == "done" and log.is_trustworthy
+
+
+def _called(log: FleetLog, summary: FleetSummary) -> str:
+    """The name of a log, with its device where several have that name."""
+    is_alone = sum(one.name == log.name for one in summary.logs) == 1
+    return log.name if is_alone else f"{log.serial}: {log.name}"
+
+
+def _why(log: FleetLog) -> str:
+    return f" ({log.serious[0].replace('-', ' ')})" if log.serious else ""
 
 
 def _first(names: list[str]) -> str:
@@ -284,6 +297,9 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     ``most``: only that many parameters, those in which devices differ most relative to their standard errors.
     """
     logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
+    if most is not None:
+        # One calibration that is not to be trusted would set the scale of all.
+        logs = [log for log in logs if log.is_trustworthy] or logs
     n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
     serials = list(dict.fromkeys(log.serial for log in logs))
     strays = {(one.serial, one.parameter) for one in summary.outliers}

@@ -89,7 +89,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
             said(f"pose {p:.0f}, {name}", float(v), "times its predicted variance")
             for p, v in zip(pose, nis, strict=True)
         ]
-        marks.append(Points(pose, np.minimum(nis, 12.0), tips, None, f"{name}: one pose", AXIS_COLOURS[k], True))
+        marks.append(Points(pose, nis, tips, None, f"{name}: one pose", AXIS_COLOURS[k], True))
         marks.append(Line(pose[window - 1 :], mean, f"{name}: running mean", AXIS_COLOURS[k]))
     low, high = (np.full(2, chdtri(window, above) / window) for above in (0.995, 0.005))
     name = f"99 % of running means (of {window}) when the noise model is right"

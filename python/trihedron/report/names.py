@@ -9,6 +9,8 @@ from trihedron.report.numbers import listed
 
 LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
+QUANTITIES = {"w": "angular rate", "u": "specific force", "f": "specific force"}
+"""Symbols of the variables of empirical relations."""
 MEANING = {
     "static-accel": "gravity error in static poses",
     "static-gyro": "gyro rate in static poses",
@@ -55,6 +57,14 @@ def parameter_in_print(name: str) -> str:
     if not re.fullmatch(r"[xyz]+[+-]?", axis):
         return name.replace("_", " ")
     return f"{stem}_{axis}" if 0 < len(stem) <= LETTERS else f"{stem.replace('_', ' ')} {axis.upper()}".lstrip()
+
+
+def variable_in_print(name: str) -> str:
+    """A variable of an empirical relation in words: ``w_x f_y`` as ``angular rate X × specific force Y``."""
+    said = re.sub(r"(?<=_[xyz]) (?=[wuf]_)", " × ", name)
+    said = re.sub(r"\b([wuf])(?:_([xyz]))?\b", lambda f: f"{QUANTITIES[f[1]]} {(f[2] or '').upper()}".strip(), said)
+    said = re.sub(r"(?<=about )[xyz]\b|^[xyz](?=:)", lambda found: found[0].upper(), said)
+    return said.replace("^2", "²").replace("^3", "³")
 
 
 def channel_in_print(channel: str) -> str:

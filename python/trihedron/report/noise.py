@@ -263,7 +263,7 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
                 words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"
             else:
                 limit = math.sqrt(float(np.mean([max(a.terms[term].limit, a.value(term)) ** 2 for a in axes])))
-                words = f"{limit:.2g}  (upper limit: not detected on every axis)"
+                words, per = f"{limit:.2g}", f"{per}, upper limit on an axis"
             rows[f"{sensor}_{key}"] = f"{words}  # {square}{per}"
     rows["update_rate"] = f"{noise.curve.rate_hz:.6g}  # Hz"
     return rows

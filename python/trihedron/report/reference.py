@@ -282,6 +282,6 @@ def residual_chart(found: AgainstReference) -> Chart:
     x = Scale("time [s]", "s", limits=(float(found.residual_time_s[0]), float(found.residual_time_s[-1])))
     for k in range(3):
         marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
-        y = Scale(f"{XYZ[k]}  [°/s]", "°/s", limits=(-reach, reach))
+        y = Scale(f"rate residual {XYZ[k]} [°/s]", "°/s", limits=(-reach, reach))
         panels.append(Panel(x, y, marks, height_px=110))
     return Chart(tuple(panels), is_linked=True, legend=False)

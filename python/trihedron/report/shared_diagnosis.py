@@ -10,11 +10,19 @@ import numpy as np
 
 from trihedron.records.recording import distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale
-from trihedron.report.diagnosis_words import p_in_words, parameter_unit, value_in_words, verdict_in_words
+from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale, around_zero
+from trihedron.report.diagnosis_words import (
+    level_of,
+    p_in_words,
+    parameter_unit,
+    value_in_words,
+    verdict_in_words,
+)
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.findings import serious_ones
+from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
-from trihedron.report.numbers import capital, plain_number, with_sigma
+from trihedron.report.numbers import capital, listed, plain_number, with_sigma
 
 TWO_SIGMA = 2.0
 ROW_PX = 26
@@ -37,6 +45,9 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         verdict = f"{ids_in_print(one.id for one in found.effects)} differs from recording to recording."
     tried = tuple((id_in_print(one.id), plain_number(one.score)) for one in found.candidates)
     n_alone = sum(map(bool, found.of_single_recordings))
+    doubted = _doubted(found, names)
+    for name, why in doubted.items():
+        verdict += f" {name} by itself is NOT TO BE TRUSTED: {why}."
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
@@ -47,14 +58,24 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
             Section("Each recording by itself", (_each(found, names),)),
             Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
-        stated_level="usable" if found.effects else "good",
+        stated_level="bad" if doubted else "usable" if found.effects else "good",
         headlines=(
             Headline("recordings", str(len(found.diagnoses)), "", f"{n_alone} with effects of their own"),
             Headline("shared effects", str(len(own)), "", "of the instrument"),
         ),
         lead=_lead(found, names),
-        next_step=_next_step(found, own),
+        next_step=_next_step(found, own, list(doubted)),
     )
+
+
+def _doubted(found: SharedDiagnosis, names: list[str]) -> dict[str, str]:
+    """Recordings that are red by themselves, each with the reason."""
+    unexplained = "neither the model nor a known effect explains it"
+    out = {name: unexplained for name, one in zip(names, found.diagnoses, strict=True) if level_of(one) == "bad"}
+    for name, own in zip(names, found.calibrations, strict=False):
+        if serious := serious_ones(own.findings):
+            out[name] = opening(serious[0].seen)
+    return out
 
 
 def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
@@ -72,7 +93,10 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
     return Picture("shared", caption, chart)
 
 
-def _next_step(found: SharedDiagnosis, own: list[str]) -> str:
+def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
+    if doubted:
+        again = "them" if len(doubted) > 1 else "it"
+        return f"Record {listed(doubted)} again, and diagnose the others without {again}."
     if own:
         return (
             "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."
@@ -148,7 +172,7 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
             Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
         )
         name = parameter_in_print(common.name)
-        x = Scale(f"{name} [{unit}]", unit, includes=(0.0,))
+        x = Scale(f"{name} [{unit}]", unit, includes=around_zero(value))
         panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
 
@@ -159,8 +183,7 @@ def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
     score = np.array([one.score for one in candidates])
     tips = [f"{id_in_print(one.id)}: score {plain_number(one.score)}" for one in candidates]
     bars = Bars(score, place, BAR, tips, "tried in all recordings together", "soft", is_across=True)
-    # The axis extends beyond 0, so that positive scores have space even if there are none.
-    x = Scale("score", includes=(0.0, -0.1 * float(score.min())))
+    x = Scale("score", includes=around_zero(score))
     names = tuple(id_in_print(one.id) for one in candidates)
     marks = (bars, Level(x=0.0, name="gains from here on"))
     return Chart((Panel(x, Scale("", names=names), marks, height_px=ROW_PX * (len(names) + 1)),))

@@ -39,8 +39,7 @@ ENTRIES = {
         "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
         "The log was not corrected, or by outdated parameters. Such errors follow the motion: no noise of a "
         "filter represents them.",
-        "Calibrate first (trihedron calibrate LOG --reference MOTION -o FILE), correct the log with trihedron apply, "
-        "and estimate N and K from that.",
+        "Calibrate first, correct the log with that, and estimate N and K from the corrected log.",
     ),
     (Code.FILTER_NOISE_UNCERTAIN, "", WARNING): Words(
         "N of the {sensor} is uncertain: between {lower:.3g} and {upper:.3g} (95 % interval), and a filter is too sure "

@@ -66,8 +66,8 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "gravity-missed": "tilt error after a rotation",
         "velocity-over-move": "velocity error over a rotation",
         # empirical relations of what stays unexplained
-        "relation-follows": "The {sensor}'s {is_static:?bias|reading in motion} ({axes:axes}) follows {depends:and}: "
-        "{share:.0f %} of the cross-validated misfit.",
+        "relation-follows": "The {sensor}'s {is_static:?bias|reading in motion} ({axes:axes}) follows "
+        "{depends:variables}: {share:.0f %} of the cross-validated misfit.",
         "relation-follows-world": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",

@@ -17,6 +17,7 @@ A placeholder is a name and, after the colon, the format of its value:
 ``unit``                 ``m/s²`` for ``m/s^2``
 ``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
+``variables``            variables of an empirical relation, in words
 ``ids``                  ``gyro bias`` for ``gyro-bias``; several are listed, or as a further format says
 ``axis``                 ``X`` for 1 or ``x``
 ``axes`` · ``axes and ``  several axes, joined by comma or by the word: ``X, Y``, ``X and Z``
@@ -33,7 +34,7 @@ from string import Formatter
 from typing import Any
 
 from trihedron.arrays import XYZ
-from trihedron.report.names import axis_in_print, id_in_print
+from trihedron.report.names import axis_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import MINUS, listed, plain_number, shown, unit_in_print, with_sigma, with_unit
 from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
@@ -111,6 +112,8 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how.startswith("ids"):
         named = [id_in_print(one) for one in ([value] if isinstance(value, str) else value)]
         return _in_words(named, how[4:] or "and", line)
+    if how == "variables":
+        return listed([variable_in_print(word) for word in value])
     if how == "axis":
         return axis_name(value)
     if how == "letter":
