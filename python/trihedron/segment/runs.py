@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -224,7 +225,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         run = Run(first, last, (), True)
         if last - first < shortest or _sway(attitude, [run]) > SWAY_RAD:
             continue
-        if bias is not None and turns_on(channels, first, last, bias):
+        if bias is not None and turns_on(channels, first, last, bias, steady):
             continue
         if any(
             max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
@@ -256,19 +257,23 @@ def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
     return kept
 
 
-def turns_on(channels: Channels, first: int, last: int, bias: FloatArray) -> bool:
+def turns_on(channels: Channels, first: int, last: int, bias: FloatArray, still: Sequence[Run] = ()) -> bool:
     """Whether the gyro's reading follows a straight line: a slow move, or its pause before the next move.
 
-    A hand that tries to hold still moves to and fro.
+    A hand that tries to hold still moves to and fro, beyond the noise of the ``still`` runs if given.
     """
     gyro = channels.is_gyroscope
     is_valid = channels.is_valid[first:last]
-    if not gyro.any() or np.count_nonzero(is_valid) < 2:
+    n = int(np.count_nonzero(is_valid))
+    if not gyro.any() or n < 2:
         return False
     rate = channels.mean[first:last][is_valid][:, gyro] - bias[gyro]
     t = np.flatnonzero(is_valid) - np.mean(np.flatnonzero(is_valid))
-    along = np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * len(t))
-    return float(along) > ONE_WAY * float(np.mean(np.sum(rate**2, axis=1)))
+    along = float(np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * n))
+    parts = [run.quiet_rows(channels.mean)[:, gyro] for run in still]
+    noise = float(np.median([part.var(axis=0).sum() for part in parts])) if parts else 0.0
+    is_seen = along > float(probability.chdtri(6, SAME_POSE)) * noise / (3.0 * n)
+    return is_seen and along > ONE_WAY * (float(np.mean(np.sum(rate**2, axis=1))) - noise)
 
 
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:
