@@ -82,6 +82,10 @@ WEAKNESSES = {
     "rounding at the ends of quick moves": Weakness(900012, drawn(720498), {"S_f": 3.5}, is_trusted=True),
     # Twelve poses leave three degrees of freedom, which do not show a drift: b_f was off by 8.0 standard errors.
     "drift behind few poses": Weakness(993049, drawn(993049), {"S_f": 4.0, "b_f": 4.0}),
+    # Two warm-ups fit twelve poses alike, and both were off by ten standard errors.
+    "drift along one of several curves": Weakness(994107, drawn(994107), {"S_f": 4.0}),
+    # The noise of the gyro hid that a pause of a slow move goes on turning: S_w was off by 6.3.
+    "pause that turns below the noise": Weakness(997867, drawn(997867), {"S_w": 5.0}),
 }
 
 

@@ -8,9 +8,6 @@ import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_adc, missing_codes
 
-MISSING = (1.0, False)
-"""Samples lost without a trace in the timestamps, in motion too quick for a smooth join across the gap."""
-
 
 def diagnosed(tmp_path, *drawn):
     columns, answer = draw(*drawn)
@@ -46,14 +43,15 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
 
 
 @pytest.mark.parametrize(
-    ("seed", "what"),
+    ("seed", "has_small_faults", "what"),
     [
-        (87100100214, "20 Hz, one sample a gap: a join of six samples spans half the move"),
-        pytest.param(87100100614, "50 Hz, two samples a gap, moves that do not join at all", marks=pytest.mark.slow),
+        (87100100214, False, "20 Hz, one sample a gap: twelve samples span half the move"),
+        (99870100014, True, "50 Hz, one sample a gap: they were named a nonlinear gyro"),
+        pytest.param(87100100614, False, "50 Hz, two samples a gap", marks=pytest.mark.slow),
     ],
 )
-def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, what):
-    found, answer = diagnosed(tmp_path, "dropped-samples", seed, *MISSING)
+def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed, has_small_faults, what):
+    found, answer = diagnosed(tmp_path, "dropped-samples", seed, 1.0, has_small_faults)
     assert [effect.id for effect in found.effects][:1] == ["dropped-samples"], what
     lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
     # Up to one in ten of what is missing: a loss in a turn about the vertical is one that gravity cannot count.
@@ -62,5 +60,5 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
 
 @pytest.mark.parametrize("flaw", ["gyro-saturation", pytest.param("sensor-lag", marks=pytest.mark.slow)])
 def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw):
-    found, _ = diagnosed(tmp_path, flaw, 11, *MISSING)
+    found, _ = diagnosed(tmp_path, flaw, 11, 1.0, False)
     assert "dropped-samples" not in [effect.id for effect in found.effects]
