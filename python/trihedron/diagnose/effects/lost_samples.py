@@ -92,7 +92,7 @@ def _gains(
         flat = (window - window.mean(axis=0)).reshape(n, -1)
         for c, count in enumerate(counts):
             squares = ((inverse[count] @ flat) ** 2).sum(axis=0).reshape(-1, axes).sum(axis=1)
-            out[:, c] -= 0.5 * axes * (n * np.log(squares) + log_det[count])
+            out[:, c] -= 0.5 * axes * (n * np.log(squares + TINY) + log_det[count])
     return out - out[:, :1]
 
 
