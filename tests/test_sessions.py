@@ -125,10 +125,10 @@ def test_what_one_recording_leaves_is_a_warning_of_all(four_sessions):
     drift = 0.02 * (first.time_s / first.time_s[-1])[:, None]
     drifting = replace(first, gyroscope=first.gyroscope + drift)
     result = trihedron.calibrate_sessions([drifting, four_sessions[1]], gravity_m_s2=G)
-    said = [one.seen for one in result.findings if one.code is FindingCode.CALIBRATION_DOUBTED]
+    said = [one.seen for one in result.model.findings if one.code is FindingCode.CALIBRATION_DOUBTED]
     assert len(said) == 1
     assert "bias drifts" in said[0]
-    assert result.is_trustworthy
+    assert result.model.is_trustworthy
 
 
 def test_dates_that_are_not_in_the_logs_are_asked_for(four_sessions):
