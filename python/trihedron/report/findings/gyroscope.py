@@ -80,7 +80,7 @@ _MOVES = {
     ),
     (Code.GYRO_BIAS_DRIFT, "drifts", WARNING): Words(
         "the gyro's bias drifts while the log runs, by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times "
-        "its noise; b is its mean and does not hold before, after or in the next log. S accounts for the drift.",
+        "its noise; the stated b is its mean and holds neither before nor after. S accounts for the drift.",
         _BIAS_CHANGES,
         "Let the sensor warm up and record again, or measure the bias in a static pose before use.",
     ),
