@@ -1,5 +1,6 @@
 """The first screen of every kind of page, photographed for docs/reports.md, and how large the pages are; single figures
-for docs/procedure.md and, of the public recordings in FOLDER (not part of the repository), for docs/evidence.md.
+for docs/procedure.md, docs/simulation.md and, of the public recordings in FOLDER (not part of the repository), for
+docs/evidence.md.
 
     python benches/pages.py [FOLDER]
 
@@ -132,6 +133,10 @@ def figures(folder: Path, recordings: Path | None) -> dict[str, tuple[Path, str]
         path = folder / f"{name}.html"
         main(["calibrate", *words, "--report", str(path)])
         found[name] = (path, figure)
+    for scenario in ("manual-example", "table-turns"):
+        path = folder / f"{scenario}.html"
+        main(["simulate", scenario, "-o", f"{scenario}.csv", "--seed", "1", "--report", str(path)])
+        found[f"simulation_{scenario}"] = (path, "signals")
     return found
 
 

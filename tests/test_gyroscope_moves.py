@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.session.solved import calibrate_moves
-from trihedron.records import FindingCode, SensorCalibration
+from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
 from trihedron.simulate import Pose as SimulatedPose
 from true_segments import codes, segments_from_truth, z_scores
@@ -141,7 +141,8 @@ def test_a_zero_that_drifts_is_followed_and_reported(quiet):
     drifting = replace(recording, gyroscope=recording.gyroscope + drift[:, None])
     means = np.array([drifting.gyroscope[h.start : h.stop].mean(axis=0) for h in segments.poses])
     found, findings = calibrated(drifting, replace(segments, gyroscope_mean=means), truth)
-    assert FindingCode.GYRO_BIAS_DRIFT in codes(findings)
+    # 0.6 °/s turns a move of two seconds by 1°, far above its noise: b of this log is not b of the next.
+    assert [f.severity for f in findings if f.code is FindingCode.GYRO_BIAS_DRIFT] == [Severity.WARNING]
     assert np.abs(z_scores(found, truth)[:9]).max() < 4.0
 
 

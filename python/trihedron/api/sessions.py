@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import get_args
@@ -16,7 +17,7 @@ from trihedron.api.sessions_combined import ALPHA, combine
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
-from trihedron.records import Frame, Recording, SensorCalibration
+from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.recording import distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
@@ -26,6 +27,12 @@ from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
 
 BYS: tuple[By, ...] = get_args(By)
+LEFT_BY_S_AND_B = (
+    FindingCode.RESIDUAL_ABOVE_NOISE,
+    FindingCode.HELD_OUT_WORSE,
+    FindingCode.GYRO_G_SENSITIVITY,
+    FindingCode.GYRO_BIAS_DRIFT,
+)
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
 resolution of 0.1 to 0.5 °C."""
@@ -113,7 +120,18 @@ def calibrate_sessions(
         raise InputError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
+    findings = (*_doubts(results, sessions), *model.findings)
+    model = replace(model, calibration=replace(model.calibration, findings=findings), findings=findings)
     return SessionsResult(model, tuple(results))
+
+
+def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -> Iterator[Finding]:
+    """The gravest warning of every recording alone about what S and b leave: the common ones leave it as well."""
+    for result, session in zip(results, sessions, strict=True):
+        warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
+        for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
+            seen, path = words("quoted", sentence=warned[code]), result.recording.source
+            yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=session.name, seen=seen, path=path)
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:

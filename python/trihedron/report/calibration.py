@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, TINY, XYZ
-from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, strong_correlations
@@ -21,7 +21,9 @@ from trihedron.report.calibration_pictures import (
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, serious_ones, verdict_of
+from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import (
+    capital,
     duration,
     each_with_sigma,
     engineering_exponent,
@@ -137,14 +139,16 @@ def errors_in_words(calibration: Calibration) -> str:
 
 
 def verdict(calibration: Calibration) -> str:
-    """The verdict: usable or not, how far beyond noise, and the effects of an extended calibration."""
+    """The verdict: usable or not, how far beyond noise, a gyro bias that drifts, the effects of an extended one."""
     said = errors_in_words(calibration)
     above = f": {said}" if said else ""
     if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
         above += "; the gyro was not calibrated"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
-    return " ".join([whole, *effects])
+    warned = [f for f in calibration.findings if f.severity is Severity.WARNING]
+    drifts = [f"{capital(opening(f.seen))}." for f in warned if f.code is FindingCode.GYRO_BIAS_DRIFT]
+    return " ".join([whole, *drifts, *effects])
 
 
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:

@@ -161,7 +161,7 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
         times = ("–" if p is None else plain_number(p.correlation_time_s, 2) for p in processes)
         rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *sigmas))
         rows.append(("   … correlation time [s]", *times))
-    return _by_axis(axes, rows, "Noise terms ± standard uncertainty (1 σ); < is the upper end of the 95 % interval")
+    return _by_axis(axes, rows, "Noise terms ± standard uncertainty (1 σ); <: not seen, at most this (95 %)")
 
 
 def _by_axis(axes: Sequence[NoiseAxis], rows: Sequence[tuple[str, ...]], caption: str) -> Table:

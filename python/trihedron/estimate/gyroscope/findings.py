@@ -51,7 +51,9 @@ def findings_of(
             dof=solution.moves_dof,
         )
     yield from _attitude_findings(measured, S)
-    yield from drift_findings("poses", measured.bias, measured.bias_excess, S)
+    # A random walk of b is part of the model; a curve says that b of this log is not b of the next.
+    is_curve = solution.has_gyro_drift and _is_material(np.ptp(measured.bias, axis=0), measured)
+    yield from drift_findings("drifts" if is_curve else "poses", measured.bias, measured.bias_excess, S)
 
 
 def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
@@ -107,8 +109,7 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Fi
         return
     per_g = np.abs(S @ attitude.A) * STANDARD_GRAVITY_M_S2
     rate, force = (int(k) for k in np.unravel_index(int(np.argmax(per_g)), (3, 3)))
-    per_move = np.median(measured.durations_s) * np.abs(attitude.A).max(axis=1) * STANDARD_GRAVITY_M_S2
-    is_material = bool(np.any(per_move > measured.noise_density * np.sqrt(np.median(measured.durations_s))))
+    is_material = _is_material(np.abs(attitude.A).max(axis=1) * STANDARD_GRAVITY_M_S2, measured)
     yield Finding.of(
         FindingCode.GYRO_G_SENSITIVITY,
         severity=Severity.WARNING if is_material else Severity.NOTE,
@@ -120,8 +121,14 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Fi
     )
 
 
+def _is_material(change: FloatArray, measured: MoveMeasurements) -> bool:
+    """Whether a change of the raw bias (3,) turns a move of usual length by more than its noise."""
+    lasts_s = np.median(measured.durations_s)
+    return bool(np.any(change * lasts_s > measured.noise_density * np.sqrt(lasts_s)))
+
+
 def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArray) -> Iterator[Finding]:
-    """Finding where raw biases (n, 3) of ``case`` (poses, turns) differ: χ² ``excess`` (3,) of their constancy."""
+    """Finding where raw biases (n, 3) of ``case`` (poses, drifts, turns) differ: ``excess`` (3,) is their χ²."""
     dof = len(bias) - 1
     if dof < 1 or chdtrc(dof, float(excess.max())) > FALSE_ALARM / 3.0:
         return

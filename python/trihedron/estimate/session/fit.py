@@ -75,6 +75,11 @@ class SessionSolution:
         return _drift_curves(self.observed, self.observed.force_effect, self.S_a)
 
     @property
+    def has_gyro_drift(self) -> bool:
+        """Whether the gyro's bias follows a curve of time."""
+        return bool(_drift_curves(self.observed, self.observed.rate_effect, self.S_w).any())
+
+    @property
     def accel_bias_change(self) -> tuple[float, float]:
         """RMS difference of the poses' biases from the session's, the least gravity error of S, b alone, and the range
         of their drift along a curve, largest axis; m/s²."""

@@ -208,6 +208,11 @@ _MANY_RECORDINGS = {
         "This recording alone does not determine a calibration; the others are used.",
         "Run `trihedron check {path}`.",
     ),
+    (Code.CALIBRATION_DOUBTED, "of-recording", WARNING): Words(
+        "By itself, {name} has a warning: {seen:clause}.",
+        "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
+        "Run `trihedron diagnose {path}`, which looks for the cause.",
+    ),
     (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",
         "A standard deviation of few values is uncertain whatever is done with them.",

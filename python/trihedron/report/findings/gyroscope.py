@@ -78,6 +78,12 @@ _MOVES = {
         _BIAS_CHANGES,
         "Let the sensor warm up; use the stated bias only near this temperature.",
     ),
+    (Code.GYRO_BIAS_DRIFT, "drifts", WARNING): Words(
+        "the gyro's bias drifts while the log runs, by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times "
+        "its noise; the stated b is its mean and holds neither before nor after. S accounts for the drift.",
+        _BIAS_CHANGES,
+        "Let the sensor warm up and record again, or measure the bias in a static pose before use.",
+    ),
     (Code.NOT_OBSERVABLE, "moves-rank", SERIOUS): Words(
         "the moves determine {rank} of {n_parameters} gyro parameters; least certain: {weakest}.",
         _SAME_GRAVITY,
@@ -98,12 +104,13 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
-        "The tilt error after rotations exceeds noise, and these timestamps do not show lost samples: "
-        "{lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
-        "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
-        "A link or a logger that drops samples and renumbers the others, or timestamps them anew; or another cause of "
-        "the error, for which `trihedron diagnose` looks.",
-        "Log the sensor's own sample counter or time, and record again.",
+        "The tilt error after rotations exceeds noise: a support gives way after the moves, or samples are lost "
+        "without a trace in these timestamps. Up to {lost_share:.2g %} of the samples could be missing; every turn, "
+        "and the gyro's scale factors, would be wrong by as much; their standard error without that is "
+        "{sigma_scale:.2g %}.",
+        "A soft support; a link or a logger that drops samples and renumbers the others, or timestamps them anew; or "
+        "another cause of the error, for which `trihedron diagnose` looks.",
+        "Put the sensor on a firm support, log its own sample counter or time, and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
