@@ -160,10 +160,16 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    # The bias of a session that drifts is its mean over the static time, which is known to a pose.
-    for at, effect, S in ((9, observed.force_effect, S_a), (21, observed.rate_effect, S_w)):
+    # The bias of a session that drifts is its mean over the static time, which is known to a pose; where poses were not
+    # found, to its difference from the mean over the whole time.
+    paths = (core.pose_force_bias, core.pose_rate_bias)
+    for at, effect, S, path in zip(
+        (9, 21), (observed.force_effect, observed.rate_effect), (S_a, S_w), paths, strict=True
+    ):
         drift = _drift(observed, core, effect, S)
-        covariance[range(at, at + 3), range(at, at + 3)] += np.mean(drift**2, axis=0) / len(drift) ** 2
+        known = np.mean(drift**2, axis=0) / len(drift) ** 2
+        known += sum(_from_mean_over_time(one, observed.pose_time_s) ** 2 for one in (drift, path @ S.T))
+        covariance[range(at, at + 3), range(at, at + 3)] += known
     return SessionSolution(
         S_a=S_a,
         b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
@@ -180,6 +186,13 @@ def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
         observed=observed,
         core=core,
     )
+
+
+def _from_mean_over_time(values: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Mean (3,) of ``values`` (n, 3) at ``time_s`` (n,) less that of a line from each to the next."""
+    step_s = np.diff(time_s)[:, None]
+    over_time = np.sum(step_s * (values[1:] + values[:-1]), axis=0) / (2.0 * step_s.sum())
+    return np.asarray(values.mean(axis=0) - over_time)
 
 
 def _drift_curves(observed: Observed, effect: FloatArray, S: FloatArray) -> FloatArray:
