@@ -37,8 +37,6 @@ Units: SI everywhere but in raw readings. Angles are in radians unless a name en
 >>> print(result)  # doctest: +SKIP
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from types import ModuleType

@@ -1,7 +1,5 @@
 """Entry point of ``python -m trihedron`` and of the installed command."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

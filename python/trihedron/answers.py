@@ -4,8 +4,6 @@ A record calls a function by name and imports no module; ``trihedron/__init__`` 
 is imported on first use.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any

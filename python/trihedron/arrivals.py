@@ -1,7 +1,5 @@
 """The host's clock against the device's: the line between them, and the delay of arriving bytes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

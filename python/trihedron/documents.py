@@ -1,7 +1,5 @@
 """Small text files written or edited by users: read with limits on type, size, depth and numbers."""
 
-from __future__ import annotations
-
 import json
 import os
 import stat

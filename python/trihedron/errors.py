@@ -5,8 +5,6 @@ inconsistently by a stage (``records/segments.py``, the arrays of a calibration 
 a file, a value or a request is an ``InputError``.
 """
 
-from __future__ import annotations
-
 from numpy.linalg import LinAlgError
 
 from trihedron._core import InputError

@@ -1,7 +1,5 @@
 """Catalogues whose entries are the modules of a folder, without a list of their names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules

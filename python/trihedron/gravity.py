@@ -1,7 +1,5 @@
 """Gravity and rotation of the Earth where the sensor stands."""
 
-from __future__ import annotations
-
 import math
 
 from trihedron.errors import InputError

@@ -5,8 +5,6 @@ the off-diagonals. In the distort direction ``M = S⁻¹`` rows are ``k_i n_i``:
 vector n. Scales, biases along each axis and angles between axes are then the same in every frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import permutations

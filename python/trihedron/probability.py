@@ -3,8 +3,6 @@
 They are computed by the core: importing SciPy takes longer than a calibration.
 """
 
-from __future__ import annotations
-
 from trihedron import _core
 
 LEAST_P = 1e-300

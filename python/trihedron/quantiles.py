@@ -3,8 +3,6 @@
 NumPy takes ten to thirty microseconds for a few numbers, and holds the interpreter lock meanwhile.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from trihedron import _core

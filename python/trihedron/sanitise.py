@@ -1,7 +1,5 @@
 """External names (columns, files, keys) in messages: escaped for a terminal; a suggestion for an unknown one."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable

@@ -10,8 +10,6 @@ Frames are therefore related by *proper rotations* only: a triad whose documente
 stays left-handed in every frame, with the signs on the diagonal of ``S``, and is reported, not corrected.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import product
 

@@ -4,8 +4,6 @@ Whether it works is tried once, on a separate thread, and a child in which it do
 core starts its own threads in a child and needs no check.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """S and b as functions of temperature, from a calibration of several recordings `--by temperature`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Limits on the threads of the numerical core and of polars that the environment requests."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Transforms that several modules use."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

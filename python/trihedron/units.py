@@ -4,8 +4,6 @@ Inside the package everything is SI (m/s², rad/s, s, °C) except *raw* sensor r
 log, so that a calibration maps the logged values themselves.
 """
 
-from __future__ import annotations
-
 import math
 from enum import Enum
 

@@ -233,6 +233,7 @@ def asked_in_python(verb: Verb) -> Verb:
             if signature.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
                 given.arguments[name] = _options(verb.__name__, value)
             else:
+                # As it is written: modules of verbs keep `from __future__ import annotations`.
                 annotation = str(signature.parameters[name].annotation)
                 given.arguments[name] = settled(verb.__name__, name, value, annotation)
         try:

@@ -10,8 +10,6 @@
 ...     print(block.time_s[-1], block.values[-1])
 """
 
-from __future__ import annotations
-
 from trihedron.capture.detection import find_protocol
 from trihedron.capture.guide import Guide
 from trihedron.capture.recorder import Recorder

@@ -1,7 +1,5 @@
 """Summary of a capture: frames saved, lost and corrupt, and the device's clock against the host's."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from trihedron.arrivals import ClockLine

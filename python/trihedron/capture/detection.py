@@ -1,7 +1,5 @@
 """Detects baud rate and protocol: every candidate decodes the same bytes, and the one that decodes most is taken."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Callable, Iterable, Sequence

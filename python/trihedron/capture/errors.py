@@ -1,7 +1,5 @@
 """Errors of a capture; each message is one sentence."""
 
-from __future__ import annotations
-
 from trihedron.errors import InputError
 
 

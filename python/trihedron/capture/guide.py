@@ -4,8 +4,6 @@ It contains no estimator: ``examine`` returns the state of the session (poses, u
 and is called once per pose. The caller passes the real one (``trihedron.api.guiding``) or a substitute.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 

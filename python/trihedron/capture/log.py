@@ -1,7 +1,5 @@
 """The log of a capture: text that grows row by row and is complete and readable after every write."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

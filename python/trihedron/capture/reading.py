@@ -1,7 +1,5 @@
 """Rows of a log, and the thread that only reads the source and never waits for a disk or a decoder."""
 
-from __future__ import annotations
-
 import queue
 import threading
 import time

@@ -1,7 +1,5 @@
 """Records a stream: a thread that only reads, and a loop that decodes, counts, assigns times and writes."""
 
-from __future__ import annotations
-
 import queue
 import time
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ Most simple protocols have no checksum, so a counter may itself be corrupt. A fr
 by one step therefore waits until later frames show whether frames are missing before it, or its counter is wrong.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from itertools import pairwise
 from statistics import median

@@ -3,8 +3,6 @@
 The segmentation of the whole log decides later which poses count; this one only drives the display.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

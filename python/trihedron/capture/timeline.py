@@ -1,7 +1,5 @@
 """Time of every frame while it is recorded."""
 
-from __future__ import annotations
-
 from trihedron.arrivals import ClockFit
 
 

@@ -1,7 +1,5 @@
 """Facts of channels (noise, LSB, limits), found in one place; a recording carries them (``Recording.facts``)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

@@ -1,7 +1,5 @@
 """One extreme of a channel: its value, the readings equal to it, and those next to it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -6,8 +6,6 @@ abruptly, and codes that are read more often than those before them.
 A channel that stands still while all others stand still too is no evidence: it is a pose, or a constant rate.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Pooling of figures over many poses, and the ratio of two such figures."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Range limits blurred by noise: clipping before the ADC (pickup, amplifier) has no exact code."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 This is not the segmentation: no pose is accepted or excluded here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ Results go to stdout, progress to stderr. Exit status: 0 success; 1 could not ru
 that several commands share are in ``options.py``.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

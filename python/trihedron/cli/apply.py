@@ -1,7 +1,5 @@
 """``trihedron apply``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import typer

@@ -1,7 +1,5 @@
 """``trihedron check``."""
 
-from __future__ import annotations
-
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import Results, is_stdout, leave
 

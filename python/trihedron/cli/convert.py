@@ -1,7 +1,5 @@
 """``trihedron convert``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from trihedron.cli.options import LogSource, with_options

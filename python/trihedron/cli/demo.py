@@ -1,7 +1,5 @@
 """``trihedron demo``."""
 
-from __future__ import annotations
-
 import secrets
 from itertools import count
 from pathlib import Path

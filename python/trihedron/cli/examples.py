@@ -1,7 +1,5 @@
 """Examples for every command's help: purpose and command line."""
 
-from __future__ import annotations
-
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "": (
         ("two examples on a simulated sensor, with reports", "trihedron demo"),

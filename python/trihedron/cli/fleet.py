@@ -1,7 +1,5 @@
 """``trihedron fleet``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import typer

@@ -1,7 +1,5 @@
 """Layout of the help: commands in the order of the workflow, options by subject, examples."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``trihedron noise``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from trihedron.cli.options import GravitySource, LogSource, numbers, progress, with_options

@@ -1,7 +1,5 @@
 """The guide as a page in a browser: a server on 127.0.0.1 with a single-use token."""
 
-from __future__ import annotations
-
 import json
 import math
 import secrets

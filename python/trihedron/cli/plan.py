@@ -1,7 +1,5 @@
 """``trihedron plan``."""
 
-from __future__ import annotations
-
 from trihedron.cli.options import numbers, with_options
 from trihedron.cli.output import Results
 

@@ -1,7 +1,5 @@
 """``trihedron ports``."""
 
-from __future__ import annotations
-
 import typer
 
 

@@ -1,7 +1,5 @@
 """The guide on a terminal: a screen of 80 × 24 or larger, in plain characters for light and dark themes."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """``trihedron segment``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from trihedron.cli.options import LogSource, progress, with_options

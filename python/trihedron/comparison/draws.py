@@ -1,7 +1,5 @@
 """How a simulation draws its noise: from which distribution, and whether separately for each axis."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Literal

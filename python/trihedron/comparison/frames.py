@@ -1,7 +1,5 @@
 """Frame of a simulated log's readings (rates in the world frame, gravity upside down), and its errors in motion."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol

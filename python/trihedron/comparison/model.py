@@ -1,7 +1,5 @@
 """A given model against a recording: both are fitted freely, then compared; effects beside free parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Noise and sampling of a simulated log against those of a recording, axis by axis, and likely causes of a ratio."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Quantisation noise Q of a simulation against the recording's, by axis: static noise that rises with frequency."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Range limits that a scenario states, against those that a recording reaches."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bias instability and random walk of a given simulation against the recording's, by the biases in their poses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from types import MappingProxyType

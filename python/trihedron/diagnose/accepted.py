@@ -1,7 +1,5 @@
 """Accepted effects, candidates and stages as the records that reports and files show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType

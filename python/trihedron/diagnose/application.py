@@ -4,8 +4,6 @@ The effects' own forward models (``variants``) are evaluated with every sample a
 own reading, corrected by S and b.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

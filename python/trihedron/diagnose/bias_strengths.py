@@ -4,8 +4,6 @@ Every hypothesis contains both processes with free strengths. A process is named
 with that strength bounded to what the part's own noise explains.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Every effect of the catalogue added to a hypothesis: which gain, how much, at which size and shape (eq. 11.19)."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Signals that effects are computed from: the motion of the fitted session along every sensor axis, and logged ones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The diagnosis of recordings: locate the disagreement, search for missing effects, fit them, test the improvement."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType

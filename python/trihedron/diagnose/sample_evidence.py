@@ -1,7 +1,5 @@
 """Effects detected by their own tests on the samples: each correction is kept only if it improves the prediction."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 

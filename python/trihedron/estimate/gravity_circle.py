@@ -1,7 +1,5 @@
 """Gravity during a turn about a table's normal: a circle in the body frame, whose centre is along the normal."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

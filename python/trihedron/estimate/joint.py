@@ -1,7 +1,5 @@
 """Joint fit of both sensors: the reference solution, with the covariance of all 24 parameters."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from trihedron.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Several calibrations compared on one recording: predictive density, intervals, and the mistake in a wrong one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations, product

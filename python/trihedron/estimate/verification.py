@@ -1,7 +1,5 @@
 """A calibration against another recording: gravity error in static poses and tilt error after rotations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

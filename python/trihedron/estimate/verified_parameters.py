@@ -1,7 +1,5 @@
 """Every parameter of a calibration against its estimate from a recording, and readings without a calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

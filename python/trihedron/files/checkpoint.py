@@ -1,7 +1,5 @@
 """Progress of one pass over a long log, saved on disk so that an interrupted run can continue."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """The diagnosis as JSON, checked against the schema in the package (docs/diagnosis.md)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from trihedron.errors import InputError

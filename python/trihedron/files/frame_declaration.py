@@ -1,7 +1,5 @@
 """A declared binary protocol, read from TOML (docs/capture.md, section 3)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Recordings written as tables that :func:`trihedron.read` reads without options: CSV, npz, Parquet."""
 
-from __future__ import annotations
-
 import io
 import os
 import sys

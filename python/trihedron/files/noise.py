@@ -1,7 +1,5 @@
 """Noise figures read from the JSON that ``trihedron allan`` writes."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

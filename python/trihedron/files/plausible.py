@@ -1,7 +1,5 @@
 """Plausibility checks of a calibration from any file, before its numbers are used."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.errors import InputError

@@ -1,7 +1,5 @@
 """Changes a user's scenario file as a diagnosis requires; everything else is kept except comments on changed values."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Mapping, Sequence
 from itertools import dropwhile

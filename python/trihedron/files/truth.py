@@ -1,7 +1,5 @@
 """The truth of a simulated log in a separate file: .npz with a JSON header, or the header alone as .json."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

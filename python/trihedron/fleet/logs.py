@@ -1,7 +1,5 @@
 """Discovery of logs, their devices, and the key by which an earlier result is recognised."""
 
-from __future__ import annotations
-
 import glob
 import hashlib
 import json

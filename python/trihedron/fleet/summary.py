@@ -1,7 +1,5 @@
 """Summary of a fleet from the rows of all logs: spreads, outliers, shared effects, changes of single devices."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The task of a worker: calibrate and diagnose one log, with plain types as input and output."""
 
-from __future__ import annotations
-
 import os
 import time
 import traceback

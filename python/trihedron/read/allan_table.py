@@ -1,7 +1,5 @@
 """Tables of Allan deviations, as ``trihedron allan --csv`` writes them, or as other programs do."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """NumPy files: ``.npz`` archives and ``.npy`` arrays."""
 
-from __future__ import annotations
-
 import math
 import struct
 import tokenize

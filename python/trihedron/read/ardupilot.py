@@ -1,7 +1,5 @@
 """ArduPilot DataFlash logs (.bin), read by pymavlink: IMU messages, or the raw ACC and GYR."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

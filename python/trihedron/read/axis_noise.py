@@ -1,7 +1,5 @@
 """Noise coefficients given by the user as JSON: per term one number, or one per axis."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import fields
 from pathlib import Path

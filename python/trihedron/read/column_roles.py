@@ -1,7 +1,5 @@
 """The roles of a table's columns, as a finding and as the value of ``--columns``."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Roles of columns: recognised by name, given by the user, or by position."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Several devices or sensors in one table: separated, listed with their row counts, and never merged silently."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace

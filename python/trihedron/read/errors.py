@@ -1,7 +1,5 @@
 """Errors of files that cannot be read, each one sentence; checks of a file before reading, and its hash."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

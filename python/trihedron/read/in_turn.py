@@ -1,7 +1,5 @@
 """Splits a table whose rows contain either the accelerometer or the gyro, with the other's cells empty, into two."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """KITTI's raw data: a folder ``oxts`` with a file of thirty numbers for each sample, and a file of timestamps."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

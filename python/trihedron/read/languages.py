@@ -2,8 +2,6 @@
 Portuguese, Russian, Scandinavian, Spanish, Turkish, Ukrainian, Chinese, Japanese, Korean, and the Greek letters of
 equations. An unknown word is unchanged, and its column is not recognised."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 

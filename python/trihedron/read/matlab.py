@@ -5,8 +5,6 @@ Tables and timetables, which are objects in MATLAB files, are decoded by mat-io,
 MATLAB Mobile saves a timetable for each sensor (``Acceleration``, ``AngularVelocity``) with columns X, Y, Z.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from pathlib import Path

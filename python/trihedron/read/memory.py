@@ -1,7 +1,5 @@
 """Tables from readings in memory (arrays, structured and masked arrays, data frames, dictionaries); memory limits."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Merges two sensors with separate clocks: one keeps its samples, the other is interpolated to its timestamps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

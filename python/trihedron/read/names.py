@@ -1,7 +1,5 @@
 """The meaning of a column name, as common loggers write it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache

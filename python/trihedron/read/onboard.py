@@ -1,7 +1,5 @@
 """Parameters of a flight controller, collected while its log is read."""
 
-from __future__ import annotations
-
 import re
 from types import MappingProxyType
 

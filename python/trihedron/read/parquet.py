@@ -1,7 +1,5 @@
 """Parquet tables, read by polars."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

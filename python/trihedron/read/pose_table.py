@@ -1,7 +1,5 @@
 """A table of known attitudes: angles of a dividing head, or directions, one row per pose (docs/kalman.md)."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reads one or two files to one audited recording; composes the other modules of this package."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """ROS 1 bags, ROS 2 bags (folder, .db3, .mcap): messages of type sensor_msgs/Imu, read by rosbags."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Units, and the order of unnamed triads: from names, from the user's options, and from the readings."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TypeVar

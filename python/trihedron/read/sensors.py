@@ -1,7 +1,5 @@
 """The sensors of one table on the table's clock, with units and order of samples."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

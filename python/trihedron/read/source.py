@@ -1,7 +1,5 @@
 """Any supported file as tables of numbers; the format is recognised by the first bytes, never by the name."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The time of a log: summed time steps, times from arrivals, and rejection of a time column that is not understood."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

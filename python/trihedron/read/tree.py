@@ -1,7 +1,5 @@
 """HDF5 and MATLAB files: groups of arrays; the group with an accelerometer or a gyro is the log."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -5,8 +5,6 @@ and sign of its axes, and for the best-fitting rotation. Rotations about the ver
 contribute. No calibration is needed; the body's own acceleration averages out.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

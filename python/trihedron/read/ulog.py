@@ -6,8 +6,6 @@ Such a message contains up to 32 samples of each axis in counts, the LSB, the in
 timestamp t of its last one: sample s of n was taken at t - (n - 1 - s) dt.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """Zip archives from phone apps: one text file per sensor, on a common clock."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 import zlib

@@ -1,7 +1,5 @@
 """A calibration: the linear model of both sensors with the covariance of its parameters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """Type checks for arguments of public records: one clear sentence instead of a library's error."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from enum import Enum

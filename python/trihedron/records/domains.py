@@ -1,7 +1,5 @@
 """Domains of residuals, their tests against noise, and their cross-validated prediction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Process noise of a filter: causes of a log's integrated errors, and the N and K that predict these errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

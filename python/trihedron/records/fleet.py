@@ -1,7 +1,5 @@
 """Many devices: the result of every log, how far devices differ, which effects they share."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """The frame of a binary protocol, as declared by its user."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args
 

@@ -1,7 +1,5 @@
 """Immutable records: arrays and containers in their fields are read-only, also after pickling."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """Records of noise: the terms of an axis with their uncertainties, and the noise of a log."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import Enum

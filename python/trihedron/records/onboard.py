@@ -1,7 +1,5 @@
 """Corrections that a flight controller applies to its readings before it logs them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

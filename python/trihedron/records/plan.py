@@ -1,7 +1,5 @@
 """A planned experiment: the uncertainties to expect from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from trihedron.records.presented import Presented

@@ -1,7 +1,5 @@
 """Records of noise inside the poses of a session: each figure with the interval used to compare two logs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

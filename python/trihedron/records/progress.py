@@ -1,7 +1,5 @@
 """Callback by which a long step reports its progress."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]

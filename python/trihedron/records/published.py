@@ -1,7 +1,5 @@
 """Figures of merit of a calibration, with one definition for print and files."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Several calibrations of one unit, judged on one recording and put in order."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

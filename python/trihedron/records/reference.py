@@ -1,7 +1,5 @@
 """Reference motion of a log (rate table, tracking, robot, another unit) and the results of a fit to it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Results of the public functions: records, shown as a laboratory report by ``print``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

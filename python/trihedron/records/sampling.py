@@ -1,7 +1,5 @@
 """How a recording was sampled: kind and error of its timestamps, as determined when the log was read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -1,7 +1,5 @@
 """Many recordings of one unit: common parameters, repeatability of each, and parameters that changed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

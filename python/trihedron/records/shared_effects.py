@@ -1,7 +1,5 @@
 """Effects that several recordings of one unit share."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

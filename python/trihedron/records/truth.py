@@ -1,7 +1,5 @@
 """The truth behind a simulated recording, kept apart from the log."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal

@@ -1,7 +1,5 @@
 """A calibration judged on a recording that it was not made from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

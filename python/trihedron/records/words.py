@@ -1,7 +1,5 @@
 """Words of the catalogue: the only English text that a value of a finding, or a field beside it, may contain."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from trihedron.answers import ask

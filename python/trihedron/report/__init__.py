@@ -1,7 +1,5 @@
 """Reports: words, tables and figures of results; laid out once, written as text or as a page."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

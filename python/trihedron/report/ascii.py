@@ -1,7 +1,5 @@
 """Text for terminals and files with ASCII only."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 

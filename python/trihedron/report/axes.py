@@ -3,8 +3,6 @@
 All three are the same in every frame: they belong to the sensor, not to the choice of the body frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

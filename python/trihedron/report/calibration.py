@@ -1,7 +1,5 @@
 """The calibration as a laboratory report: result, findings, properties of the axes, residuals, uncertainty."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Charts of a calibration: residuals with their limits, the sphere of poses, moves, correlations."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Residuals of the fit of S and b in words and tables, with one definition each in every report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pictures of a calibration: before and after, residuals by pose, time and orientation, correlations."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Resolution, range limits reached, and bandwidth of a log's channels."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from trihedron.arrays import AXES, FloatArray

@@ -1,7 +1,5 @@
 """A figure as data: panels with axes and marks, which a page draws at any width, in light, dark and on paper."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Report on a log before its calibration: fitness, and the uncertainties to expect."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments

@@ -1,7 +1,5 @@
 """Report of the demonstration: a session against its truth, and a simulation that a log contradicts."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """A diagnosis as a report: what disagrees, which effects are missing, how the fit improves, what is unexplained."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import replace

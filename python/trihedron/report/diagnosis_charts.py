@@ -1,7 +1,5 @@
 """Charts of a diagnosis: residuals before and after the effects; of a model: errors by stage, spectra, Allan curves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """A diagnosis in tables: S and b without and with the effects, every effect that was tried, empirical relations."""
 
-from __future__ import annotations
-
 from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis, Relation
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words

@@ -1,7 +1,5 @@
 """A given model compared with a recording: parameters and noise that differ, and prediction errors by stage."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

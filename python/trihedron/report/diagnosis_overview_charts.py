@@ -1,7 +1,5 @@
 """Overview charts of a diagnosis: disagreement by domain, forest plots of parameters and noise, traces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """A diagnosis in words: the verdict, where it disagrees, and residuals in customary units."""
 
-from __future__ import annotations
-
 from pathlib import PurePath
 from shlex import quote
 

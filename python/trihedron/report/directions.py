@@ -1,7 +1,5 @@
 """Panels without axes: directions on a disc or a rotatable sphere, correlations as a triangle of cells."""
 
-from __future__ import annotations
-
 import json
 import math
 from html import escape

@@ -1,7 +1,5 @@
 """Figures by matplotlib, imported on demand: text and JSON work without it."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from types import ModuleType
 

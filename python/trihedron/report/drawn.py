@@ -1,7 +1,5 @@
 """Charts as HTML: marks as SVG that scales with the panel, axes and text as HTML that does not."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from html import escape

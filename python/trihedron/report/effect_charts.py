@@ -1,7 +1,5 @@
 """Charts of an effect: its curve over the variable that drives it, or the residual that it explains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The report of a calibration with what else its result has: a reference, and effects fitted together with S and b."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

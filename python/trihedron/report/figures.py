@@ -1,7 +1,5 @@
 """Charts as matplotlib figures, for notebooks and ``.plot()``."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Report of filter noise."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

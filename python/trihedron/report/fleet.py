@@ -1,7 +1,5 @@
 """Report of a fleet of devices."""
 
-from __future__ import annotations
-
 import statistics
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Results as columns of a data frame: one row per parameter, pose, axis and term, or sample."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Texts that name command-line flags, rewritten with the parameters of the Python functions."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace

@@ -1,7 +1,5 @@
 """Report of a calibration by Kalman filter: constants by every method, convergence, innovations, residual."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Charts of a calibration by Kalman filter: convergence, innovations, slow noise, residual."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where things stand in a panel: positions of marks, ticks of its axes, labels that overlap nothing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Results for JSON: the content of the report as plain types, with units in the names."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Names of effects, parameters, domains and axes in print."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

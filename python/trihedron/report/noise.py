@@ -1,7 +1,5 @@
 """Reports of noise and of an Allan curve: terms in SI and customary units, best averaging time, the Allan plot."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial

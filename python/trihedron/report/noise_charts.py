@@ -1,7 +1,5 @@
 """Charts of noise: Allan curves with their interval, and the terms of the fitted sum."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Noise for other programs: a JSON record with every value and its unit, and the Allan curve as a table."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Names and units of noise terms: SI, and those of IEEE 952 that data sheets use."""
 
-from __future__ import annotations
-
 from trihedron.records import TermName
 from trihedron.report.numbers import unit_in_print
 from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour

@@ -1,7 +1,5 @@
 """Numbers as text: as many digits as the uncertainty allows, and a unit."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """A report as one self-contained HTML file with embedded figures, and its first screen as a fragment for a notebook."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Report of a planned experiment: uncertainties to expect."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from functools import partial

@@ -1,7 +1,5 @@
 """Report of a ranking of calibrations."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Report sections of the fit to a reference, and charts of its error and of the residual rate."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

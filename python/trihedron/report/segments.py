@@ -1,7 +1,5 @@
 """Reports of a recording and of its poses and moves, with the charts of its signals."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

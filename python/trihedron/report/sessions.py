@@ -1,7 +1,5 @@
 """Report of many recordings of one unit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

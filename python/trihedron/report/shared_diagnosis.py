@@ -1,7 +1,5 @@
 """Report of several recordings of one unit, diagnosed together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

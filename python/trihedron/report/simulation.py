@@ -1,7 +1,5 @@
 """Report of a simulated recording: motion, instrument, and its true parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """A report as plain text, for a terminal or a notebook."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 import unicodedata

@@ -1,7 +1,5 @@
 """Report of a calibration tested on another recording."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The log as short blocks of all channels, on which the whole segmentation works."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The sensor's own noise, estimated from the log, and the two activities relative to it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

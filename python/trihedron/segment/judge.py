@@ -1,7 +1,5 @@
 """Findings on the poses and on the log as a whole."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mean reading of every pose, and its standard error without assuming white noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

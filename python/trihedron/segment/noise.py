@@ -1,7 +1,5 @@
 """Noise of means over time: differences between the means of neighbouring intervals, pooled over all poses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

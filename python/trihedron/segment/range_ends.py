@@ -1,7 +1,5 @@
 """Range limits at which a static channel reads one code for seconds, which is no measure of its noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Segmentation of one recording into poses and moves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise

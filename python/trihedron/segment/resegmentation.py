@@ -1,7 +1,5 @@
 """Poses for a joint model: cut at disturbances, and extended by poses that only drift."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """An accelerometer whose bias settles after every move, alike in all poses (docs/segmentation.md, section 4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

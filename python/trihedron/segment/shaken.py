@@ -1,7 +1,5 @@
 """Poses on a vibrating support: the accelerometer is as loud as in a move, but the body does not rotate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

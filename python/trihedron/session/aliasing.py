@@ -11,8 +11,6 @@ it for a rate that steps (p = 2). D₁ contains slower motion too, which makes t
 a part of D₁ is counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ A mean m over the interval T differs from the value in its middle by T²/24 of t
 about one axis, a sum of means, a does not matter; for rotations that do not commute it does, and moves determine it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Drift of a bias while a part warms up: its usual size, and the time constants tried."""
 
-from __future__ import annotations
-
 TYPICAL = (0.05, 4e-3)
 """Bias change of typical parts while they warm up, one sigma, accelerometer [m/s²] and gyro [rad/s]."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)

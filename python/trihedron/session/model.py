@@ -5,8 +5,6 @@ and the slow part of the accelerometer bias. Both biases are random walks whose 
 the sensor's noise (docs/model-session.md). The arithmetic is :class:`trihedron._core.SessionModel`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

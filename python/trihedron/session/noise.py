@@ -1,7 +1,5 @@
 """Noise of a session, measured once: `calibrate` and `diagnose` use the same weights (docs/model-session.md)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Rate hidden inside one LSB of a coarse ADC, in poses and in moves."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator

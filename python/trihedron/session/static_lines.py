@@ -1,7 +1,5 @@
 """Means of poses with a spectral line, by a joint fit of constant and line (docs/diagnosis-method.md, 8.0)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache

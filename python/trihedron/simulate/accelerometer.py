@@ -1,7 +1,5 @@
 """Accelerometer model: three proof masses, each at its own position, on springs between capacitor plates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

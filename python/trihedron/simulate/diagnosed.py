@@ -1,7 +1,5 @@
 """Effects that a diagnosis accepted, added to a simulation: ids and parameters become sizes of mechanisms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gyro model: a driven mass whose Coriolis force moves a sense mass between capacitor plates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Ready-made scenarios and sessions by name."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Sensor noise with exact discrete statistics: Q, N, B, K, R per axis, each from its own random stream."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import dataclass
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Figures are written in the units of the data sheet and converted to SI here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

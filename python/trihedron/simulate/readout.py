@@ -1,7 +1,5 @@
 """Signal chain that both sensors share after the moving mass: electronics, filter, ADC. A value of 0 disables it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

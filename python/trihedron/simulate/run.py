@@ -1,7 +1,5 @@
 """Simulate a scenario: a recording and its truth."""
 
-from __future__ import annotations
-
 import hashlib
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """A scenario: motion, sensors, clock and environment of a simulated recording."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Scenario files (TOML): a profile, a session or steps, overrides of any parameter, and effects by id."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import inspect

@@ -1,7 +1,5 @@
 """Motions of typical calibration sessions."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

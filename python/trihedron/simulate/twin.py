@@ -5,8 +5,6 @@ accelerations, with a slow rotation about a level axis added so that each ends i
 digital twin therefore differ by what the calibration does not explain.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

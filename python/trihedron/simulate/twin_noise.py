@@ -3,8 +3,6 @@
 For each of a list of filters N² and B² are fitted, non-negative, to the pooled Allan variance; the best filter is kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

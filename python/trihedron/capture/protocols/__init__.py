@@ -1,7 +1,5 @@
 """Protocols by name, one manufacturer per file, found automatically; a decoder converts bytes to frames."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

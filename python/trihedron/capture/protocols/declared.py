@@ -1,7 +1,5 @@
 """Decoder of a binary frame that the user declares in TOML."""
 
-from __future__ import annotations
-
 import struct
 
 from trihedron.capture.protocols.framing import CHECKSUM_OF, Frame, FramedDecoder

@@ -1,7 +1,5 @@
 """Decoders: bytes in, frames out, corrupt and skipped bytes counted; frames by sync and length, or by line."""
 
-from __future__ import annotations
-
 import binascii
 import zlib
 from abc import ABC, abstractmethod

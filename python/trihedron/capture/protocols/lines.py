@@ -1,7 +1,5 @@
 """Lines of text: numbers separated by commas, semicolons, tabs or blanks, or each with a label."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable

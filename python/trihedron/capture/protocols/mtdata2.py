@@ -3,8 +3,6 @@
 Layout by the manufacturer's "MT Low Level Communication Protocol" (MT0101P); numbers are big-endian.
 """
 
-from __future__ import annotations
-
 import struct
 
 from trihedron.capture.protocols.framing import MORE, Frame, FramedDecoder

@@ -4,8 +4,6 @@ Layout by the manufacturer's firmware manual: message 3 (IMU data, floats in m/s
 integers), each with a clock in microseconds and the temperature.
 """
 
-from __future__ import annotations
-
 import struct
 
 from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, Frame, FramedDecoder

@@ -4,8 +4,6 @@
 high byte first, readings of a ten-bit ADC. There is no checksum. Razor: one line per sensor, ``#A-R=x,y,z``.
 """
 
-from __future__ import annotations
-
 import struct
 
 from trihedron.capture.protocols.framing import Frame, FramedDecoder, LineFedDecoder, printed_numbers

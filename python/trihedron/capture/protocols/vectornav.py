@@ -4,8 +4,6 @@ Layout by the manufacturer's manuals; the checksum is the XOR of the bytes betwe
 digits. Fields after the readings (pressure, a count that the user configured) are ignored.
 """
 
-from __future__ import annotations
-
 import binascii
 from functools import reduce
 from operator import xor

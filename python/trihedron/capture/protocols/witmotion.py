@@ -5,8 +5,6 @@ Layout by the manufacturer's data sheets (WT901): 0x50 is the clock, 0x51 accele
 if the sensor sends it, precedes them.
 """
 
-from __future__ import annotations
-
 import struct
 
 from trihedron.capture.protocols.framing import Frame, FramedDecoder

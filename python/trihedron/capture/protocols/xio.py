@@ -4,8 +4,6 @@ Layout by the manufacturer's manual: text ``I,time,gx,gy,gz,ax,ay,az``; binary 0
 little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xDB 0xDD). There is no checksum.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 

@@ -1,7 +1,5 @@
 """Effects of the recording against those of the given model: missing, surplus, or common with other parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Parameters of a given model against those of the recording, by group (docs/diagnosis-method.md, section 9)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

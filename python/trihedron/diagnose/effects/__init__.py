@@ -1,7 +1,5 @@
 """The catalogue: every file of this folder that defines an :class:`Effect` is found automatically."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType

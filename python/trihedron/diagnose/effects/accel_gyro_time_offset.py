@@ -1,7 +1,5 @@
 """Timestamps of one sensor late against those of the other."""
 
-from __future__ import annotations
-
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only

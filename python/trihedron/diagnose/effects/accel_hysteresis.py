@@ -1,7 +1,5 @@
 """Accelerometer offset that depends on the previous orientation."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Three accelerometers at different points of the package (size effect)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES

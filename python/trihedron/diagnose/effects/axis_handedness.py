@@ -1,7 +1,5 @@
 """Documented axes that form a left-handed triad."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES

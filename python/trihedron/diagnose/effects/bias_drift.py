@@ -1,7 +1,5 @@
 """Bias that drifts in time and that no logged channel explains."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random changes of a bias from pose to pose: a strength of the session's noise, not columns of the readings."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Bias that differs from pose to pose."""
 
-from __future__ import annotations
-
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO

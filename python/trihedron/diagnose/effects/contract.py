@@ -3,8 +3,6 @@
 To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 

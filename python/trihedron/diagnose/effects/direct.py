@@ -1,7 +1,5 @@
 """Effects detected by a test on the samples, with evidence of their own, not by columns over poses."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

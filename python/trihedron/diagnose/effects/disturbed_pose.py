@@ -1,7 +1,5 @@
 """A pose that was disturbed or not static: a property of the experiment, not of the sensor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

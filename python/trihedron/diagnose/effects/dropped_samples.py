@@ -1,7 +1,5 @@
 """Samples lost without a gap in the timestamps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary

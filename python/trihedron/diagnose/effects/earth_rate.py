@@ -1,7 +1,5 @@
 """Earth rate, which turns with the attitude."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gyro bias that depends on specific force."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES

@@ -1,7 +1,5 @@
 """Gyro scale that depends on rate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

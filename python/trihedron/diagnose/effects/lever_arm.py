@@ -1,7 +1,5 @@
 """The accelerometer triad is away from the centre of rotation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Losses of samples: intervals where the two sides join only if samples are inserted (eq. 8.16)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A spectral line that motion does not explain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.diagnose.context import Context

@@ -1,7 +1,5 @@
 """Readings at the range limits of a recording, inside its moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Resolution too coarse for the noise: pose means follow the staircase of the ADC."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Range limit reached: the reading stays on a plateau while the motion continues."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import ClassVar
 

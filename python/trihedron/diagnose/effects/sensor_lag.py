@@ -5,8 +5,6 @@ x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All beg
 them. Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Ratiometric readout: the reading scales with the supply."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.diagnose.context import LEAST_SWING_V, Context

@@ -1,7 +1,5 @@
 """Rotations on a table by multiples of 90°: a table that is not level, rotations that miss their angle."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bias or scale of either sensor that depends on a logged temperature."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

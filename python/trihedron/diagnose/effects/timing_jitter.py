@@ -1,7 +1,5 @@
 """Sampling instants that scatter about the timestamps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Bias that depends on the power of vibration."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

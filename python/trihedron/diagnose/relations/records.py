@@ -1,7 +1,5 @@
 """Empirical relations as the records that reports and files show."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray

@@ -4,8 +4,6 @@ Variables of the catalogue's effects (temperature, supply, the square of an axis
 the effect is the better explanation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

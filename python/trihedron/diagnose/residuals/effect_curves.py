@@ -1,7 +1,5 @@
 """An effect as a curve over the one variable that drives it, from its columns, with the residual of every pose."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 

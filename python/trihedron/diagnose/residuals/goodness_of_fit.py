@@ -1,7 +1,5 @@
 """Test of each domain against its predicted noise, and where the misfit is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Static rates caused by motion: a soft support rotates the sensor, and gravity shows it (eq. 8.7d)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

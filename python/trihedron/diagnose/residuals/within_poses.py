@@ -1,7 +1,5 @@
 """Inside the poses: spectral lines, and poses noisier than the others."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -3,8 +3,6 @@
 A thin interface to :class:`trihedron._core.SessionModel`, which computes rows and normal equations.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 

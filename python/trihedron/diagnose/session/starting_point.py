@@ -1,7 +1,5 @@
 """From a calibration to the start of the session fit, and from a fitted session to a linear model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

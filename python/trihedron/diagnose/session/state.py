@@ -1,7 +1,5 @@
 """What effects add to the corrected readings, and slopes of smoothed signals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The diagnosis of a log with one or two orientations (docs/static-logs.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType, SimpleNamespace

@@ -1,7 +1,5 @@
 """A long log cut into static pieces, independent of its segmentation, for biases that drift (docs/static-logs.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ bias differs at random from pose to pose; a nonlinearity is one function of dire
 most of it. Where the poses do not determine its strength, data sheets bound it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Which axis of the case points up in a pose."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Checks of the arguments; errors name them in the user's words."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Method 2: ``|S a' + b| = |g|`` in every pose, independent of case and table (docs/model.md, section 3)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

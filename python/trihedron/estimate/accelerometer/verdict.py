@@ -1,7 +1,5 @@
 """Findings of a fitted triad: residual against noise, undetermined parameters, outliers, handedness, scale."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tilt of the table from whole turns on it: horizontal gravity rotates once through the case during a turn."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Stretches of the gyro's attitude against the reference's."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Noise of both sensors for a filter from a log with a reference, validated on the held-out half of the log."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

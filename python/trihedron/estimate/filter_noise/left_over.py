@@ -1,7 +1,5 @@
 """Error over a horizon of a filter that does not correct S and g-sensitivity, drawn from their posterior."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Without a reference: static noise as identified, and changes of bias and gravity between static intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Noise strengths by evidence: draws of their posterior, and a comparison with a Gauss-Markov bias."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

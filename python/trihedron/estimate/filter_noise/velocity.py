@@ -1,7 +1,5 @@
 """Stretches of the velocity from accelerometer and reference attitude, against the reference's position."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

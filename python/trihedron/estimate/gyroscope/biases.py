@@ -1,7 +1,5 @@
 """Gyro biases of the poses: their mean, their variance between poses, and the combined estimate for each pose."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clipped gyro readings: replaced by a smooth peak, with the variance of the replacement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

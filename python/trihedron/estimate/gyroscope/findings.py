@@ -1,7 +1,5 @@
 """Findings of the fit of moves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Undetected lost samples: the rotation that they remove, bounded by the scatter of the tilt errors after moves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Measurements of a recording's moves: arrays for the fit of a session, with their noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

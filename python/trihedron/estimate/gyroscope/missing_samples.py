@@ -1,7 +1,5 @@
 """Lost samples that the timestamps do not show, detected by the motion on either side of each step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron import _core

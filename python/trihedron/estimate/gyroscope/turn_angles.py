@@ -1,7 +1,5 @@
 """Turns as measured, and identification of the known angle and case axis of each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Known turns on a table, and their axes in the body frame: of the case, or by the accelerometer in any pose."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """Predicted uncertainty of the gyro's parameters from planned turns and moves (the manual's problems 3, 4 and 8)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

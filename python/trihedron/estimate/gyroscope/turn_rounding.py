@@ -1,7 +1,5 @@
 """Rounding errors of a coarse ADC in known turns and in the bias: a steady rate has one constant error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

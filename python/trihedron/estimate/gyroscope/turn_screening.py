@@ -1,7 +1,5 @@
 """Turns that the others contradict, and findings of turns."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Method 1: gyro calibration from turns by known angles about known axes (a table, a wall, a square case)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ It is the norm fit of an accelerometer's poses with another constant (docs/model
 rows to the fit of poses and moves of the same log, so that the frame stays that of the accelerometer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

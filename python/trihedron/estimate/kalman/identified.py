@@ -1,7 +1,5 @@
 """Conversion of identified noise terms (Allan variance, docs/noise.md) to the filter's noise in raw units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The filter's model of an axis' noise, and tests of the innovations against it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

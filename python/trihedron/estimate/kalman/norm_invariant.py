@@ -1,7 +1,5 @@
 """Calibration without reference attitudes: the norm of a static reading is gravity (docs/kalman.md, eq. 10)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Calibration in known attitudes, axis by axis: the Kalman filter, and least squares for comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

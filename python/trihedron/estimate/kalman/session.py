@@ -1,7 +1,5 @@
 """Input of the filters from a recording and its poses: mean readings, times, noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Noise terms of one axis: spectrum, low-pass filtering, lines, selection, intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

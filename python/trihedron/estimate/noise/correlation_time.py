@@ -6,8 +6,6 @@ with one τ for the axes of a sensor, N and q per axis. It is stated only where 
 than any power of frequency (1/f, random walk), and where it lies within their range.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

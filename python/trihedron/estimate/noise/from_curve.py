@@ -1,7 +1,5 @@
 """Noise terms of published or stored Allan curves (docs/noise.md, section 5)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

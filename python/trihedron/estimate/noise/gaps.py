@@ -5,8 +5,6 @@ mean (sampling from a finite population). The transform of a log with the fracti
 f² S + f (1 - f) h s² (docs/noise.md, eq. 16).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recording as equally spaced readings: lost rows become NaN, nothing is shifted or interpolated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray

@@ -1,7 +1,5 @@
 """Parts of a spectrum that no sum of noise terms explains: spectral lines, and low-pass filtering."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """How long to record: predicted relative uncertainty of each noise term for a log of given length."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

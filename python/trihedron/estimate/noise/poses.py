@@ -5,8 +5,6 @@ mean of logarithms over poses, whose error comes from the number of readings and
 logs are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Every detector measures the log's own scatter robustly; its threshold is the val
 exceeds once in 10 000 logs.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ the others nearly so. A long stretch has two bands: block means of its whole len
 the readings for high ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Noise of logs that do not fit into memory: one pass over their chunks, in bounded memory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 

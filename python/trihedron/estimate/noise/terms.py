@@ -1,7 +1,5 @@
 """Contribution of each noise term to a spectral ordinate and to the Allan variance (docs/noise.md, eq. 7-10)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

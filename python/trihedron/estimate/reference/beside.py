@@ -1,7 +1,5 @@
 """One recording with its reference: parameters, point of linearisation, and the linear problem about it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

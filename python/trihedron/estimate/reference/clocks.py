@@ -1,7 +1,5 @@
 """Time alignment of a reference and a log by the magnitude of the rate, which does not depend on the axes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A tracker's noise is blue, a table's wobble has lines, a bias drifts, and all of
 model can make an estimate worse than ordinary least squares; a jackknife over blocks of time selects the model.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

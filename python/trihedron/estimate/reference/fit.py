@@ -1,7 +1,5 @@
 """Fit of a log, or several, to reference motion: composition of the steps (docs/reference.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Initial S and b of a gyro and the clock, by windows, for the fit of the whole motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

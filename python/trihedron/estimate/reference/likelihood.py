@@ -6,8 +6,6 @@ strengths are unknown in every hypothesis and integrated out (docs/reference.md)
 parameters; strengths are per recording.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

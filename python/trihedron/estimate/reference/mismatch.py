@@ -1,7 +1,5 @@
 """Checks that a reference and a log fit together; each error is one sentence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

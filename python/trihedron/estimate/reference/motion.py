@@ -1,7 +1,5 @@
 """Fit of the gyro: parameters of one or several recordings, and effects by their score."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Attitude integrated from the gyro alone against the reference's, on the held-out part of a log."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -11,8 +11,6 @@ A the columns of the attitude's model, V its covariance, P the prior covariance 
 of the accelerometer's least squares to attitudes and to the clock (docs/reference.md).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Log on an even grid of its own clock, and the reference as functions of its time ``(1 + ε) t + τ``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

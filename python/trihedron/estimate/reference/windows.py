@@ -4,8 +4,6 @@ With a cubic B-spline h that begins and ends at zero, ``∫ h dx/dt = -∫ dh/dt
 Windows follow at the spacing of the knots, so that no frequency below 1/(2 spacing) is lost.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

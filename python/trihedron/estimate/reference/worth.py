@@ -1,7 +1,5 @@
 """Quality of a reference: its error, its gaps, and whether it was computed from this gyro."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

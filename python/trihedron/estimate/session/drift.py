@@ -5,8 +5,6 @@ certain than the session determines them. Few poses may not show one: both hypot
 (docs/model-session.md, 11.12e).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The session solved without effects: both sensors, one bias for the session, and their uncertainties."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Input of the session model: pose means, moves and their noise, centred, in raw units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solution of a recording's session: initial scale, outlier moves, fit of both sensors, and their uncertainties."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Initial values for the fit of a session: the scale with the least tilt errors."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

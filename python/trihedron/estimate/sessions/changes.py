@@ -6,8 +6,6 @@ corrects for the number of ids. Where they differ, the simplest change after whi
 session apart, a step at one place, an even trend; else scatter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

@@ -10,8 +10,6 @@ which is exact for any number of sessions (Hartung and Knapp 2005; Viechtbauer 2
 group's mean depends on the unknown σ_u: (1) is averaged over the distribution of σ_u by (1) (a generalised interval).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache

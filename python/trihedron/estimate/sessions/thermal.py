@@ -5,8 +5,6 @@ three is chosen by cross-validation over sessions. Where sessions were recorded 
 the difference between both branches is tested too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ the matrix and some after it. The ``FORMATS`` of every module are found automati
 tested by evaluating the target's equation, readers as the inverse of their writers.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from dataclasses import replace

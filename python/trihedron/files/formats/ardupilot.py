@@ -4,8 +4,6 @@
 TMIN to TMAX. By AP_InertialSensor (Backend and tempcal) of ArduPilot, https://github.com/ArduPilot/ardupilot.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray

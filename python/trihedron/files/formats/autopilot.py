@@ -5,8 +5,6 @@ log are corrected by that already; the exported offsets and scales replace those
 ``R (s' o (r - p'(T) - o'))`` equals the calibration applied to the log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

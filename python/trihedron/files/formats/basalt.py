@@ -1,7 +1,5 @@
 """Basalt's calibration: ``(I + M) raw - b``; b, then M by columns, for the accelerometer only its lower triangle."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

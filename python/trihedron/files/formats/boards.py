@@ -1,7 +1,5 @@
 """Parameters of an autopilot as a calibration of the readings that its board logged."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from trihedron.files.formats import ardupilot, px4

@@ -1,7 +1,5 @@
 """Records and functions that formats of other programs share: options, noise, temperature, headings, parsed results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType

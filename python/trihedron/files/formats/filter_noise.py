@@ -1,7 +1,5 @@
 """Noise parameters alone, in the keys and units of each filter; values of the static log are comments."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

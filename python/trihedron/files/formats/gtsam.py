@@ -1,7 +1,5 @@
 """GTSAM's combined preintegration: covariances of continuous noise, N² and K²; S and b are applied before it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number, of_si_readings, row

@@ -1,7 +1,5 @@
 """The ROS package imu_calib: ``corrected = SM raw - bias``, accelerometer only, SM row by row."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, of_si_readings, row

@@ -4,8 +4,6 @@ imu_tk reads 3 x 3, 3 x 3 and 3 x 1 numbers from the first character on and igno
 end.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row

@@ -3,8 +3,6 @@
 Units are stated in the file; corrected values are in m/s² and usually deg/s.
 """
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -4,8 +4,6 @@ Integers, in the sensor's axes, before the alignments. By applyAccelerationZero 
 https://github.com/iNavFlight/inav.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray

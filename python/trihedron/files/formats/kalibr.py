@@ -3,8 +3,6 @@
 M is lower triangular, C a rotation. Kalibr's results have the same keys under ``imu0``; it stores no biases.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import AXES

@@ -1,7 +1,5 @@
 """Sentences, with sizes, on significant parts of a calibration that a format cannot represent."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Matrix factors in the conventions of other programs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import FloatArray

@@ -5,8 +5,6 @@ LIO-SAM squares its continuous densities for GTSAM's preintegration. FAST-LIO's 
 white noise of density N adds N² dt to the variance of the angle, and a random walk K adds K² dt to that of the bias.
 """
 
-from __future__ import annotations
-
 from trihedron.files.formats.contract import ExportOptions, Format, heading, number, of_si_readings
 from trihedron.files.formats.losses import lost_without_intrinsics
 from trihedron.files.formats.noise_keys import COVARIANCES, KEYS, Figures, limits, required, si_rows

@@ -1,7 +1,5 @@
 """Noise under the keys of other programs: rows of figures, and the error where a target requires missing ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from trihedron.errors import InputError

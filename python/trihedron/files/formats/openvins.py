@@ -1,7 +1,5 @@
 """OpenVINS: ``a = R_IMUtoACCᵀ Ta⁻¹ (a_m - b)``, ``ω = R_IMUtoGYROᵀ Tw⁻¹ (w_m - b - Tg a)``."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parsing of other programs' documents to plain values; a text that does not parse is of another format."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

@@ -4,8 +4,6 @@
 and temperature_compensation of PX4-Autopilot, https://github.com/PX4/PX4-Autopilot.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.arrays import XYZ

@@ -1,7 +1,5 @@
 """pyins: ``x_out = T x + b``, true → measured, T a full matrix."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -4,8 +4,6 @@ The manufacturer's script (tools/rs-imu-calibration of librealsense) solves ``ra
 the camera stores its transpose.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Covariances of ROS' ``sensor_msgs/Imu``: the variance of one message, N² times the rate, on the diagonal."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, of_si_readings, row

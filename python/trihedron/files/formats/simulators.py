@@ -1,7 +1,5 @@
 """IMU models of simulators: truth to readings, and comments on what a model cannot represent."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """S and b as source code of C, Python and Rust: ``true = S raw + b``."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, heading, row

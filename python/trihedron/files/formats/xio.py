@@ -1,7 +1,5 @@
 """xio Fusion and x-IMU3: ``M (s ∘ (raw - b))`` to g and degrees per second, M with unit diagonal."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Detects gravity that rotates between two samples without a gyro rate: both sensors' axes changed, or rows are cut."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Findings on timestamps: changes of rate, jitter, gaps, duplicates, lost packets."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Seconds from a time column: unit, start, wraps, order."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The even clock from which a log's timestamps deviate, if any, and the lost samples (docs/reading.md, section 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise

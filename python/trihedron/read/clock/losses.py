@@ -1,7 +1,5 @@
 """Samples lost on a clock of known period, which shift the earliest timestamps by periods (docs/reading.md, 4)."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import cast
 

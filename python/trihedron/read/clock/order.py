@@ -1,7 +1,5 @@
 """Rows in the order of sampling: counters that wrap, packets that arrived out of order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

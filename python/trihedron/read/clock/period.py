@@ -1,7 +1,5 @@
 """The sampling period from timestamps alone, before losses are counted: a peak of a phase sum (docs/reading.md, 4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

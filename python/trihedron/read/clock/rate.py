@@ -1,7 +1,5 @@
 """Steps and rate of timestamps before their kind is determined."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Chooses the clock of a recording: its timestamps, or an even clock (docs/reading.md, section 4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The unit of a time column: given, named, or inferred from step, digits, length and readings."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A reference motion from a file, or from the log of another unit."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

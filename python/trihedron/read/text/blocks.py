@@ -1,7 +1,5 @@
 """The bytes of a text log: decompressed, in blocks of complete lines, as plain UTF-8."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import hashlib

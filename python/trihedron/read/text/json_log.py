@@ -4,8 +4,6 @@ Nested values are named by their path (``imu.acc.x``); arrays of objects inside 
 with timestamps spread evenly to the next packet's; ``sensors`` and ``values`` are the format of Edge Impulse.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Lines of a block normalised, counted and separated into rows and remarks."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A text log of any dialect as one table, or as one table per sensor."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path

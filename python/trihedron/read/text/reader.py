@@ -1,7 +1,5 @@
 """One text log, read block by block to a table: every line becomes a row or is counted in a finding."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from contextlib import closing
 from itertools import islice

@@ -1,7 +1,5 @@
 """Texts with a record type as the first word of each line, as GnssLogger writes, split into one table per sensor."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """Storage of a text log's numbers while its blocks are parsed; each number is stored once, in its final place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The closed catalogue of sentences about effects, by effect and case."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """The catalogue of effects as a page of the documentation."""
 
-from __future__ import annotations
-
 from trihedron.report.effects.catalogue import CATALOGUE
 from trihedron.report.effects.words import EffectWords
 from trihedron.report.findings.page import shown

@@ -1,7 +1,5 @@
 """Experiments that test an empirical relation, and mechanisms that it resembles, by the family of its variables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Words of effects, by id: of the accelerometers, of the gyros, of both sensors, the log and the session."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

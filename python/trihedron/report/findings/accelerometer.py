@@ -1,7 +1,5 @@
 """Findings about a fitted accelerometer."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated"

@@ -1,7 +1,5 @@
 """Findings of ``api``: gravity, limits, temperature, many recordings, applied and compared calibrations."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "

@@ -1,7 +1,5 @@
 """The closed catalogue of findings: every sentence about a recording, by code and case."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any

@@ -1,7 +1,5 @@
 """Findings about time: timestamps, rates, gaps, and the clock of a recording."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."

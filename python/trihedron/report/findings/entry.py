@@ -1,7 +1,5 @@
 """Sentences of one finding."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

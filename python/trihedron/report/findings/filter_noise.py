@@ -1,7 +1,5 @@
 """Findings about filter noise."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
 
 ENTRIES = {

@@ -1,7 +1,5 @@
 """Findings in reading order, with equal ones merged, and the verdict that follows from them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

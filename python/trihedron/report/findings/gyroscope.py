@@ -1,7 +1,5 @@
 """Findings about a fitted gyro: by moves, by turns of known angle, by the fit of a whole session."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _CONTRADICTING = "rotations that contradict each other, or a start far from the truth."

@@ -1,7 +1,5 @@
 """Findings about a Kalman filter's result and its innovations."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _OF_AXES = {

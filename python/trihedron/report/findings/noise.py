@@ -1,7 +1,5 @@
 """Findings about a static log and its noise terms."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _WIDENED = "Intervals were widened to allow for it."

@@ -1,7 +1,5 @@
 """The catalogue of findings as a page of the documentation."""
 
-from __future__ import annotations
-
 from itertools import groupby
 from string import Formatter
 

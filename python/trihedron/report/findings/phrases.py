@@ -1,7 +1,5 @@
 """Parts of sentences that stages select by id: least determined parameters, poses to add, reasons of a stop."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any

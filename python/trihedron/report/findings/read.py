@@ -1,7 +1,5 @@
 """Findings about a file: its columns, units, rows and devices."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _SAY_ACCEL_UNIT = "Give --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."

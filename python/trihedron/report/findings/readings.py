@@ -1,7 +1,5 @@
 """Findings about the readings: missing, repeated, frozen, clipped, coarse."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 ENTRIES = {

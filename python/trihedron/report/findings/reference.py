@@ -1,7 +1,5 @@
 """Findings about the comparison of a log with known motion, or with another log."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
 
 ENTRIES = {

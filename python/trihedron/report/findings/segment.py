@@ -1,7 +1,5 @@
 """Findings about poses and moves."""
 
-from __future__ import annotations
-
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 ENTRIES = {

@@ -26,8 +26,6 @@ A placeholder is a name and, after the colon, the format of its value:
 ``each`` · ``each; ``    several groups of values, each by the entry's line of that name, joined by comma or ``; ``
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from string import Formatter

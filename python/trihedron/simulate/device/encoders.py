@@ -1,7 +1,5 @@
 """Frames of board protocols from readings; independent of the decoders, so that each tests the other."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Sends a recording as a board does, over a pseudo-terminal or a TCP socket."""
 
-from __future__ import annotations
-
 import math
 import os
 import random

@@ -3,8 +3,6 @@
 ``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. No formula is shared with an estimator.
 """
 
-from __future__ import annotations
-
 import inspect
 from functools import partial
 from typing import Any, Literal

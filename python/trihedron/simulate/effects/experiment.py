@@ -1,7 +1,5 @@
 """Effects of the clock, the environment and the motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Sizes of effects from the parameters that a diagnosis found, by effect and variant of its model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias

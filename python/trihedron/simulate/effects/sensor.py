@@ -1,7 +1,5 @@
 """Effects of the two sensors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Sizes of effects as triples and matrices, and the electronics that several effects change."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

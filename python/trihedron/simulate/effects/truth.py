@@ -1,7 +1,5 @@
 """Effects that a scenario contains, read from its parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from types import MappingProxyType

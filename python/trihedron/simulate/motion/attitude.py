@@ -1,7 +1,5 @@
 """Attitudes as unit quaternions (w, x, y, z) from the body frame to the level frame."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

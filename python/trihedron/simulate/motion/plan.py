@@ -1,7 +1,5 @@
 """A motion as tables of consecutive steps in time, which the Rust kernel evaluates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -5,8 +5,6 @@ Attitudes are quaternions (w, x, y, z) from the body frame to a level frame whos
 suffix ``_deg`` are in degrees, everything else is SI.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeAlias
 

@@ -1,7 +1,5 @@
 """Manufacturers' text formats that are not tables, one module each; ``rewritten(text)`` is a table, or None."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,8 +1,6 @@
 """NovAtel's RAWIMU messages in ASCII (RAWIMUA, RAWIMUXA and their short forms): increments of velocity and angle in
 counts."""
 
-from __future__ import annotations
-
 import re
 
 from trihedron.read.text.dialect import Rewritten, lines_of

@@ -1,7 +1,5 @@
 """Android's *Sensorstream IMU+GPS*: a time, then number and three readings of each sensor that has new ones."""
 
-from __future__ import annotations
-
 import re
 
 from trihedron.read.text.dialect import NEARLY_ALL, Rewritten, lines_of
