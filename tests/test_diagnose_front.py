@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api.extending import _still_true
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.domains import not_explained
 from trihedron.report.document import Picture
 from trihedron.report.extended import calibration_result_report
 from trihedron.simulate import (
@@ -213,10 +213,10 @@ def test_a_bent_accelerometer_is_bent_no_more_once_its_effect_is_found():
 
 def test_a_warning_of_the_linear_fit_is_gone_once_the_effects_explain_the_domain_it_is_about():
     codes = (FindingCode.GYRO_G_SENSITIVITY, FindingCode.NONLINEAR_RESIDUAL, FindingCode.POSE_SETTLING)
-    base = SimpleNamespace(findings=tuple(Finding(code, Severity.WARNING, "Seen.", "", "") for code in codes))
+    findings = tuple(Finding(code, Severity.WARNING, "Seen.", "", "") for code in codes)
     for left, gone in {"dynamics": codes[:2], "static-gyro": codes[1:2], "static-accel": codes[:1]}.items():
         remaining = (SimpleNamespace(domain=left, disagrees=True),)
-        kept = {one.code for one in _still_true(base, SimpleNamespace(remaining=remaining))}
+        kept = {one.code for one in not_explained(findings, remaining)}
         assert kept == set(codes) - set(gone)
 
 

@@ -168,12 +168,26 @@ def test_a_model_that_agrees_is_kept_and_a_log_by_itself_is_calibrated():
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
     weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
     effect = SimpleNamespace(id="disturbed-pose", confounded_with=(), model={"applies_to_other_recordings": False})
-    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), domains=())
+    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), domains=(), remaining=())
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
     found.calibration = SimpleNamespace(findings=(weak,))
     assert next_step_in_words(found).startswith("Add poses.")
+
+
+def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
+    lost = Finding(FindingCode.LOSSES_POSSIBLE, Severity.SERIOUS, "Seen.", "", "Record again.")
+    effect = SimpleNamespace(id="gyro-g-sensitivity", confounded_with=(), model={"applies_to_other_recordings": True})
+    moves = SimpleNamespace(domain="moves", disagrees=False)
+    found = SimpleNamespace(
+        verdict="missing-physics", parameters=(), effects=(effect,), remaining=(moves,),
+        domains=(SimpleNamespace(domain="moves", disagrees=True),), calibration=SimpleNamespace(findings=(lost,)),
+    )  # fmt: skip
+    assert "--extended" in next_step_in_words(found)
+    assert "without effects are not to be trusted" in next_step_in_words(found)
+    moves.disagrees = True
+    assert next_step_in_words(found) == "Record again."
 
 
 def test_what_differs_from_a_ready_made_scenario_is_set_in_a_scenario_of_ones_own():
@@ -186,7 +200,9 @@ def test_what_differs_from_a_ready_made_scenario_is_set_in_a_scenario_of_ones_ow
 def test_a_diagnosis_says_whether_s_and_b_may_be_used_without_its_effects():
     calibrated = read_calibration(made_once() / "c.json")
     effect = SimpleNamespace(id="quantisation", confounded_with=(), model={"applies_to_other_recordings": True})
-    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), calibration=calibrated)
+    found = SimpleNamespace(
+        verdict="missing-physics", parameters=(), effects=(effect,), calibration=calibrated, remaining=()
+    )
     found.domains = (SimpleNamespace(domain="static-accel", disagrees=False),)
     assert "S and b may be used without effects" in next_step_in_words(found)
     found.domains[0].disagrees = True

@@ -14,7 +14,7 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis, StageDomain
-from trihedron.records.domains import Domain
+from trihedron.records.domains import Domain, not_explained
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
@@ -107,7 +107,7 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
         if base.gyroscope is None or model.gyroscope is None
         else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
-        findings=(*_still_true(base, diagnosis), finding),
+        findings=(*not_explained(base.findings, diagnosis.remaining), finding),
         extensions=MappingProxyType(
             {
                 **base.extensions,
@@ -118,24 +118,6 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
             }
         ),
     )
-
-
-_OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[FindingCode]] = MappingProxyType(
-    {
-        "static-accel": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.NONLINEAR_RESIDUAL}),
-        "static-gyro": frozenset({FindingCode.GYRO_G_SENSITIVITY, FindingCode.GYRO_BIAS_DRIFT}),
-        "moves": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE, FindingCode.LOSSES_POSSIBLE}),
-        "dynamics": frozenset({FindingCode.LOSSES_POSSIBLE}),
-    }
-)
-"""Findings about the residuals of the linear fit, by the domain in which they show."""
-
-
-def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    """Findings without those about residuals of the linear fit in domains that agree with noise by the effects."""
-    left = [_OF_THE_LINEAR_FIT.get(d.domain, frozenset()) for d in diagnosis.remaining if d.disagrees]
-    gone = frozenset().union(*_OF_THE_LINEAR_FIT.values()).difference(*left)
-    return tuple(f for f in base.findings if f.code not in gone)
 
 
 def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:

@@ -1,9 +1,12 @@
 """Domains of residuals, their tests against noise, and their cross-validated prediction."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from trihedron.arrays import FloatArray
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
 
@@ -83,3 +86,22 @@ class HeldOut(Plain):
     rms_before: float
     rms_after: float
     unit: str
+
+
+OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[FindingCode]] = MappingProxyType(
+    {
+        "static-accel": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.NONLINEAR_RESIDUAL}),
+        "static-gyro": frozenset({FindingCode.GYRO_G_SENSITIVITY, FindingCode.GYRO_BIAS_DRIFT}),
+        "moves": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE, FindingCode.LOSSES_POSSIBLE}),
+        "dynamics": frozenset({FindingCode.LOSSES_POSSIBLE}),
+    }
+)
+"""Findings about the residuals of the linear fit, by the domain in which they show."""
+
+
+def not_explained(findings: Iterable[Finding], remaining: Iterable[DomainTest]) -> tuple[Finding, ...]:
+    """Findings of a linear calibration without those about residuals in domains that agree with noise by the effects;
+    ``remaining`` are the tests with the effects."""
+    left = [OF_THE_LINEAR_FIT.get(d.domain, frozenset()) for d in remaining if d.disagrees]
+    gone = frozenset().union(*OF_THE_LINEAR_FIT.values()).difference(*left)
+    return tuple(f for f in findings if f.code not in gone)

@@ -3,9 +3,9 @@
 from pathlib import PurePath
 from shlex import quote
 
-from trihedron.records import Finding, Severity
+from trihedron.records import Calibration, Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.domains import DomainTest, HeldOut
+from trihedron.records.domains import DomainTest, HeldOut, not_explained
 from trihedron.records.finding import FindingCode
 from trihedron.report.calibration import errors_in_words
 from trihedron.report.diagnosis_numbers import differing_in_short
@@ -153,7 +153,9 @@ def _by_themselves(diagnosis: Diagnosis) -> str:
     if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
         return " S and b may be used without effects: errors of poses and rotations are within noise."
     own = getattr(diagnosis, "calibration", None)
-    errors = "" if own is None else errors_in_words(own)
+    if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
+        return "" if own is None else " S and b without effects are not to be trusted."
+    errors = errors_in_words(own)
     return f" S and b without effects may be used where these errors are acceptable: {errors}." if errors else ""
 
 
@@ -186,10 +188,16 @@ def _dependent(diagnosis: Diagnosis) -> str:
 
 
 def own_serious(diagnosis: Diagnosis) -> Finding | None:
-    """The first serious finding of the calibration that the log itself gives."""
+    """The first serious finding of the calibration that the log itself gives, unless the effects explain it."""
     name = "updated" if getattr(diagnosis, "model_is_given", False) else "calibration"
-    own = getattr(diagnosis, name, None)
+    return serious_beside(diagnosis, getattr(diagnosis, name, None))
+
+
+def serious_beside(diagnosis: Diagnosis, own: Calibration | None) -> Finding | None:
+    """The first serious finding of a log's ``own`` calibration that the effects of its diagnosis do not explain."""
     findings = () if own is None else own.findings
+    if diagnosis.verdict == "missing-physics" and not getattr(diagnosis, "model_is_given", False):
+        findings = not_explained(findings, diagnosis.remaining)
     return next((one for one in findings if one.severity is Severity.SERIOUS), None)
 
 

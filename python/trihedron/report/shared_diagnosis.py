@@ -13,11 +13,11 @@ from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
     parameter_unit,
+    serious_beside,
     value_in_words,
     verdict_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.findings import serious_ones
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, listed, plain_number, with_sigma
@@ -70,9 +70,9 @@ def _doubted(found: SharedDiagnosis, names: list[str]) -> dict[str, str]:
     """Recordings that are red by themselves, each with the reason."""
     unexplained = "neither the model nor a known effect explains it"
     out = {name: unexplained for name, one in zip(names, found.diagnoses, strict=True) if level_of(one) == "bad"}
-    for name, own in zip(names, found.calibrations, strict=False):
-        if serious := serious_ones(own.findings):
-            out[name] = opening(serious[0].seen)
+    for name, one, own in zip(names, found.diagnoses, found.calibrations, strict=False):
+        if serious := serious_beside(one, own):
+            out[name] = opening(serious.seen)
     return out
 
 
@@ -93,8 +93,7 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
 
 def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
     if doubted:
-        again = "them" if len(doubted) > 1 else "it"
-        return f"Record {listed(doubted)} again, and diagnose the others without {again}."
+        return f"Record {listed(doubted)} again, and diagnose all recordings together then."
     if own:
         return (
             "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."

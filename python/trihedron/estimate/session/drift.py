@@ -17,7 +17,9 @@ from trihedron.session.model import NOTHING
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Strengths
 
 UNLIKELY = 0.02
-"""Probability of a drift below which it is left out of account."""
+"""Probability of a drift, along whichever curve, below which it is left out of account."""
+NEGLIGIBLE = 1e-3
+"""Probability of one curve below which it is: it must change a parameter by 15 errors to widen it by a tenth."""
 WARM_UPS = (0.1, 0.18, 0.32, 0.56, 1.0)
 """Time constants tried, four a decade, as fractions of the session: faster ones alone, one or two poses may as well be
 disturbed; slower are a line. Where several are likely they share the covariance."""
@@ -44,16 +46,15 @@ def likely_curves(observed: Observed, core: _core.SessionFit, sensor: int) -> li
     strengths = [core.strengths, (*START_STRENGTHS[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
     choice = float(np.log(len(asked)))
-    if max(float(one[0].max()) for one in found) - choice < np.log(UNLIKELY):
+    if np.logaddexp.reduce([float(one[0].max()) for one in found]) - choice < np.log(UNLIKELY):
         return [Likely(STEADY, 1.0, core.strengths)]
     answers = core.evidence([NOTHING, *asked], strengths, ANYTHING)
     score = np.array([one[0] for one in answers]) - [0.0, *[choice] * len(asked)]
-    share = np.exp(score - score.max())
-    share *= share > UNLIKELY * share.sum()
+    share = np.exp(score - np.logaddexp.reduce(score))
     likely = [
         Likely(curve, float(p), one[1])
-        for curve, p, one in zip([STEADY, *asked], share / share.sum(), answers, strict=True)
-        if p > 0.0
+        for curve, p, one in zip([STEADY, *asked], share, answers, strict=True)
+        if p > NEGLIGIBLE
     ]
     return sorted(likely, key=lambda one: -one.probability)
 

@@ -78,7 +78,7 @@ _MOVES = {
     ),
     (Code.GYRO_BIAS_DRIFT, "drifts", WARNING): Words(
         "the gyro's bias drifts while the log runs, by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times "
-        "its noise; the stated b is its mean and holds neither before nor after. S accounts for the drift.",
+        "its noise; the stated b is its mean, valid neither before nor after. S accounts for the drift.",
         _BIAS_CHANGES,
         "Let the sensor warm up and record again, or measure the bias in a static pose before use.",
     ),
