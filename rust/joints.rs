@@ -1,201 +1,369 @@
-//! Sample intervals of a move across which one sample is lost or too many, by how the curves on either side join.
+//! Joints of a motion: whether samples are missing between two neighbouring ones, by the likelihood of an
+//! autoregression of the motion above the noise of the sensor (docs/diagnosis-method.md, 8.16).
 
+use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::running::{running_maximum, running_median};
 
-/// Samples on either side of an interval that one curve is fitted to.
-pub const HALF: usize = 4;
-/// Contrasts per channel that the fit of one curve to both sides leaves.
-pub const FREE: usize = 2;
-/// Weights of the contrasts, which are zero where the samples on both sides of an interval lie on one curve.
-pub type Contrasts = [[f64; 2 * HALF]; FREE];
+/// Samples on either side of a joint that are compared.
+pub const HALF: usize = 6;
+const WINDOW: usize = 2 * HALF;
+/// Contrasts of a window that do not depend on its mean.
+const FREE: usize = WINDOW - 1;
+/// Order of the autoregression that predicts the motion from sample to sample.
+const ORDER: usize = 10;
+/// Frequencies of its spectrum: many more than samples in a gap.
+const SPECTRUM: usize = 1 << 14;
+/// Least variance of a contrast, of the largest: a smooth motion has none that rounding does not exceed.
+const SMOOTHEST: f64 = 1e-9;
+/// Powers of the motion tried in a window, of that of all moves: 10⁻⁵ to 250, in steps of four.
+const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
+/// Variances of the shocks of a jolt, of that of the motion's own, and the samples beside the joint that they reach.
+const JOLTS: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
+const SHOCKS: [usize; 3] = [HALF - 1, HALF, HALF + 1];
+/// Counts tried at every joint; all are tried where one of these gains half of what is asked.
+const COARSE: usize = 8;
 
-/// Limits for the detection of an interval that is one sample too long or too short.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// Window, in intervals, of the median that is the ordinary misfit.
-    pub nearby: usize,
-    /// Misfit expected of one lost sample, in ordinary misfits, from which an interval is tested.
-    pub sharp: f64,
-    /// Least and greatest part of the expected misfit that a sample inserted or removed must explain.
-    pub part: (f64, f64),
-    /// Least and greatest shortfall of an interval that is too short, in intervals.
-    pub whole: (f64, f64),
-    /// Largest misfit that may remain, in ordinary misfits.
-    pub left: f64,
-    /// Largest misfit that may remain at a short interval, as a part of the misfit before.
-    pub mirrored: f64,
+/// Samples that are missing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loss {
+    /// The sample behind which they are missing.
+    pub sample: usize,
+    /// Their number, the likeliest.
+    pub count: usize,
+    /// Log-likelihood that they gain over none missing, with or without a jolt.
+    pub gain: f64,
+    /// The same over motions before and after that have nothing to do with one another.
+    pub over_unrelated: f64,
 }
 
-/// The inner intervals of one move: where a lost sample is detectable, which are one sample too long, which too short.
+/// What the joints of a motion show.
 #[derive(Debug, Clone, Default)]
 pub struct Joints {
-    /// A lost sample is detectable.
-    pub is_sharp: Vec<bool>,
-    /// One sample too long.
-    pub is_long: Vec<bool>,
-    /// One sample too short.
-    pub is_short: Vec<bool>,
+    /// Losses, clearest first, none within a window of another.
+    pub losses: Vec<Loss>,
+    /// Number of joints at which a missing sample would be one.
+    pub telling: usize,
 }
 
-/// Joints of the readings `(n, channels)` of a move in units of their noise, row by row; `contrasts` are for the
-/// samples unchanged, with one inserted and with one removed. `n - 2 HALF - 1` intervals.
-///
-/// # Errors
-/// `BadInput` when the numbers do not make rows.
-pub fn joints(
-    readings: &[f64],
-    channels: usize,
-    contrasts: &[Contrasts; 3],
-    limits: &Limits,
-) -> Result<Joints> {
-    if channels == 0 || !readings.len().is_multiple_of(channels) || limits.nearby == 0 {
-        return Err(Error::bad_input(
-            "readings of a move are rows of equal length",
-        ));
-    }
-    let n = readings.len() / channels;
-    let k = n.saturating_sub(2 * HALF + 1);
-    if k == 0 {
-        return Ok(Joints::default());
-    }
-    let jump: [f64; FREE] = std::array::from_fn(|i| contrasts[0][i][HALF..].iter().sum());
-    let jump2: f64 = jump.iter().map(|j| j * j).sum();
-    let seen: Vec<Seen> = (0..k)
-        .map(|at| {
-            Seen::at(
-                &readings[at * channels..(at + 2 * HALF + 2) * channels],
-                channels,
-                contrasts,
-                jump,
-            )
-        })
-        .collect();
-    let dof = (FREE * channels) as f64;
-    let column = |value: fn(&Seen) -> f64| seen.iter().map(value).collect::<Vec<f64>>();
-    let ordinary: Vec<f64> = running_median(&column(|s| s.zero), limits.nearby)
-        .iter()
-        .map(|m| (m / dof).max(1.0))
-        .collect();
-    let best = running_maximum(&column(|s| s.gain[0].max(s.gain[1])), HALF);
-    let explained = running_maximum(&column(Seen::explained), HALF);
-    let mut out = Joints::default();
-    for (at, s) in seen.iter().enumerate() {
-        let expected = jump2 * s.across2;
-        let is_sharp = expected > limits.sharp * ordinary[at];
-        let most = s.gain[0].max(s.gain[1]);
-        let is_off = |gain: f64| {
-            is_sharp
-                && most >= best[at]
-                && gain >= most
-                && gain > limits.part.0 * expected
-                && gain < limits.part.1 * expected
-                && s.zero - gain < limits.left * dof * ordinary[at]
-        };
-        // An interval is too short also where its jump is less than the slope beside it, the mirror image of a long
-        // one: a bend resembles either equally often.
-        let short_by = -s.extra();
-        let is_mirrored = s.power() > limits.sharp * ordinary[at]
-            && s.explained() >= explained[at]
-            && short_by > limits.whole.0
-            && short_by < limits.whole.1
-            && s.with_jump < limits.mirrored * s.zero + limits.left * dof * ordinary[at];
-        out.is_sharp.push(is_sharp);
-        out.is_long.push(is_off(s.gain[0]));
-        out.is_short.push(is_off(s.gain[1]) || is_mirrored);
-    }
-    Ok(out)
+/// Three axes of a sensor in units of the noise of one sample: `(n, 3)`, row by row.
+pub type Readings<'a> = &'a [[f64; 3]];
+type Window = [[f64; 3]; WINDOW];
+
+/// A covariance of windows, apart from their mean: eigenvectors, and the inverse variances with the logarithm of their
+/// determinant at every power of the motion.
+struct Likelihood {
+    vectors: [[f64; WINDOW]; FREE],
+    at: Vec<([f64; FREE], f64)>,
 }
 
-/// Joints of all intervals of the moves `[first, last)`, one after the other; readings `(n, channels)` with noise
-/// `(channels,)`; a reading that is not finite counts as zero.
-///
-/// # Errors
-/// `BadInput` when the numbers do not make rows, or samples on either side of a move are missing.
-pub fn joints_of_moves(
-    readings: &[f64],
-    noise: &[f64],
-    moves: &[[usize; 2]],
-    contrasts: &[Contrasts; 3],
-    limits: &Limits,
-) -> Result<Joints> {
-    let channels = noise.len();
-    let of_move = |&[first, last]: &[usize; 2]| {
-        let from = first.checked_sub(HALF).map(|row| row * channels);
-        let rows = from.and_then(|from| readings.get(from..(last + HALF + 1) * channels));
-        let Some(rows) = rows else {
-            return Err(Error::bad_input(format!(
-                "a move needs {HALF} samples before it and {} behind",
-                HALF + 1
-            )));
-        };
-        let scaled = rows.iter().zip(noise.iter().cycle()).map(|(v, s)| v / s);
-        let whole = scaled.map(|v| if v.is_finite() { v } else { 0.0 });
-        joints(&whole.collect::<Vec<f64>>(), channels, contrasts, limits)
-    };
-    let found: Vec<Joints> = moves.par_iter().map(of_move).collect::<Result<_>>()?;
-    let mut out = Joints::default();
-    for one in found {
-        out.is_sharp.extend(one.is_sharp);
-        out.is_long.extend(one.is_long);
-        out.is_short.extend(one.is_short);
+impl Likelihood {
+    fn of(covariance: &DMatrix<f64>, power: f64) -> Self {
+        let contrasts = contrasts();
+        let eigen = SymmetricEigen::new(contrasts.transpose() * covariance * &contrasts);
+        let vectors = contrasts * eigen.eigenvectors;
+        let least = SMOOTHEST * eigen.eigenvalues.max();
+        let at = POWERS.iter().map(|&n| {
+            let variance: [f64; FREE] = std::array::from_fn(|i| {
+                1.0 + power * 4f64.powi(n) * eigen.eigenvalues[i].max(least)
+            });
+            let log_det = variance.iter().map(|v| v.ln()).sum();
+            (variance.map(|v| 1.0 / v), log_det)
+        });
+        Self {
+            at: at.collect(),
+            vectors: std::array::from_fn(|i| std::array::from_fn(|j| vectors[(j, i)])),
+        }
     }
-    Ok(out)
-}
 
-/// Sums over the channels at one interval.
-#[derive(Clone, Copy, Default)]
-struct Seen {
-    /// Squared misfit of the readings unchanged.
-    zero: f64,
-    /// Decrease of that misfit by one sample inserted, and by one removed.
-    gain: [f64; 2],
-    /// Squared slope across the interval.
-    across2: f64,
-    /// Squares of a jump by the slope beside the interval, its product with the misfit, and the misfit with it.
-    shape2: f64,
-    product: f64,
-    with_jump: f64,
-}
-
-impl Seen {
-    fn at(rows: &[f64], channels: usize, contrasts: &[Contrasts; 3], jump: [f64; FREE]) -> Self {
-        let mut out = Self::default();
-        for c in 0..channels {
-            let value = |row: usize| rows[row * channels + c];
-            let misfit = |of: &Contrasts, i: usize| -> f64 {
-                (0..2 * HALF).fold(0.0, |sum, j| sum + of[i][j] * value(1 + j))
-            };
-            let across = (value(HALF + 2) - value(HALF - 1)) / 3.0;
-            let beside = (value(HALF) - value(HALF - 2) + value(HALF + 3) - value(HALF + 1)) / 4.0;
-            out.across2 += across * across;
-            for i in 0..FREE {
-                let left = misfit(&contrasts[0], i);
-                let shape = jump[i] * beside;
-                out.zero += left * left;
-                for (gain, of) in out.gain.iter_mut().zip(&contrasts[1..]) {
-                    *gain -= misfit(of, i).powi(2);
+    /// Log-likelihood of a window, its motion as large as fits best.
+    fn of_window(&self, window: &Window) -> f64 {
+        let squares: [f64; FREE] = std::array::from_fn(|i| {
+            let mut sum = [0.0; 3];
+            for (weight, row) in self.vectors[i].iter().zip(window) {
+                for (total, value) in sum.iter_mut().zip(row) {
+                    *total += weight * value;
                 }
-                out.shape2 += shape * shape;
-                out.product += left * shape;
-                out.with_jump += (left + shape).powi(2);
+            }
+            sum.iter().map(|s| s * s).sum()
+        });
+        let each = self.at.iter().map(|(inverse, log_det)| {
+            let chi2: f64 = squares.iter().zip(inverse).map(|(s, i)| s * i).sum();
+            -0.5 * (chi2 + 3.0 * log_det)
+        });
+        each.fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// Orthonormal contrasts `(WINDOW, FREE)` that vanish for a constant (Helmert).
+fn contrasts() -> DMatrix<f64> {
+    DMatrix::from_fn(WINDOW, FREE, |row, column| {
+        let k = (column + 1) as f64;
+        let size = (k * (k + 1.0)).sqrt();
+        match row.cmp(&(column + 1)) {
+            std::cmp::Ordering::Less => 1.0 / size,
+            std::cmp::Ordering::Equal => -k / size,
+            std::cmp::Ordering::Greater => 0.0,
+        }
+    })
+}
+
+/// Likelihoods of a sensor's windows: with 0, 1, ... samples missing, with jolts of each size, and with sides that have
+/// nothing to do with one another.
+struct Sensor<'a> {
+    readings: Readings<'a>,
+    each: Vec<Likelihood>,
+}
+
+impl<'a> Sensor<'a> {
+    fn of(readings: Readings<'a>, moves: &[[usize; 2]], most: usize) -> Self {
+        let own: Vec<&[[f64; 3]]> = moves
+            .iter()
+            .map(|&[a, b]| &readings[a..b])
+            .filter(|one| one.len() > WINDOW && one.iter().flatten().all(|v| v.is_finite()))
+            .collect();
+        let coefficients = burg(&own);
+        let covariance = autocovariance(&coefficients, WINDOW + most);
+        let power = own.iter().map(|one| variance(one)).sum::<f64>() / own.len().max(1) as f64;
+        let lag = |i: usize, j: usize| covariance[i.abs_diff(j)] / covariance[0];
+        let missing = (0..=most).map(|n| {
+            let at = |i: usize| if i < HALF { i } else { i + n };
+            let between = DMatrix::from_fn(WINDOW, WINDOW, |i, j| lag(at(i), at(j)));
+            Likelihood::of(&between, power)
+        });
+        let response = impulse_response(&coefficients);
+        let shocked = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
+            let of = |shock: &usize| match (i.checked_sub(*shock), j.checked_sub(*shock)) {
+                (Some(i), Some(j)) => response[i] * response[j],
+                _ => 0.0,
+            };
+            SHOCKS.iter().map(of).sum::<f64>() / covariance[0]
+        });
+        let plain = DMatrix::from_fn(WINDOW, WINDOW, lag);
+        let aside = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
+            f64::from(u8::from((i < HALF) == (j < HALF))) * lag(i, j)
+        });
+        let apart = Likelihood::of(&aside, power);
+        let jolts = JOLTS
+            .iter()
+            .map(|size| Likelihood::of(&(&plain + &shocked * *size), power));
+        Self {
+            readings,
+            each: missing.chain(jolts).chain([apart]).collect(),
+        }
+    }
+
+    /// Samples up to `after` and those behind it, without the first `skipped` of these.
+    fn window(&self, after: usize, skipped: usize) -> Window {
+        std::array::from_fn(|i| {
+            let at = after + 1 + i - HALF;
+            self.readings[if i < HALF { at } else { at + skipped }]
+        })
+    }
+}
+
+/// The joints inside the moves `[first, last)`, with fewer than `most` samples missing; `least` is the gain that is
+/// asked. No window has a sample behind a gap or at a limit (`is_broken`), or a reading that is not finite.
+///
+/// # Errors
+/// `BadInput` when the moves are not within the readings, or lengths differ.
+pub fn joints(
+    sensors: &[Readings<'_>],
+    moves: &[[usize; 2]],
+    is_broken: &[bool],
+    most: usize,
+    least: f64,
+) -> Result<Joints> {
+    let n = is_broken.len();
+    if moves.iter().any(|&[a, b]| a > b || b > n) || sensors.iter().any(|one| one.len() != n) {
+        return Err(Error::bad_input("moves are ranges of the readings"));
+    }
+    let known: Vec<Sensor<'_>> = sensors
+        .par_iter()
+        .map(|one| Sensor::of(one, moves, most))
+        .collect();
+    let coarse = coarse(most);
+    let places: Vec<usize> = moves
+        .iter()
+        .flat_map(|&[a, b]| a + HALF - 1..b.saturating_sub(HALF + 1).max(a + HALF - 1))
+        .filter(|&k| !is_broken[k + 1 - HALF..=k + HALF + 1].contains(&true))
+        .collect();
+    let one = |&sample: &usize| {
+        let at = |skipped| known.iter().map(|s| s.window(sample, skipped)).collect();
+        let (whole, cut): (Vec<Window>, Vec<Window>) = (at(0), at(1));
+        if !whole
+            .iter()
+            .chain(&cut)
+            .flatten()
+            .flatten()
+            .all(|v| v.is_finite())
+        {
+            return (None, false);
+        }
+        let loss = likeliest(&known, (sample, &whole), (&coarse, most), least);
+        let cut = likeliest(&known, (sample, &cut), (&[1], 1), least);
+        let is_loss = loss.gain > least && loss.count < most;
+        (is_loss.then_some(loss), cut.over_unrelated > least)
+    };
+    let seen: Vec<(Option<Loss>, bool)> = places.par_iter().map(one).collect();
+    Ok(Joints {
+        telling: seen.iter().filter(|(_, tells)| *tells).count(),
+        losses: apart(seen.iter().filter_map(|(loss, _)| *loss).collect()),
+    })
+}
+
+/// The clearest losses, none within a window of another.
+fn apart(mut all: Vec<Loss>) -> Vec<Loss> {
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut out: Vec<Loss> = Vec::new();
+    for one in all {
+        if out
+            .iter()
+            .all(|other| one.sample.abs_diff(other.sample) > WINDOW)
+        {
+            out.push(one);
+        }
+    }
+    out
+}
+
+/// The likeliest number of missing samples behind `sample`; its gains, which are over none alone where that is less than
+/// half of `least`.
+fn likeliest(
+    known: &[Sensor<'_>],
+    (sample, windows): (usize, &[Window]),
+    (coarse, most): (&[usize], usize),
+    least: f64,
+) -> Loss {
+    let of = |hypothesis: usize| -> f64 {
+        let each = known.iter().zip(windows);
+        each.map(|(one, window)| one.each[hypothesis].of_window(window))
+            .sum()
+    };
+    let best = |counts: &mut dyn Iterator<Item = usize>| {
+        counts
+            .map(|n| (n, of(n)))
+            .fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a })
+    };
+    let mut rival = of(0);
+    let mut found = best(&mut coarse.iter().copied());
+    let mut unrelated = rival;
+    if found.1 - rival > 0.5 * least {
+        found = best(&mut (1..=most));
+        let last = known.first().map_or(0, |one| one.each.len() - 1);
+        rival = (last - JOLTS.len()..last).map(of).fold(rival, f64::max);
+        unrelated = of(last).max(rival);
+    }
+    Loss {
+        sample,
+        count: found.0,
+        gain: found.1 - rival,
+        over_unrelated: found.1 - unrelated,
+    }
+}
+
+/// Counts from 1 to `most`, evenly spaced in their logarithm.
+fn coarse(most: usize) -> Vec<usize> {
+    let each = |k: usize| (most as f64).powf(k as f64 / (COARSE - 1) as f64).round() as usize;
+    let mut out: Vec<usize> = (0..COARSE).map(each).collect();
+    out.dedup();
+    out
+}
+
+/// Mean variance of the axes.
+fn variance(readings: &[[f64; 3]]) -> f64 {
+    let n = readings.len() as f64;
+    let of_axis = |c: usize| {
+        let mean = readings.iter().map(|row| row[c]).sum::<f64>() / n;
+        readings
+            .iter()
+            .map(|row| (row[c] - mean).powi(2))
+            .sum::<f64>()
+            / n
+    };
+    (0..3).map(of_axis).sum::<f64>() / 3.0
+}
+
+/// Prediction-error filter `(ORDER + 1)` that Burg's method fits to all moves and axes together (Burg 1975), every move
+/// in units of its own steps.
+fn burg(moves: &[&[[f64; 3]]]) -> [f64; ORDER + 1] {
+    let mut pairs: Vec<[Vec<f64>; 2]> = Vec::new();
+    for one in moves {
+        let steps = one
+            .windows(2)
+            .flat_map(|w| (0..3).map(|c| (w[1][c] - w[0][c]).powi(2)));
+        let size = (steps.sum::<f64>() / (3 * (one.len() - 1)) as f64).sqrt() + f64::MIN_POSITIVE;
+        for c in 0..3 {
+            let mean = one.iter().map(|row| row[c]).sum::<f64>() / one.len() as f64;
+            let scaled: Vec<f64> = one.iter().map(|row| (row[c] - mean) / size).collect();
+            pairs.push([scaled[1..].to_vec(), scaled[..scaled.len() - 1].to_vec()]);
+        }
+    }
+    let mut out = [0.0; ORDER + 1];
+    out[0] = 1.0;
+    for order in 1..=ORDER {
+        let (mut product, mut power) = (0.0, f64::MIN_POSITIVE);
+        for [forward, backward] in &pairs {
+            for (f, b) in forward.iter().zip(backward) {
+                product += f * b;
+                power += f * f + b * b;
             }
         }
-        out.gain = out.gain.map(|g| out.zero + g);
-        out
+        let reflection = -2.0 * product / power;
+        let before = out;
+        for i in 1..=order {
+            out[i] += reflection * before[order - i];
+        }
+        for [forward, backward] in &mut pairs {
+            for (f, b) in forward.iter_mut().zip(backward.iter_mut()) {
+                (*f, *b) = (*f + reflection * *b, *b + reflection * *f);
+            }
+            // The next order pairs each forward error with the backward error one sample earlier.
+            if !forward.is_empty() {
+                forward.remove(0);
+                backward.pop();
+            }
+        }
     }
+    out
+}
 
-    fn power(&self) -> f64 {
-        self.shape2.max(1e-300)
-    }
+/// `(lags)` autocovariance of the autoregression from its spectrum.
+fn autocovariance(coefficients: &[f64; ORDER + 1], lags: usize) -> Vec<f64> {
+    let cosine: Vec<f64> = (0..SPECTRUM)
+        .map(|k| (std::f64::consts::TAU * k as f64 / SPECTRUM as f64).cos())
+        .collect();
+    let sine = |k: usize| cosine[(k + 3 * SPECTRUM / 4) % SPECTRUM];
+    let power: Vec<f64> = (0..SPECTRUM)
+        .map(|f| {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (j, c) in coefficients.iter().enumerate() {
+                re += c * cosine[f * j % SPECTRUM];
+                im += c * sine(f * j % SPECTRUM);
+            }
+            1.0 / (re * re + im * im)
+        })
+        .collect();
+    (0..lags)
+        .map(|lag| {
+            let terms = power
+                .iter()
+                .enumerate()
+                .map(|(f, p)| p * cosine[f * lag % SPECTRUM]);
+            terms.sum::<f64>() / SPECTRUM as f64
+        })
+        .collect()
+}
 
-    fn extra(&self) -> f64 {
-        self.product / self.power()
+/// What a shock of one adds to the samples from its own on.
+fn impulse_response(coefficients: &[f64; ORDER + 1]) -> [f64; WINDOW] {
+    let mut out = [0.0; WINDOW];
+    out[0] = 1.0;
+    for i in 1..WINDOW {
+        out[i] = -(1..=i.min(ORDER))
+            .map(|j| coefficients[j] * out[i - j])
+            .sum::<f64>();
     }
-
-    fn explained(&self) -> f64 {
-        self.extra().powi(2) * self.power()
-    }
+    out
 }

@@ -42,17 +42,6 @@ fn medians_from(values: &[f64], half: usize, first: usize, out: &mut [f64]) {
     }
 }
 
-/// Greatest of the numbers up to `half` away from each.
-#[must_use]
-pub fn running_maximum(values: &[f64], half: usize) -> Vec<f64> {
-    (0..values.len())
-        .map(|i| {
-            let window = &values[i.saturating_sub(half)..(i + half + 1).min(values.len())];
-            window.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        })
-        .collect()
-}
-
 /// Mean over `width` rows of `channels` numbers centred on each; at the ends the nearest whole window. By running sums.
 #[must_use]
 pub fn rolling_mean(rows: &[f64], channels: usize, width: usize) -> Vec<f64> {

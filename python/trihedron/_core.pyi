@@ -249,17 +249,12 @@ def block_differences(
 
 # joints of a motion, and the law of its noise
 def motion_joints(
-    readings: FloatArray,
-    noise: FloatArray,
+    readings: Sequence[FloatArray],
     moves: npt.NDArray[np.int64],
-    contrasts: FloatArray,
-    *,
-    nearby: int,
-    sharp: float,
-    part: tuple[float, float],
-    whole: tuple[float, float],
-    left: tuple[float, float],
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]: ...
+    is_broken: BoolArray,
+    most: int,
+    least: float,
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], FloatArray, FloatArray, int]: ...
 def halves_of(
     blocks: FloatArray, stretches: npt.NDArray[np.int64]
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]: ...

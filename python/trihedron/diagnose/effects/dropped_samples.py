@@ -12,13 +12,13 @@ from trihedron.diagnose.effects.lost_samples import (
     Loss,
     find_losses,
     insert_samples,
-    most_lost,
     residual_after,
 )
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.session.joints import most_lost
 from trihedron.session.model import Prior, SessionState
 
 CLEAR_COUNT = 3.0
@@ -29,8 +29,6 @@ MEDIAN_OF_FIVE = 4.35
 """Median of a chi-square with five degrees of freedom: a move has five rows."""
 CONTRADICTS, FEWEST_MOVES = 10.0, 3
 """Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
-OF_NO_JOLT = 200.0
-"""Gain of a join above which it needs no gravity: jolts gained up to 176 in twelve healthy logs."""
 MOST_OF_INTERVALS = 0.02
 """Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
 NAMED = 4
@@ -49,7 +47,7 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     if context.obs not in _KNOWN:
         losses = list(find_losses(context.obs))
         if context.obs.n_moves < 2 * FEWEST_MOVES or len(context.fitted.state.effect):
-            clear = [one for one in losses if one.gain > OF_NO_JOLT]
+            clear = [one for one in losses if one.is_certain]
             _KNOWN[context.obs] = clear, {one.sample: 0.5 + UNSETTLED * one.count for one in clear}
         else:
             _KNOWN[context.obs] = _by_gravity(context, losses)
@@ -103,7 +101,7 @@ class _Move:
     def _best(self, own: list[Loss], k: int) -> Loss:
         best, least = own[k], self.misfit(own)
         for direction in (-1, 1):
-            while 1 <= best.count + direction <= most_lost(self.obs):
+            while 1 <= best.count + direction <= most_lost(self.obs.recording.rate_hz):
                 moved = replace(best, count=best.count + direction)
                 value = self.misfit([*own[:k], moved, *own[k + 1 :]])
                 if value >= least:
@@ -177,7 +175,7 @@ class DroppedSamples(DirectEffect):
         )
         gain, clearest = sum(loss.gain for loss in losses), max(loss.gain for loss in losses)
         # Corrected for all intervals and counts.
-        p = float(np.exp(-0.5 * clearest)) * n_intervals * most_lost(obs)
+        p = float(np.exp(-0.5 * clearest)) * n_intervals * most_lost(obs.recording.rate_hz)
         return Evidence(
             p, gain, parameters, statement, "timing", where,
             reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),

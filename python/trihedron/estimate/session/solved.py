@@ -9,6 +9,7 @@ from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.missing_samples import seen_in_motion
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import with_prior
@@ -206,9 +207,12 @@ def _losses(log: Log, found: _Fit) -> PossibleLosses:
     if not _is_asked_for_losses(log, found):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
-    return losses_that_fit(
+    by_tilt = losses_that_fit(
         log.recording.time_s, found.measured, found.solution.S_w, log.gravity_m_s2, missed, dof, found.used
     )
+    # As many as these errors need would be seen in the motion.
+    is_denied = by_tilt.possible > seen_in_motion(log.recording, log.segments)[0].largest_share
+    return PossibleLosses() if is_denied else by_tilt
 
 
 # The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees.

@@ -92,10 +92,9 @@ _MOVES = {
         Words("the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"),
     ),
     (Code.SAMPLES_LOST, "seen-in-motion", WARNING): Words(
-        "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} intervals in motion are one "
-        "sample too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
-        "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
-        "by about that.",
+        "Samples are missing though the timestamps run on evenly: the motion jumps across {losses} of {joints} "
+        "intervals that would show it (first at {first_s:.2f} s): about {lost_share:.2g !%} ± {sigma_lost_share:.1g %} "
+        "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew.",
         "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
         "`trihedron diagnose` puts single losses back.",

@@ -1,0 +1,70 @@
+"""Samples missing from a motion that no timestamp shows: where the two sides join only with samples between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.probability import chdtri
+
+STRONG = 20.0
+"""Odds that are strong evidence (Kass, Raftery 1995), asked of a loss after its number and its joint were chosen."""
+MOST_LOST, LONGEST_LOSS_S = 60, 0.15
+"""Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
+GAP = 1.5
+"""Steps between timestamps that are a gap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """``count`` samples are missing behind each ``sample`` (k,), clearest first.
+
+    They gain ``gain`` in log-likelihood over none missing and a jolt; where ``is_certain``, also over motions before
+    and after that have nothing to do with one another. One missing sample would be certain at ``telling`` joints.
+    """
+
+    sample: IntArray
+    count: IntArray
+    gain: FloatArray
+    is_certain: BoolArray
+    telling: int
+
+    @property
+    def share(self) -> float:
+        """Share of samples that are missing."""
+        return self._certain / max(self.telling, 1)
+
+    @property
+    def largest_share(self) -> float:
+        """Upper limit of that share, once exceeded in a thousand: losses at random are Poisson."""
+        return 0.5 * chdtri(2.0 * self._certain + 2.0, 1e-3) / max(self.telling, 1)
+
+    @property
+    def _certain(self) -> float:
+        return float(self.count[self.is_certain].sum())
+
+
+def most_lost(rate_hz: float) -> int:
+    """Largest number of samples tried at one place."""
+    return max(MOST_LOST, round(LONGEST_LOSS_S * rate_hz))
+
+
+def joints(
+    readings: list[FloatArray], time_s: FloatArray, rate_hz: float, moves: IntArray, is_cut: BoolArray | None = None
+) -> Joints:
+    """Joints of ``moves`` (m, 2) in the ``readings`` (n, 3) of each sensor, in units of the noise of a sample.
+
+    An autoregression of the motion (Burg's method, order 10), as large as fits each window of six samples before and
+    six after, and the noise of the sensor, compare: none missing; n missing; none missing and three shocks of any size
+    (docs/diagnosis-method.md, 8.16). No joint is asked at a gap of the timestamps, or near samples that are ``is_cut``
+    (n,).
+    """
+    is_broken: BoolArray = np.diff(time_s, prepend=time_s[0]) > GAP / rate_hz
+    if is_cut is not None:
+        is_broken |= is_cut
+    whole = [np.ascontiguousarray(one, dtype=np.float64) for one in readings]
+    most = most_lost(rate_hz)
+    least = float(np.log(STRONG * most * max(int((moves[:, 1] - moves[:, 0]).sum()), 1)))
+    sample, count, gain, over_unrelated, telling = _core.motion_joints(whole, moves, is_broken, most, least)
+    return Joints(sample, count, gain, over_unrelated > least, telling)
