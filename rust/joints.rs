@@ -1,6 +1,8 @@
 //! Joints of a motion: whether samples are missing between two neighbouring ones, by the likelihood of an
 //! autoregression of the motion above the noise of the sensor (docs/diagnosis-method.md, 8.16).
 
+use std::iter::successors;
+
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
@@ -22,9 +24,6 @@ const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
 /// Variances of the shocks of a jolt, of that of the motion's own, and the samples beside the joint that they reach.
 const JOLTS: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 const SHOCKS: [usize; 3] = [HALF - 1, HALF, HALF + 1];
-/// Counts tried at every joint; all are tried where one of these gains half of what is asked.
-const COARSE: usize = 8;
-
 /// Samples that are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
@@ -183,7 +182,10 @@ pub fn joints(
         .par_iter()
         .map(|one| Sensor::of(one, moves, most))
         .collect();
-    let coarse = coarse(most);
+    // Counts tried at every joint; all are tried where one of these gains half of what is asked.
+    let coarse: Vec<usize> = successors(Some(1), |n| Some(2 * n))
+        .take_while(|&n| n <= most)
+        .collect();
     let places: Vec<usize> = moves
         .iter()
         .flat_map(|&[a, b]| a + HALF - 1..b.saturating_sub(HALF + 1).max(a + HALF - 1))
@@ -261,14 +263,6 @@ fn likeliest(
         gain: found.1 - rival,
         over_unrelated: found.1 - unrelated,
     }
-}
-
-/// Counts from 1 to `most`, evenly spaced in their logarithm.
-fn coarse(most: usize) -> Vec<usize> {
-    let each = |k: usize| (most as f64).powf(k as f64 / (COARSE - 1) as f64).round() as usize;
-    let mut out: Vec<usize> = (0..COARSE).map(each).collect();
-    out.dedup();
-    out
 }
 
 /// Mean variance of the axes.

@@ -20,8 +20,9 @@ type Seen<'py> = (
 );
 
 /// Samples missing in moves `(m, 2)`: the samples behind which they are missing, clearest first, their numbers, gains in
-/// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which one missing sample would be seen. `readings` has an array `(n,
-/// 3)` a sensor, in units of its noise; `is_broken` `(n,)`: no joint is asked near the sample.
+/// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which one missing
+/// sample would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise; `is_broken` `(n,)`: no joint
+/// is asked near the sample.
 #[pyfunction]
 fn motion_joints<'py>(
     py: Python<'py>,
@@ -42,9 +43,10 @@ fn motion_joints<'py>(
         joints::joints(&sensors, &moves, &is_broken, most, least)
     })?;
     let losses = || found.losses.iter();
+    let whole = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
     Ok((
-        PyArray1::from_iter(py, losses().map(|one| one.sample as i64)),
-        PyArray1::from_iter(py, losses().map(|one| one.count as i64)),
+        PyArray1::from_iter(py, losses().map(|one| whole(one.sample))),
+        PyArray1::from_iter(py, losses().map(|one| whole(one.count))),
         PyArray1::from_iter(py, losses().map(|one| one.gain)),
         PyArray1::from_iter(py, losses().map(|one| one.over_unrelated)),
         found.telling,

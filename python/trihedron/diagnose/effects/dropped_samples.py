@@ -39,8 +39,8 @@ _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = W
 def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     """Losses with their counts, and the standard error of each count by its sample.
 
-    Joining the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the move
-    determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
+    The joint of the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the
+    move determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
     session is fitted without the moves that seem to have lost most, half of all at the most, so that a loss cannot bias
     it. Computed once per set of observations.
     """
