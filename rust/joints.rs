@@ -24,6 +24,7 @@ const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
 /// Variances of the shocks of a jolt, of that of the motion's own, and the samples beside the joint that they reach.
 const JOLTS: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 const SHOCKS: [usize; 3] = [HALF - 1, HALF, HALF + 1];
+
 /// Samples that are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
@@ -143,13 +144,13 @@ impl<'a> Sensor<'a> {
         let aside = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
             f64::from(u8::from((i < HALF) == (j < HALF))) * lag(i, j)
         });
-        let apart = Likelihood::of(&aside, power);
+        let unrelated = Likelihood::of(&aside, power);
         let jolts = JOLTS
             .iter()
             .map(|size| Likelihood::of(&(&plain + &shocked * *size), power));
         Self {
             readings,
-            each: missing.chain(jolts).chain([apart]).collect(),
+            each: missing.chain(jolts).chain([unrelated]).collect(),
         }
     }
 
