@@ -6,7 +6,8 @@ import pytest
 
 import trihedron
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.effects.quantisation import before_adc, missing_codes
+from trihedron.diagnose.effects.quantisation import missing_codes
+from trihedron.session.rounding import before_adc
 
 
 def diagnosed(tmp_path, *drawn):
@@ -36,8 +37,14 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     poses = [step * np.round(zero + noise * rng.normal(size=400)) for _ in range(20)]
     assert len(np.unique(np.concatenate(poses))) == 2
     assert missing_codes(poses, float(np.concatenate(poses).std()), step) == 0
-    sigma, _, _ = before_adc(poses, step)
-    assert sigma == pytest.approx(noise, rel=0.15)  # one level of its grid is 12 %
+    # The same shares of two codes in all: a mean farther from the edge with more noise, or nearer with less.
+    found = before_adc(poses, step)
+    assert abs(np.mean([one.mean() for one in poses]) / step + found.shift.mean() - zero) < 3.0 * found.common
+    assert 0.03 < found.common < 0.2
+    # Means in several places of a step show the noise, and each mean.
+    places = np.linspace(-1.2, 1.3, 20)
+    found = before_adc([step * np.round(at + noise * rng.normal(size=400)) for at in places], step)
+    assert found.sigma == pytest.approx(noise, rel=0.1)
     # One code shows no grid.
     assert missing_codes([np.zeros(100)] * 5, 0.0, 0.02) is None
 

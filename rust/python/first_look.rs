@@ -5,11 +5,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3};
-use crate::{adc_grid as grid, first_look, levels, running};
+use crate::{adc_grid as grid, before_adc as adc, first_look, levels, running};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(levels_of, module)?)?;
     module.add_function(wrap_pyfunction!(adc_grid, module)?)?;
+    module.add_function(wrap_pyfunction!(before_adc, module)?)?;
     module.add_function(wrap_pyfunction!(window_statistics, module)?)?;
     module.add_function(wrap_pyfunction!(median_length, module)?)?;
     module.add_function(wrap_pyfunction!(block_mean_readings, module)?)?;
@@ -138,4 +139,38 @@ fn running_median<'py>(
     let flat = flat1(&values);
     let found = super::run(py, || Ok(running::running_median(&flat, size)))?;
     Ok(PyArray1::from_vec(py, found))
+}
+
+type Means<'py> = (
+    f64,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    f64,
+);
+
+/// Noise of one reading before the ADC, `(h,)` posterior less plain mean of every pose and its own standard deviation,
+/// and the one that all means share, in steps; `values` `(n,)` are those of the poses, one after the other, `counts`
+/// `(h,)` their numbers.
+#[pyfunction]
+fn before_adc<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    counts: Vec<usize>,
+    step: f64,
+) -> PyResult<Means<'py>> {
+    let values = flat1(&values);
+    let edges: Vec<usize> = std::iter::once(0)
+        .chain(counts.iter().scan(0, |sum, n| {
+            *sum += n;
+            Some(*sum)
+        }))
+        .collect();
+    let found = super::run(py, || adc::before_adc(&values, &edges, step))?;
+    let own = PyArray1::from_vec(py, found.own);
+    Ok((
+        found.sigma,
+        PyArray1::from_vec(py, found.shift),
+        own,
+        found.common,
+    ))
 }

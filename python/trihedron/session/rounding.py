@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -202,13 +203,22 @@ def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
     return np.asarray(np.mean(means, axis=0, where=is_near))
 
 
-def common_bias(
-    bias: FloatArray, var_bias: FloatArray, quantum: FloatArray, axes: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Biases (n, 3) and variances of undithered axes: one bias for all poses, its scatter added to the variance.
+@dataclass(frozen=True, eq=False)
+class BeforeAdc:
+    """Readings of poses before an ADC, in its steps: ``sigma`` the white noise of one; ``shift`` (h,) posterior less
+    plain means; ``own`` (h,) standard deviation of each mean by itself, ``common`` the one that all share."""
 
-    A mean biased by rounding does not determine its own pose's bias; the common bias is left to the moves.
+    sigma: float
+    shift: FloatArray
+    own: FloatArray
+    common: float
+
+
+def before_adc(poses: list[FloatArray], step: float) -> BeforeAdc:
+    """Noise and means of the ``poses`` before an ADC of ``step``, by the shares of their codes: interval-censored
+    normal readings, their means scattered about one.
+
+    A pose whose mean is at the centre of a code has no scatter, at its edge half an LSB, whatever the noise: below half
+    an LSB the scatter does not determine the noise. Two codes leave noise and mean undetermined together (``common``).
     """
-    one = np.broadcast_to(static_reading(bias, quantum), bias.shape)
-    scatter = np.var(bias, axis=0)
-    return np.where(axes, one, bias), var_bias + np.where(axes, scatter, 0.0)
+    return BeforeAdc(*_core.before_adc(np.concatenate(poses), [len(one) for one in poses], step))

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -12,13 +11,12 @@ from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.session.rounding import before_adc
 
 COARSE = 0.45
 """Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
 MISSED = 25.0
 """Expected readings of an empty code from which it counts as missing: by chance once in 10¹¹."""
-SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
-"""Values tried for the noise before the ADC, in LSB."""
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
 FEWEST_CODES = 2
@@ -75,41 +73,6 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | N
             if k + 1 not in visited and k + 2 in count:
                 expected[k + 1] = expected.get(k + 1, 0.0) + float(np.sqrt(count[k] * count[k + 2]))
     return sum(value > MISSED for value in expected.values())
-
-
-def before_adc(poses: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
-    """Noise before the ADC and mean of every pose, by the likelihood of the codes (interval-censored normal readings).
-
-    A pose whose mean is at the centre of a code has no scatter, at its edge half an LSB, whatever the noise: below half
-    an LSB the scatter does not determine the noise, but the shares of the codes do.
-
-    Returns sigma in LSB, and per pose the posterior mean minus the plain mean and the posterior sigma, in LSB.
-    """
-    offsets = np.linspace(-0.75, 0.75, 61)
-    tables = []
-    for values in poses:
-        k = np.round((values - values.min()) / step)
-        codes, counts = np.unique(k, return_counts=True)
-        tables.append((codes, counts, float(k.mean())))
-    evidence = np.zeros(len(SIGMA_GRID))
-    logs = []
-    for j, sigma in enumerate(SIGMA_GRID):
-        rows = []
-        for codes, counts, mean in tables:
-            m = mean + offsets
-            upper = ndtr((codes + 0.5 - m[:, None]) / sigma)
-            lower = ndtr((codes - 0.5 - m[:, None]) / sigma)
-            rows.append(np.log(np.maximum(upper - lower, 1e-15)) @ counts)
-        log_likelihood = np.array(rows)
-        top = log_likelihood.max(axis=1, keepdims=True)
-        evidence[j] = float((top[:, 0] + np.log(np.exp(log_likelihood - top).mean(axis=1))).sum())
-        logs.append(log_likelihood - top)
-    best = int(evidence.argmax())
-    weight = np.exp(logs[best])
-    weight /= weight.sum(axis=1, keepdims=True)
-    shift = weight @ offsets
-    spread = np.sqrt(np.maximum(weight @ offsets**2 - shift**2, 0.0))
-    return float(SIGMA_GRID[best]), shift, spread
 
 
 def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
@@ -179,7 +142,8 @@ class Quantisation(DirectEffect):
             return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, 0, dead)
         if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
             return None
-        sigma, shift, spread = before_adc(poses, step)
+        found = before_adc(poses, step)
+        sigma, shift, spread = found.sigma, found.shift, np.hypot(found.own, found.common)
         if missing and scatter < 2.0 * NOISE_ENOUGH * step:
             return Lattice(
                 c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(poses), 0.25 * step), missing, 0.0

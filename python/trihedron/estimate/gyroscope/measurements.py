@@ -17,7 +17,7 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 from trihedron.session.rounding import (
-    common_bias,
+    before_adc,
     density_without_rounding,
     resting_axes,
     rounding_variance,
@@ -145,7 +145,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         bias = np.ascontiguousarray(bias - force @ attitude.A.T)
     else:
-        attitude, rate = None, gyroscope[rows]
+        attitude, rate = None, gyroscope[rows].copy()
     clipped = bridge_clipping(recording)
     extra, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
     if clipped is not None:
@@ -155,8 +155,12 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     mean, excess, _ = pool_biases(bias, var_bias)
     bias, var_bias = shrink(bias, var_bias, mean)
     if np.any(undithered):
-        bias, var_bias = _with_hidden_bias(bias, var_bias, segments, quantum, undithered)
+        of_codes, own = _by_codes(bias_read, segments, gyroscope, quantum, undithered)
+        bias, var_bias = np.where(undithered, of_codes, bias), np.where(undithered, own**2, var_bias)
         mean = np.where(undithered, bias.mean(axis=0), mean)
+        # At rest inside a move an axis reads as in the poses around it.
+        for (first, last), pair in zip(edges, (of_codes - bias_read)[links], strict=True):
+            rate[first:last] += hidden[first:last] * np.linspace(*pair, last - first)
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)
@@ -229,14 +233,18 @@ def _bridged(
     return rate, variance if extra is None else variance + np.where(is_clipped, 0.0, extra)
 
 
-def _with_hidden_bias(
-    bias: FloatArray, var_bias: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
+def _by_codes(
+    read: FloatArray, segments: Segments, gyroscope: FloatArray, quantum: FloatArray, undithered: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    # Rounding gives the bias of every pose the same error: it is fitted to the moves as one offset.
-    hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
-    assert segments.gyroscope_sigma_mean is not None
-    own = np.maximum(segments.gyroscope_sigma_mean**2 - hidden, 0.0)
-    return common_bias(bias, np.where(undithered, own, var_bias), quantum, undithered)
+    """Biases (n, 3) of the poses on undithered axes, as their codes show them to change about the mean of what was
+    ``read``, with standard errors (n, 3). The place of all inside the LSB is left to the moves."""
+    out, own = read.copy(), np.zeros(read.shape)
+    for axis in np.flatnonzero(undithered).tolist():
+        readings = [gyroscope[pose.samples(), axis] for pose in segments.poses]
+        found = before_adc([one[np.isfinite(one)] for one in readings], float(quantum[axis]))
+        out[:, axis] += quantum[axis] * (found.shift - found.shift.mean())
+        own[:, axis] = quantum[axis] * found.own
+    return out, own
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
