@@ -70,6 +70,9 @@ def fleet_report(summary: FleetSummary) -> Document:
     verdict = f"{n_usable} of {how_many(n, 'log')} usable, {how_many(len(devices), 'device')}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
+    none = {log.serial for log in summary.logs} - {log.serial for log in summary.logs if _is_usable(log)}
+    if none and n_done:
+        verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
@@ -232,7 +235,7 @@ def _within(summary: FleetSummary) -> str:
     """The largest deviation beside the limit, where no device is an outlier."""
     one = summary.farthest
     if one is None:
-        return "Whether a device stands out is tested from 4 devices on."
+        return "Whether a device stands out is tested from 4 devices with a usable calibration on."
     what, away = _by(one.parameter, one.deviation)
     return (
         f"No device stands out: the farthest is {one.serial} by {what}, {away} or {plain_number(one.sigmas, 2)} σ of "
