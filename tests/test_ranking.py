@@ -15,6 +15,7 @@ from trihedron.records import FindingCode, Onboard, Severity
 from trihedron.report.ranking import ranking_report, said_of
 from trihedron.report.verification import verification_report
 
+DRIFT = FindingCode.GYRO_BIAS_DRIFT
 SWAPPED = np.eye(3)[[1, 0, 2]]
 
 
@@ -198,6 +199,17 @@ def test_the_best_of_several_has_the_verdict_that_it_has_alone(session):
     assert document.verdict.endswith(single.verdict)
     assert (document.level, document.foremost, document.what_next) == (single.level, single.foremost, single.what_next)
     assert document.headlines == single.headlines
+
+
+def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification(session):
+    """No bias of such a log is the next one's, whatever the file states; a log without drift has no such warning."""
+    log, known = session
+    counts = np.radians(0.5) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
+    found = [
+        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is DRIFT]
+        for one in (log, replace(log, gyroscope=log.gyroscope + counts))
+    ]
+    assert found == [[], [Severity.WARNING]]
 
 
 def test_only_an_error_of_one_pose_is_blamed_on_that_pose(session):

@@ -130,7 +130,8 @@ def _called(log: FleetLog, summary: FleetSummary) -> str:
 
 
 def _why(log: FleetLog) -> str:
-    return f" ({log.serious[0].replace('-', ' ')})" if log.serious else ""
+    why = log.serious[0].replace("-", " ") if log.serious else "not calibrated"
+    return f" ({why})"
 
 
 def _first(names: list[str]) -> str:
