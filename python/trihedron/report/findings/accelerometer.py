@@ -99,8 +99,9 @@ ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
         "The gravity error in static poses is {norm_rms_m_s2:.3g mm/s²} rms, {times:.2g} times what noise and "
         "uncertainty allow{is_offset:?, with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average "
-        "({share:.2g %} of gravity)|{is_single:?, by one pose alone|}}; largest in pose {worst_pose} "
-        "({worst_m_s2:.3g mm/s²}), χ²/dof {chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
+        "({share:.2g %} of gravity)|}; largest in pose {worst_pose} "
+        "({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}, χ²/dof "
+        "{chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
         "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|"
         "{is_single:?The sensor moved or was touched in pose {worst_pose}|{is_far:?The file is of another sensor, "
         "range or unit, or biases|Biases} and scales have changed since (temperature, shock, supply)}}.",

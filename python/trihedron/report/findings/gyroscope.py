@@ -124,8 +124,8 @@ _MOVES = {
     ),
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
-        "{is_single:?, by one move alone|}; largest in move {worst_move} ({worst_deg:.3g}°), χ²/dof {chi2_per_dof:.2g} "
-        "with each move weighted by its uncertainty.",
+        "; largest in move {worst_move} ({worst_deg:.3g}°){is_single:?, without which they are as expected|}, "
+        "χ²/dof {chi2_per_dof:.2g} with each move weighted by its uncertainty.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
         "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
         "since; else samples were lost or the gyro clipped}.",
