@@ -116,6 +116,19 @@ def row(serial, name, numbers, sigma=1e-4):
     }
 
 
+def test_a_log_of_too_few_poses_is_no_usable_calibration_and_its_device_is_named_first(tmp_path):
+    """Its diagnosis begins from nominal values, which are no calibration."""
+    for unit, n_poses in (("sound", 14), ("short", 2)):
+        path = tmp_path / "logs" / unit / "log.csv"
+        path.parent.mkdir(parents=True)
+        trihedron.convert(recorded(Instrument(), 3, n_poses=n_poses), path)
+    found = trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, gravity_m_s2=G)
+    assert [(log.serial, log.status) for log in found.summary.logs] == [("short", "rejected"), ("sound", "done")]
+    document = fleet_report(found.summary)
+    assert "(short)" in document.verdict
+    assert document.level == "usable"
+
+
 def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path):
     rng = np.random.default_rng(8)
     found, alarms = 0, 0

@@ -10,6 +10,9 @@ from trihedron import _core
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
+from trihedron.report.chart import Note
+from trihedron.report.noise import noise_report
+from trihedron.report.noise_charts import LEAST_SHARE, allan_chart
 
 
 def slow_deviance(bins, strength):
@@ -113,3 +116,31 @@ def test_scattered_loss_leaves_the_terms_where_they_are(truth):
         inside += sum(terms[TermName(s)].lower <= v <= terms[TermName(s)].upper for s, v in truth.items())
     # Twelve intervals of 95 %: nine or more with a probability of 0.998.
     assert inside >= 9
+
+
+@pytest.fixture(scope="module")
+def walking():
+    """An axis of white noise alone, and one with a random walk."""
+    rng = np.random.default_rng(4)
+    readings = np.column_stack([series(rng, 1 << 15, 50.0, N=2e-3), series(rng, 1 << 15, 50.0, N=2e-3, K=2e-4)])
+    return identify_noise(readings, 50.0, names=("gyro x", "gyro y"))
+
+
+def test_the_figure_names_the_terms_that_the_table_names_and_marks_the_others_as_limits(walking):
+    panels = allan_chart(walking.curve, walking.axes[0].unit, walking.axes).panels
+    for axis, panel in zip(walking.axes, panels, strict=True):
+        texts = [mark.text for mark in panel.marks if isinstance(mark, Note)]
+        drawn = {text[0]: text for text in texts if text.split()[0] in TermName._value2member_map_}
+        tau = walking.curve.tau_s[walking.curve.tau_s > 0.0]
+        total, parts = axis.allan_variance(tau), axis.allan_parts(tau)
+        # A part too small to be seen anywhere has no line and no name.
+        assert set(drawn) == {symbol for symbol, part in parts.items() if np.max(part / total) >= LEAST_SHARE}
+        assert all(("<" not in text) == axis.terms[TermName(symbol)].is_present for symbol, text in drawn.items())
+        assert {term.value for term in TermName if axis.terms[term].is_present} <= set(drawn)
+
+
+def test_an_axis_whose_best_averaging_time_lies_beyond_the_log_is_named_beside_the_others(walking):
+    found = [axis.optimal_averaging() is None for axis in walking.axes]
+    beside = [line.beside for line in noise_report(walking).headlines if "averaging" in line.what]
+    assert found == [True, False]
+    assert ["X beyond" in text for text in beside] == [True]

@@ -15,6 +15,7 @@ from trihedron.records import FindingCode, Onboard, Severity
 from trihedron.report.ranking import ranking_report, said_of
 from trihedron.report.verification import verification_report
 
+DRIFT = FindingCode.GYRO_BIAS_DRIFT
 SWAPPED = np.eye(3)[[1, 0, 2]]
 
 
@@ -200,14 +201,36 @@ def test_the_best_of_several_has_the_verdict_that_it_has_alone(session):
     assert document.headlines == single.headlines
 
 
-def test_errors_of_one_sign_in_all_poses_are_no_matter_of_a_single_pose(session):
-    """Another gravity is named as a common offset; a bias on one axis has either sign."""
+def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification(session):
+    """No bias of such a log is the next one's, whatever the file states; a log without drift has no such warning."""
+    log, known = session
+    counts = np.radians(0.5) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
+    found = [
+        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is DRIFT]
+        for one in (log, replace(log, gyroscope=log.gyroscope + counts))
+    ]
+    assert found == [[], [Severity.WARNING]]
+
+
+def test_only_an_error_of_one_pose_is_blamed_on_that_pose(session):
+    """Another gravity is a common offset; a bias on one axis has either sign, and stands in all poses too."""
     log, known = session
     elsewhere = trihedron.verify(known, log, gravity_m_s2=9.83).verification
     b = known.accelerometer.b + np.array([0.05, 0.0, 0.0])
     biased = replace(known, accelerometer=replace(known.accelerometer, b=b))
-    judged = (elsewhere, trihedron.verify(biased, log, gravity_m_s2=9.81).verification)
-    offset, single = (next(f for f in v.findings if f.code is FindingCode.RESIDUAL_ABOVE_NOISE) for v in judged)
-    assert (offset.numbers["n_same"], "pose 1" in offset.action) == (len(elsewhere.norm_error), False)
+    segments = trihedron.segment(log)
+    touched = segments.accelerometer_mean.copy()
+    touched[3] *= 1.01
+    of_one = replace(segments, accelerometer_mean=touched)
+    judged = (
+        elsewhere,
+        trihedron.verify(biased, log, gravity_m_s2=9.81).verification,
+        trihedron.verify(known, log, gravity_m_s2=9.81, segments=of_one).verification,
+    )
+    offset, everywhere, single = (
+        next(f for f in v.findings if f.code is FindingCode.RESIDUAL_ABOVE_NOISE) for v in judged
+    )
+    assert offset.numbers["n_same"] == len(elsewhere.norm_error)
+    assert [" pose " in found.action for found in (offset, everywhere, single)] == [False, False, True]
     assert offset.numbers["mean_m_s2"] == pytest.approx(9.81 - 9.83, abs=5e-3)
-    assert f"pose {single.numbers['worst_pose']:.0f} " in single.action
+    assert "pose 4;" in single.action

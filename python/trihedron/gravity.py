@@ -44,6 +44,10 @@ def normal_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     return at_surface * (1.0 - 2.0 * (1.0 + _FLATTENING + m - 2.0 * _FLATTENING * sin2) * relative + 3.0 * relative**2)
 
 
+LEAST_M_S2, MOST_M_S2 = normal_gravity(0.0, 20000.0), normal_gravity(90.0, -1000.0)
+"""Gravity of all places that latitude and height can state: another value is in another unit, or a slip."""
+
+
 def earth_rate_north_up(latitude_deg: float) -> tuple[float, float]:
     """Northward and upward components [rad/s] of the Earth's rotation at a latitude [deg]."""
     latitude = math.radians(latitude_deg)

@@ -13,6 +13,7 @@ from numbers import Integral, Real
 from typing import Any, TypeVar
 
 from trihedron.errors import InputError
+from trihedron.gravity import LEAST_M_S2, MOST_M_S2
 from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
 from trihedron.report.in_python import in_python, result_in_python
 
@@ -22,7 +23,7 @@ LONGEST_NAME = 4096
 """Longest text argument, in characters: the longest path of any system, and longer than any value of an option."""
 
 RANGES: dict[str, tuple[float, float, str]] = {
-    "gravity_m_s2": (1.0, 100.0, "m/s², about 9.8 on Earth"),
+    "gravity_m_s2": (LEAST_M_S2, MOST_M_S2, "m/s², about 9.8 on Earth"),
     "latitude_deg": (-90.0, 90.0, "degrees"),
     "height_m": (-12_000.0, 100_000.0, "m above sea level"),
     "rate_hz": (1e-6, 1e9, "samples per second"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from trihedron.errors import InputError
-from trihedron.gravity import normal_gravity
+from trihedron.gravity import LEAST_M_S2, MOST_M_S2, normal_gravity
 from trihedron.records import Calibration, Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -22,8 +22,11 @@ def settle_gravity(
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:
             raise InputError("gravity is given twice, as a value and by a place: give either --gravity or --latitude.")
-        if not 1.0 < gravity_m_s2 < 100.0:
-            raise InputError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
+        if not LEAST_M_S2 <= gravity_m_s2 <= MOST_M_S2:
+            raise InputError(
+                f"gravity is given in m/s² whatever the unit of the log: on Earth {LEAST_M_S2:.2f} to {MOST_M_S2:.2f}, "
+                f"and cannot be {gravity_m_s2:g}."
+            )
         return float(gravity_m_s2), "given", ()
     if latitude_deg is not None:
         height = 0.0 if height_m is None else height_m

@@ -26,6 +26,8 @@ _OF_DIAGNOSE = ("--alpha",)
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
+_NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
+"""A command with one of several logs by its name: this place is also its own."""
 UNSTORED = "calibration.json"
 # Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
@@ -138,6 +140,8 @@ def _filled(command: str) -> str:
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_now().log, *more)))
     given = [word for word in _now().typed if word not in _now().excluded]
+    if verb in _WITH_PLACE and _NAMES_A_LOG.search(command) and _now().place:
+        return f"{command[:-1]} {_now().place}`"
     same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)

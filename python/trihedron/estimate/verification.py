@@ -197,6 +197,9 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float) ->
         "verify-static",
         severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
         norm_rms_m_s2=rms,
+        times=times,
+        is_far=times > FAR_BEYOND,
+        is_single=_is_single(z2, 1),
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
         n_same=n_same,
@@ -207,6 +210,11 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float) ->
         worst_m_s2=error[worst],
         chi2_per_dof=times**2,
     )
+
+
+def _is_single(z2: FloatArray, n_components: int) -> bool:
+    """Whether the squared errors (n,) in their expected size, of ``n_components`` each, are as expected without one."""
+    return probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM
 
 
 def _angle_findings(moves: Carriage) -> Iterator[Finding]:
@@ -224,6 +232,9 @@ def _angle_findings(moves: Carriage) -> Iterator[Finding]:
         "verify-moves",
         severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
         angle_rms_deg=rms,
+        times=times,
+        is_far=times > FAR_BEYOND,
+        is_single=_is_single(z2, 2),
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
         chi2_per_dof=times**2,

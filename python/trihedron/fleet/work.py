@@ -59,6 +59,9 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
             why = grave[0] if grave else "its poses determine no calibration."
             raise InputError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
         result = CalibrationResult(found.calibration, found.segments, recording)
+        if found.verdict == "not-testable":
+            # The diagnosis may have begun from nominal values: what the log itself determines, or why nothing.
+            result = calibrating.calibrate(recording, segments=found.segments, **place)
         diagnosis = {
             "verdict": found.verdict,
             "effects": [

@@ -17,7 +17,7 @@ from trihedron.report.calibration_pictures import (
     lead_picture,
     uncalibrated_error,
 )
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Section, Table
+from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import (
@@ -139,11 +139,11 @@ def errors_in_words(calibration: Calibration) -> str:
 def verdict(calibration: Calibration) -> str:
     """The verdict: usable or not, how far beyond noise, a gyro bias that drifts, the effects of an extended one."""
     said = errors_in_words(calibration)
-    above = f": {said}" if said else ""
+    above = f"{WITHIN}{said}" if said else "Usable"
     if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
         above += "; the gyro was not calibrated"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
-    whole = verdict_of(calibration.findings, "OK: no problems found.", "Usable" + above, "NOT TO BE TRUSTED")
+    whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]
     drifts = [f"{capital(opening(f.seen))}." for f in warned if f.code is FindingCode.GYRO_BIAS_DRIFT]
     return " ".join([whole, *drifts, *effects])

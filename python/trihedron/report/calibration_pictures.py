@@ -1,5 +1,6 @@
 """The pictures of a calibration: before and after, residuals by pose, time and orientation, correlations."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -77,7 +78,8 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
     sizes = Panel(x, y, tuple(marks), title=title)
-    return Chart((*residual_chart(quality, lines=lines).panels, sizes), columns=2)
+    errors = [replace(panel, title="error of every pose") for panel in residual_chart(quality, lines=lines).panels]
+    return Chart((*errors, sizes), columns=2)
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:

@@ -39,6 +39,8 @@ CONSEQUENCE = (
     FindingCode.GYRO_BIAS_DRIFT,
 )
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
+WITHIN = "Usable where these errors are acceptable: "
+"""Verdict with warnings, before the errors."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
 THEN_RUN = {

@@ -38,6 +38,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     bad = [log for log in summary.logs if log.status != "done"]
     n_done = n - len(bad)
     mixed = {one.serial for one in summary.mixed}
+    n_devices = how_many(len({log.serial for log in summary.logs} - mixed), "device")
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
@@ -67,9 +68,12 @@ def fleet_report(summary: FleetSummary) -> Document:
         caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    verdict = f"{n_usable} of {how_many(n, 'log')} usable, {how_many(len(devices), 'device')}."
+    verdict = f"{n_usable} of {how_many(n, 'log')} usable, {n_devices}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
+    none = {log.serial for log in summary.logs} - {log.serial for log in summary.logs if _is_usable(log)}
+    if none and n_done:
+        verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
@@ -87,7 +91,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" {_named(moved)} changed between sessions, or the logs are of several units."
     return Document(
         title="Fleet",
-        subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
+        subtitle=f"{how_many(n, 'log')}, {n_devices}",
         verdict=verdict,
         is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
@@ -127,7 +131,8 @@ def _called(log: FleetLog, summary: FleetSummary) -> str:
 
 
 def _why(log: FleetLog) -> str:
-    return f" ({log.serious[0].replace('-', ' ')})" if log.serious else ""
+    why = log.serious[0].replace("-", " ") if log.serious else "not calibrated"
+    return f" ({why})"
 
 
 def _first(names: list[str]) -> str:
@@ -232,7 +237,7 @@ def _within(summary: FleetSummary) -> str:
     """The largest deviation beside the limit, where no device is an outlier."""
     one = summary.farthest
     if one is None:
-        return "Whether a device stands out is tested from 4 devices on."
+        return "Whether a device stands out is tested from 4 devices with a usable calibration on."
     what, away = _by(one.parameter, one.deviation)
     return (
         f"No device stands out: the farthest is {one.serial} by {what}, {away} or {plain_number(one.sigmas, 2)} σ of "

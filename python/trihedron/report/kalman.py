@@ -17,7 +17,7 @@ from trihedron.records import (
 )
 from trihedron.records.published import BY_FILTER
 from trihedron.report.calibration import FRAMES, parameter_table, scale_headlines
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import (
     convergence_chart,
@@ -55,7 +55,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         verdict=verdict_of(
             calibration.findings,
             "OK: the innovations are as large and as white as the noise model predicts.",
-            f"Usable: {residual.what} {residual.value} {residual.unit} rms",
+            f"{WITHIN}{residual.what} {residual.value} {residual.unit} rms",
             "NOT TO BE TRUSTED",
         ),
         is_trustworthy=calibration.is_trustworthy,

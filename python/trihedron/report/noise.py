@@ -12,7 +12,7 @@ from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
 from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, term_in_words, unit_of
-from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
+from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
 _NO_UNIT = (
@@ -23,6 +23,8 @@ NEXT = """Take N, B, K into a filter: `trihedron export CALIBRATION --to kalibr 
 NOISE.json of `... --json NOISE.json`; average for no longer than the best averaging time."""
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
+BEYOND = "beyond the log"
+"""An averaging time at which the fitted sum still falls."""
 MOST_ROWS = 12
 """Rows of a curve's table, about; averaging times between them are omitted."""
 
@@ -90,6 +92,8 @@ def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
             low, high = (plain_number(t, 2) for t in (min(best), max(best)))
             words = low if low == high else f"{low} to {high}"
             beside = "minimum of the fitted terms" + ("" if low == high else ", axis by axis")
+            without = [axis_in_print(a.name).split()[-1] for a in axes if a.optimal_averaging() is None]
+            beside += f"; {listed(without)} {BEYOND}" if without else ""
             out.append(Headline(f"{name}, best averaging time", words, "s", beside))
     return out
 
@@ -190,7 +194,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
     printed = unit_in_print(unit)
     found = [axis.optimal_averaging() for axis in axes]
     rows = (
-        ("best averaging time [s]", *("beyond the log" if one is None else plain_number(one[0]) for one in found)),
+        ("best averaging time [s]", *(BEYOND if one is None else plain_number(one[0]) for one in found)),
         (f"bias uncertainty then [{printed}]", *("–" if one is None else plain_number(one[1]) for one in found)),
         *(
             (

@@ -147,5 +147,5 @@ def each_with_sigma(values: Iterable[float], sigmas: Iterable[float], factor: fl
 
 
 def capital(text: str) -> str:
-    """The text with its first letter in upper case."""
-    return text[:1].upper() + text[1:]
+    """The text with its first letter in upper case; a symbol (χ², σ) stays as it is."""
+    return (text[:1].upper() if text[:1].isascii() else text[:1]) + text[1:]

@@ -40,7 +40,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         is_trustworthy=True,
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
-        next_step="Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses.",
+        next_step=_next_step(plan),
         sections=(
             Section(
                 "Poses",
@@ -64,6 +64,18 @@ def plan_report(plan: ExperimentPlan) -> Document:
             ),
             Section("Known turns", (_turns(plan),)),
         ),
+    )
+
+
+def _next_step(plan: ExperimentPlan) -> str:
+    """How to record the poses, and what to do between them for the gyro: the moves that determine it best."""
+    step = "Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses."
+    moves = min(plan.moves, key=lambda one: (-one.rank, one.scale), default=None)
+    if moves is None or moves.rank < ALL_NUMBERS:
+        return step
+    return (
+        f"{step} For the gyro, turn the sensor between them about each level axis in turn, {moves.name}: "
+        f"{moves.n_moves} such moves give all {ALL_NUMBERS} of its parameters (scale {_percent(moves.scale)})."
     )
 
 

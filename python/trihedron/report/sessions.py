@@ -15,7 +15,7 @@ from trihedron.report.document import Block, Document, Facts, Headline, Paragrap
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
-from trihedron.report.numbers import capital, each_with_sigma, how_many, plain_number, shown, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
 from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
@@ -30,13 +30,10 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out the common parameters of many recordings, and the repeatability of each."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    used = how_many(n, "recording")
-    without = f"; {len(model.left_out)} excluded" if model.left_out else ""
-    agree = f"{used} differ by no more than their uncertainty{without}"
-    good = f"{used} differ by no more than their uncertainty and the bias drift within a recording{without}."
+    used = f"{how_many(n, 'recording')} of {n + len(model.left_out)}" if model.left_out else how_many(n, "recording")
+    agree = f"{used} differ by no more than their uncertainty and the bias drift within a recording"
     if model.thermal is not None:
-        agree = f"{used} make one model from {_range(model.thermal)}{without}"
-        good = f"{agree}."
+        agree = f"{used} make one model from {_range(model.thermal)}"
     sections = [
         Section("Result", (Facts(_facts(model)), *_repeatability(model))),
         Section("Findings", (findings_block(model.findings),)),
@@ -51,14 +48,14 @@ def sessions_report(model: SessionsModel) -> Document:
         sections.append(Section("Recordings", (recordings,)))
     sections += [Section("Figures", (picture,)) for picture in _further(model)]
     names = [session.name for session in model.sessions]
-    usable = agree
+    usable = f"Usable: {agree}"
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        usable = f"{capital(parameters)} changed between {how_many(n, 'recording')}"
+        usable = f"Usable with the spread below: {parameters} changed between {used}"
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
-        verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
+        verdict=verdict_of(model.findings, f"OK: {agree}.", usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
         headlines=_headlines(model),

@@ -1,5 +1,6 @@
 """Report of several recordings of one unit, diagnosed together."""
 
+import shlex
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -42,23 +43,28 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     elif found.effects:
         verdict = f"{ids_in_print(one.id for one in found.effects)} differs from recording to recording."
     tried = tuple((id_in_print(one.id), plain_number(one.score)) for one in found.candidates)
-    n_alone = sum(map(bool, found.of_single_recordings))
+    alone = {name: ids for name, ids in zip(names, found.of_single_recordings, strict=True) if ids}
     doubted = _doubted(found, names)
-    for name, why in doubted.items():
-        verdict += f" {name} by itself is NOT TO BE TRUSTED: {why}."
+    wrong = [f"{name} by itself is NOT TO BE TRUSTED: {why}." for name, why in doubted.items()]
+    verdict = capital(verdict)
+    if alone:
+        missing = [f"{name} by itself misses {ids_in_print(ids)}" for name, ids in alone.items()]
+        wrong.append(f"MISSING PHYSICS: {'; '.join(missing)}.")
+    if not (wrong or found.effects):
+        wrong.append("CONSISTENT: no recording misses an effect by itself.")
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
-        verdict=capital(verdict),
+        verdict=" ".join([*wrong, verdict]),
         is_trustworthy=not found.effects,
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
             Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
-        stated_level="bad" if doubted else "usable" if found.effects else "good",
+        stated_level="bad" if doubted else "usable" if found.effects or alone else "good",
         headlines=(
-            Headline("recordings", str(len(found.diagnoses)), "", f"{n_alone} with effects of their own"),
+            Headline("recordings", str(len(found.diagnoses)), "", f"{len(alone)} with effects of their own"),
             Headline("shared effects", str(len(own)), "", "of the instrument"),
         ),
         lead=_lead(found, names),
@@ -98,8 +104,9 @@ def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> st
         return (
             "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."
         )
-    if any(found.of_single_recordings):
-        return "What single recordings name belongs to their sessions: diagnose each by itself."
+    pairs = zip(found.diagnoses, found.of_single_recordings, strict=True)
+    if alone := [f"`trihedron diagnose {shlex.quote(one.recording_source)}`" for one, ids in pairs if ids]:
+        return f"What a recording misses alone belongs to its session: {listed(alone)}."
     return "Nothing is to be added. Calibrate the recordings together: `trihedron calibrate ... -o calibration.json`."
 
 

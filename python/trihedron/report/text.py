@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
-from trihedron.report.findings import beyond_headline
+from trihedron.report.findings import beyond_headline, likely
 from trihedron.sanitise import escaped, one_line
 
 WIDTH = 100
@@ -91,7 +91,7 @@ def _finding_lines(finding: Finding, style: Style) -> list[str]:
     first, *rest = _wrap(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
     lines = [style.paint(name, _COLOURS[name]) + first[len(name) :], *rest]
     if finding.cause:
-        cause = style.plain(f"Likely: {finding.cause[0].lower()}{finding.cause[1:]}")
+        cause = style.plain(likely(finding.cause))
         lines += [style.paint(line, _DIM) for line in _wrap(cause, width, " " * 8, " " * 8)]
     if finding.action:
         lines += _wrap(style.plain(f"→ {finding.action}"), width, " " * 8, " " * 10)

@@ -69,9 +69,9 @@ def above_noise(v: Verification) -> list[Finding]:
 
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
-    above = dict.fromkeys(_ABOVE_NOISE[finding.code] for finding in above_noise(v))
+    above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
     verified = "Verified: errors are within noise and uncertainty"
-    usable = f"Doubtful: {listed(list(above))} above noise and uncertainty" if above else verified
+    usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
 
 

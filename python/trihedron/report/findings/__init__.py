@@ -5,9 +5,19 @@ from trihedron.report.findings.grouping import (
     by_weight,
     combined,
     findings_block,
+    likely,
     ranged,
     serious_ones,
     verdict_of,
 )
 
-__all__ = ["beyond_headline", "by_weight", "combined", "findings_block", "ranged", "serious_ones", "verdict_of"]
+__all__ = [
+    "beyond_headline",
+    "by_weight",
+    "combined",
+    "findings_block",
+    "likely",
+    "ranged",
+    "serious_ones",
+    "verdict_of",
+]

@@ -97,14 +97,18 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
-        "The gravity error in static poses, {norm_rms_m_s2:.3g mm/s²} rms, exceeds noise and uncertainty, "
-        "{is_offset:?with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average ({share:.2g %} of "
-        "gravity)|most in pose {worst_pose} ({worst_m_s2:.3g mm/s²})}; χ²/dof {chi2_per_dof:.2g}, each pose weighted "
-        "by its uncertainty.",
-        "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|The sensor "
-        "has changed since (temperature, shock, supply), gravity is another here, or poses were not static}.",
-        "{is_offset:?Check gravity (--gravity, --latitude) and unit; if both are right|Look at pose {worst_pose} "
-        "first; if it was static}, calibrate again near the conditions of use.",
+        "The gravity error in static poses is {norm_rms_m_s2:.3g mm/s²} rms, {times:.2g} times what noise and "
+        "uncertainty allow{is_offset:?, with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average "
+        "({share:.2g %} of gravity)|}; largest in pose {worst_pose} "
+        "({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}, χ²/dof "
+        "{chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
+        "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|"
+        "{is_single:?The sensor moved or was touched in pose {worst_pose}|{is_far:?The file is of another sensor, "
+        "range or unit, or biases|Biases} and scales have changed since (temperature, shock, supply)}}.",
+        "{is_offset:?Check gravity (--gravity, --latitude) and unit; if both are right, calibrate|{is_single:?Look at "
+        "pose {worst_pose}; if it was static, calibrate|{is_far:?Check that file, sensor and unit belong together; if "
+        "they do, calibrate|Calibrate}}} again near the conditions of use.",
         or_severity=SERIOUS,
+        numbers=("is_far",),
     ),
 }

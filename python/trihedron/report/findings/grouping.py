@@ -39,12 +39,18 @@ def _weight(finding: Finding) -> tuple[int, int]:
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
-    """``bad`` with the first clause of the gravest finding; ``usable`` with the number of warnings; or ``good``."""
+    """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the number of warnings; or
+    ``good``."""
     serious = serious_ones(findings)
     n_warnings = sum(finding.severity is Severity.WARNING for finding in combined(findings))
     if serious:
-        return f"{bad}: {capital(opening(serious[0].seen))}."
+        return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+
+
+def likely(cause: str) -> str:
+    """A cause as a sentence after an observation; empty where there is none."""
+    return f"Likely: {cause[:1].lower()}{cause[1:]}" if cause else ""
 
 
 def beyond_headline(finding: Finding, document: Document, above: str = "Stated above. ") -> Finding:
@@ -56,7 +62,8 @@ def beyond_headline(finding: Finding, document: Document, above: str = "Stated a
     is_stated = clause.lower() in document.verdict.lower()
     seen = f"{above}{capital(rest)}".rstrip() if is_stated else finding.seen
     is_next = begins_with(document.what_next, finding.action)
-    return replace(finding, seen=seen, action="" if is_next else finding.action)
+    cause = "" if likely(finding.cause) in document.verdict else finding.cause
+    return replace(finding, seen=seen, cause=cause, action="" if is_next else finding.action)
 
 
 def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:

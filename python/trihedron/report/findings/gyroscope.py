@@ -122,10 +122,14 @@ _MOVES = {
         "Record again, or log at a rate that the link sustains.",
     ),
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
-        "The tilt error after rotations, {angle_rms_deg:.3g}° rms, exceeds noise and uncertainty, most in move "
-        "{worst_move} ({worst_deg:.3g}°); χ²/dof {chi2_per_dof:.2g}, each move weighted by its uncertainty.",
-        "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not static.",
-        "Look at move {worst_move} first; if the poses around it were static, calibrate again near conditions of use.",
+        "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
+        "; largest in move {worst_move} ({worst_deg:.3g}°){is_single:?, without which they are as expected|}, "
+        "χ²/dof {chi2_per_dof:.2g} with each move weighted by its uncertainty.",
+        "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
+        "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
+        "since; else samples were lost or the gyro clipped}.",
+        "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_far:?Check that "
+        "file, sensor and unit belong together; if they do, calibrate|Calibrate}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }
