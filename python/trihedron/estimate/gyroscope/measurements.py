@@ -160,7 +160,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         mean = np.where(undithered, bias.mean(axis=0), mean)
         # At rest inside a move an axis reads as in the poses around it.
         for (first, last), pair in zip(edges, (of_codes - bias_read)[links], strict=True):
-            rate[first:last] += hidden[first:last] * np.linspace(*pair, last - first)
+            rate[first:last] += hidden[first:last] * np.linspace(pair[0], pair[1], last - first)
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     steps, nominal, jitter = _steps_of(recording)
