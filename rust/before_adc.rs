@@ -89,9 +89,7 @@ impl Pose {
     fn of(values: &[f64], lowest: f64, step: f64) -> Option<Self> {
         let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
         for value in values {
-            *counts
-                .entry(((value - lowest) / step).round() as usize)
-                .or_default() += 1.0;
+            *counts.entry(whole((value - lowest) / step)).or_default() += 1.0;
         }
         let n = values.len() as f64;
         let mean = counts
@@ -108,9 +106,19 @@ impl Pose {
     }
 }
 
+/// A number of steps or places, to the nearest.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "numbers of codes and of places on the grid: small, and not negative"
+)]
+fn whole(value: f64) -> usize {
+    value.round().max(0.0) as usize
+}
+
 /// Means that are tried for plain ones from `first` to `last`.
 fn between(first: f64, last: f64) -> Vec<f64> {
-    let n = ((last - first + 2.0 * BEYOND) / SPACING).ceil() as usize;
+    let n = whole((last - first + 2.0 * BEYOND) / SPACING);
     (0..=n)
         .map(|k| first - BEYOND + k as f64 * SPACING)
         .collect()
@@ -172,7 +180,7 @@ fn likelihoods(poses: &[Pose], grid: &[f64], sigma: f64) -> Vec<(f64, Vec<f64>)>
 
 /// Evidence and moments of the means, of which all scatter about one that may be anywhere on the grid.
 fn moments(likelihood: &[(f64, Vec<f64>)], grid: &[f64], sigma: f64, scatter: f64) -> Moments {
-    let half = (REACH * scatter / SPACING).ceil() as usize;
+    let half = whole(REACH * scatter / SPACING);
     let kernel: Vec<f64> = (0..=half)
         .map(|k| (-0.5 * (k as f64 * SPACING / scatter).powi(2)).exp())
         .collect();
