@@ -6,6 +6,7 @@ use std::iter::successors;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
+use crate::autoregression::Autoregression;
 use crate::error::{Error, Result};
 
 /// Samples on either side of a joint that are compared.
@@ -13,10 +14,6 @@ pub const HALF: usize = 6;
 const WINDOW: usize = 2 * HALF;
 /// Contrasts of a window that do not depend on its mean.
 const FREE: usize = WINDOW - 1;
-/// Order of the autoregression that predicts the motion from sample to sample.
-const ORDER: usize = 10;
-/// Frequencies of its spectrum: many more than samples in a gap.
-const SPECTRUM: usize = 1 << 14;
 /// Least variance of a contrast, of the largest: a smooth motion has none that rounding does not exceed.
 const SMOOTHEST: f64 = 1e-9;
 /// Powers of the motion tried in a window, of that of all moves: 10⁻⁵ to 250, in steps of four.
@@ -123,8 +120,8 @@ impl<'a> Sensor<'a> {
             .map(|&[a, b]| &readings[a..b])
             .filter(|one| one.len() > WINDOW && one.iter().flatten().all(|v| v.is_finite()))
             .collect();
-        let coefficients = burg(&own);
-        let covariance = autocovariance(&coefficients, WINDOW + most);
+        let motion = Autoregression::of(&own);
+        let covariance = motion.covariance(WINDOW + most);
         let power = own.iter().map(|one| variance(one)).sum::<f64>() / own.len().max(1) as f64;
         let lag = |i: usize, j: usize| covariance[i.abs_diff(j)] / covariance[0];
         let missing = (0..=most).map(|n| {
@@ -132,7 +129,7 @@ impl<'a> Sensor<'a> {
             let between = DMatrix::from_fn(WINDOW, WINDOW, |i, j| lag(at(i), at(j)));
             Likelihood::of(&between, power)
         });
-        let response = impulse_response(&coefficients);
+        let response = motion.response(WINDOW);
         let shocked = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
             let of = |shock: &usize| match (i.checked_sub(*shock), j.checked_sub(*shock)) {
                 (Some(i), Some(j)) => response[i] * response[j],
@@ -278,87 +275,4 @@ fn variance(readings: &[[f64; 3]]) -> f64 {
             / n
     };
     (0..3).map(of_axis).sum::<f64>() / 3.0
-}
-
-/// Prediction-error filter `(ORDER + 1)` that Burg's method fits to all moves and axes together (Burg 1975), every move
-/// in units of its own steps.
-fn burg(moves: &[&[[f64; 3]]]) -> [f64; ORDER + 1] {
-    let mut pairs: Vec<[Vec<f64>; 2]> = Vec::new();
-    for one in moves {
-        let steps = one
-            .windows(2)
-            .flat_map(|w| (0..3).map(|c| (w[1][c] - w[0][c]).powi(2)));
-        let size = (steps.sum::<f64>() / (3 * (one.len() - 1)) as f64).sqrt() + f64::MIN_POSITIVE;
-        for c in 0..3 {
-            let mean = one.iter().map(|row| row[c]).sum::<f64>() / one.len() as f64;
-            let scaled: Vec<f64> = one.iter().map(|row| (row[c] - mean) / size).collect();
-            pairs.push([scaled[1..].to_vec(), scaled[..scaled.len() - 1].to_vec()]);
-        }
-    }
-    let mut out = [0.0; ORDER + 1];
-    out[0] = 1.0;
-    for order in 1..=ORDER {
-        let (mut product, mut power) = (0.0, f64::MIN_POSITIVE);
-        for [forward, backward] in &pairs {
-            for (f, b) in forward.iter().zip(backward) {
-                product += f * b;
-                power += f * f + b * b;
-            }
-        }
-        let reflection = -2.0 * product / power;
-        let before = out;
-        for i in 1..=order {
-            out[i] += reflection * before[order - i];
-        }
-        for [forward, backward] in &mut pairs {
-            for (f, b) in forward.iter_mut().zip(backward.iter_mut()) {
-                (*f, *b) = (*f + reflection * *b, *b + reflection * *f);
-            }
-            // The next order pairs each forward error with the backward error one sample earlier.
-            if !forward.is_empty() {
-                forward.remove(0);
-                backward.pop();
-            }
-        }
-    }
-    out
-}
-
-/// `(lags)` autocovariance of the autoregression from its spectrum.
-fn autocovariance(coefficients: &[f64; ORDER + 1], lags: usize) -> Vec<f64> {
-    let cosine: Vec<f64> = (0..SPECTRUM)
-        .map(|k| (std::f64::consts::TAU * k as f64 / SPECTRUM as f64).cos())
-        .collect();
-    let sine = |k: usize| cosine[(k + 3 * SPECTRUM / 4) % SPECTRUM];
-    let power: Vec<f64> = (0..SPECTRUM)
-        .map(|f| {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (j, c) in coefficients.iter().enumerate() {
-                re += c * cosine[f * j % SPECTRUM];
-                im += c * sine(f * j % SPECTRUM);
-            }
-            1.0 / (re * re + im * im)
-        })
-        .collect();
-    (0..lags)
-        .map(|lag| {
-            let terms = power
-                .iter()
-                .enumerate()
-                .map(|(f, p)| p * cosine[f * lag % SPECTRUM]);
-            terms.sum::<f64>() / SPECTRUM as f64
-        })
-        .collect()
-}
-
-/// What a shock of one adds to the samples from its own on.
-fn impulse_response(coefficients: &[f64; ORDER + 1]) -> [f64; WINDOW] {
-    let mut out = [0.0; WINDOW];
-    out[0] = 1.0;
-    for i in 1..WINDOW {
-        out[i] = -(1..=i.min(ORDER))
-            .map(|j| coefficients[j] * out[i - j])
-            .sum::<f64>();
-    }
-    out
 }

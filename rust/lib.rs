@@ -7,6 +7,7 @@ pub mod adc_grid;
 pub mod allan;
 pub mod attitude;
 pub mod audit;
+pub mod autoregression;
 pub mod before_adc;
 pub mod bias_process;
 pub mod block_motion;
