@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 
 /// Noise before the ADC that is tried, in steps: without bounds the shares of two codes fit any.
 const SIGMAS: (f64, f64, usize) = (0.03, 2.0, 25);
-/// Scatter of the means that is tried, in steps, and the spacing of the means that are tried.
+/// Scatter of the means that is tried, in steps, a priori as rare as it is large: codes that do not change do not show
+/// it, and moves would have to bear it. The spacing of the means that are tried.
 const SCATTERS: [f64; 6] = [0.004, 0.012, 0.04, 0.12, 0.4, 1.2];
 const SPACING: f64 = 0.005;
 /// Means are tried up to so many steps beyond the plain ones.
@@ -50,7 +51,8 @@ struct Moments {
 }
 
 /// Interval-censored normal readings `values` on a grid of `step`, pose after pose (`edges`): one noise for all, means
-/// that scatter normally about one; noise and scatter are integrated over, flat in their logarithms.
+/// that scatter normally about one; noise and scatter are integrated over, flat in the logarithm of the noise, and the
+/// scatter as rare as it is large.
 ///
 /// # Errors
 /// `BadInput` when a pose has no readings, or there is no step.
@@ -228,7 +230,7 @@ fn moments(likelihood: &[(f64, Vec<f64>)], grid: &[f64], sigma: f64, scatter: f6
         .collect();
     Moments {
         sigma,
-        log_evidence: top + (sum / n as f64).ln(),
+        log_evidence: top + (sum / n as f64).ln() - scatter.ln(),
         mean: first.iter().map(|of| over(of)).collect(),
         square: second.iter().map(|of| over(of)).collect(),
         shared: (

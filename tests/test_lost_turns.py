@@ -78,7 +78,7 @@ def knocked(w, rests, rate, per_rad_s, rng):
 
 @pytest.mark.parametrize(
     ("seeds", "least", "most"),
-    [(range(640005, 640007), 2, 0), pytest.param(range(640000, 640008), 5, 1, marks=pytest.mark.slow)],
+    [(range(640009, 640011), 2, 0), pytest.param(range(640000, 640036), 22, 1, marks=pytest.mark.slow)],
 )
 def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_not(seeds, least, most):
     """Axis after axis at one speed, 12 bits: residuals of moves are within the noise whatever the others lost."""
@@ -93,8 +93,8 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             is_said = FindingCode.LOSSES_POSSIBLE in {one.code for one in found.findings}
             lossy += is_lossy and is_said
             false += not is_lossy and is_said
-    # 41 of 54 sessions: what three lost samples do to moves that others were left out of may be a hidden turn as well.
-    # Of eight, fewer than five are found by chance once in ten.
+    # Three of four sessions: what three lost samples do to moves that others were left out of may be a hidden turn as
+    # well. Of 36, fewer than 22 are found by chance once in fifty.
     assert lossy >= least
     # None of 30 sessions: a impact meets the curve of a loss by chance only.
     assert false <= most
