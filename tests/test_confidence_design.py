@@ -74,6 +74,8 @@ WEAKNESSES = {
     "coarse gyro that its noise dithers": Weakness(510002, drawn(510002), {"S_w": 4.0}),
     # A pose whose readings toggle between two codes was one that moves, and S_w followed its ends by up to 7.8.
     "poses between two codes": Weakness(764860, drawn(764860), {"S_w": 4.0}, is_slow=True),
+    # A bias that drifts by less than an LSB was taken as constant, and moves that showed the drift were left out.
+    "bias that drifts inside its LSB": Weakness(1010238, drawn(1010238), {"S_w": 4.0, "b_w": 4.0}),
     # A blow that no code of the gyro showed was a move without rotation, and b_w was off by 13.6 standard errors.
     "move without a change of code": Weakness(764410, drawn(764410), {"b_w": 4.0}),
     # One reading in five was of the other code, and the axis was never at rest: b_w was off by 6.7.
