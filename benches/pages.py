@@ -9,9 +9,9 @@ All else is simulated with fixed seeds; needs Chromium and the extra ``test``. T
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -161,7 +161,11 @@ def photograph(found: dict[str, Path], parts: dict[str, tuple[Path, str]]) -> No
 
 
 if __name__ == "__main__":
-    given = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else None
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "folder", nargs="?", type=lambda given: Path(given).resolve(), metavar="FOLDER", help="the public recordings"
+    )
+    given = parser.parse_args().folder
     with tempfile.TemporaryDirectory() as place:
         # Names in the pages are those of a working folder.
         os.chdir(place)

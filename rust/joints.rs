@@ -228,8 +228,8 @@ fn apart(mut all: Vec<Loss>) -> Vec<Loss> {
     out
 }
 
-/// The likeliest number of missing samples behind `sample`; its gains, which are over none alone where that is less than
-/// half of `least`.
+/// The likeliest number of missing samples behind `sample`; its gains, which are over none alone where that is less
+/// than half of `least`.
 fn likeliest(
     known: &[Sensor<'_>],
     (sample, windows): (usize, &[Window]),

@@ -73,6 +73,15 @@ def test_a_calibration_that_was_not_written_is_stored_first():
     assert "`trihedron apply calibration.json 'my log.csv' --rate 50`" in said
 
 
+def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_them():
+    found = Finding(FindingCode.GYRO_G_SENSITIVITY, Severity.WARNING, "Seen.", "", "Calibrate with --extended.")
+    sections = (Section("Findings", (FindingList((found,)),)),)
+    used = "Use it: `trihedron apply FILE LOG`."
+    said = with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step
+    assert said.count("-o calibration.json") == 1
+    assert "--extended -o calibration.json`" in said
+
+
 def test_words_outside_commands_stay_and_a_second_filling_changes_nothing():
     step = "Record a LOG again ..."
     assert filled(step) == step

@@ -125,11 +125,13 @@ def _word(value: Any) -> str:
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
     """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
     replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
-    said = document.next_step
-    commands = " ".join(_COMMAND.findall(said))
-    if re.search(r"\bFILE\b", commands) and not _now().file:
-        said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
-    filled = _COMMAND.sub(lambda found: _filled(found[0]), replace(document, next_step=said).what_next)
+    said, what_next = document.next_step, document.what_next
+    if not _now().file:
+        what_next = what_next.replace("-o FILE --force", "-o FILE")
+        if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
+            said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
+            what_next = replace(document, next_step=said).what_next
+    filled = _COMMAND.sub(lambda found: _filled(found[0]), what_next)
     return document if filled == document.next_step else replace(document, next_step=filled)
 
 

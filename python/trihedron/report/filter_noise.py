@@ -22,6 +22,11 @@ OF_SENSOR = {
     "accelerometer": (1.0, "m/s", "velocity error"),
 }
 NEXT = "Put these values into your filter: `... --to kalibr -o imu.yaml` (other targets: `trihedron noise --help`)."
+OF_ONE = (
+    "Put N and K of the table into your filter; for a file of both sensors (`trihedron noise --help`) give a reference "
+    "with positions."
+)
+"""Targets need both sensors; a reference of attitudes shows the gyro alone."""
 CAUSE_WORDS = {
     "static": ("static noise", "a better sensor; nothing else"),
     "vibration": ("vibration", "dampers at the mount, a low-pass filter on the sensor, a higher rate"),
@@ -64,7 +69,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
         sections=tuple(sections),
         headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
-        next_step=next(uncalibrated, NEXT) if is_trustworthy else "",
+        next_step=next(uncalibrated, NEXT if len(found.sensors) == 2 else OF_ONE) if is_trustworthy else "",
     )
 
 

@@ -7,13 +7,12 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import chdtri
+from trihedron.session.aliasing import GAP
 
 STRONG = 20.0
 """Odds that are strong evidence (Kass, Raftery 1995), asked of a loss after its number and its joint were chosen."""
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
-GAP = 1.5
-"""Steps between timestamps that are a gap."""
 
 
 @dataclass(frozen=True, eq=False)

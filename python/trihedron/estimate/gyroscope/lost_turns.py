@@ -12,6 +12,7 @@ from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import fdtrc
 from trihedron.records.finding import Finding, FindingCode
+from trihedron.session.joints import STRONG
 from trihedron.session.noise import NOISE_DOF
 
 ACROSS_VERTICAL = 2.0 / 3.0
@@ -29,8 +30,6 @@ excluded. The nine elements of S absorb part of a loss in each move, moves with 
 seems nearly consistent (sessions wrong by 20 standard uncertainties had χ² of 1.7 per degree of freedom)."""
 POINTS = 100
 """Instants of a move at which each of two lost samples is tried: the effect changes slowly between them."""
-STRONG = 20.0
-"""Odds that are strong evidence (Kass, Raftery 1995): a fall between two samples causes a fraction of a loss."""
 OWN_CLOCK = 1.5
 """Deviation of timestamps from a straight line, in ranges of their steps, above which a real clock made them: rounding
 of a straight line deviates by at most one range."""
@@ -118,6 +117,7 @@ def left_out_as_by_losses(
         ]
         impact = 1.0 / (np.pi * np.e * float(missed @ missed))
         log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / impact))
+    # A fall between two samples causes a fraction of a loss.
     return log_odds > float(np.log(STRONG))
 
 
