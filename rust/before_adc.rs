@@ -35,9 +35,9 @@ pub struct BeforeAdc {
     pub common: f64,
 }
 
-/// Codes with their numbers, and their mean, of one pose.
+/// Codes with their numbers, of the first and the second half of one pose, and their mean.
 struct Pose {
-    counts: Vec<(usize, f64)>,
+    halves: [Vec<(usize, f64)>; 2],
     mean: f64,
 }
 
@@ -52,7 +52,8 @@ struct Moments {
 
 /// Interval-censored normal readings `values` on a grid of `step`, pose after pose (`edges`): one noise for all, means
 /// that scatter normally about one; noise and scatter are integrated over, flat in the logarithm of the noise, and the
-/// scatter as rare as it is large.
+/// scatter as rare as it is large. Each pose is static throughout, or in one half, the other at any rate of rotation:
+/// in a pause of a slow move the next one begins inside an LSB. The three are equally likely a priori.
 ///
 /// # Errors
 /// `BadInput` when a pose has no readings, or there is no step.
@@ -89,22 +90,22 @@ pub fn before_adc(values: &[f64], edges: &[usize], step: f64) -> Result<BeforeAd
 
 impl Pose {
     fn of(values: &[f64], lowest: f64, step: f64) -> Option<Self> {
-        let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
-        for value in values {
-            *counts.entry(whole((value - lowest) / step)).or_default() += 1.0;
-        }
         let n = values.len() as f64;
-        let mean = counts
-            .iter()
-            .map(|(&code, count)| code as f64 * count)
-            .sum::<f64>()
-            / n;
         let weight = (MOST / n).min(1.0);
-        let counts = counts
-            .into_iter()
-            .map(|(code, count)| (code, count * weight))
-            .collect();
-        mean.is_finite().then_some(Self { counts, mean })
+        let mut sum = 0.0;
+        let mut codes = |part: &[f64]| {
+            let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
+            for value in part {
+                let code = whole((value - lowest) / step);
+                sum += code as f64;
+                *counts.entry(code).or_default() += weight;
+            }
+            counts.into_iter().collect()
+        };
+        let (before, after) = values.split_at(values.len() / 2);
+        let halves = [codes(before), codes(after)];
+        let mean = sum / n;
+        mean.is_finite().then_some(Self { halves, mean })
     }
 }
 
@@ -155,10 +156,10 @@ fn apart(poses: &[Pose], sigma: f64) -> Moments {
     out
 }
 
-/// Logarithm of the largest likelihood of every pose, and its likelihoods over the means tried relative to that.
+/// Logarithm of a reference of every pose, and its likelihoods over the means tried relative to that.
 fn likelihoods(poses: &[Pose], grid: &[f64], sigma: f64) -> Vec<(f64, Vec<f64>)> {
     let mut of_code: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-    for &(code, _) in poses.iter().flat_map(|one| &one.counts) {
+    for &(code, _) in poses.iter().flat_map(|one| one.halves.iter().flatten()) {
         of_code.entry(code).or_insert_with(|| {
             let one = |mean: &f64| {
                 let at = |edge: f64| normal_above((mean - code as f64 - edge) / sigma);
@@ -167,15 +168,24 @@ fn likelihoods(poses: &[Pose], grid: &[f64], sigma: f64) -> Vec<(f64, Vec<f64>)>
             grid.iter().map(one).collect()
         });
     }
-    let one = |pose: &Pose| {
+    let half = |counts: &Vec<(usize, f64)>| {
         let mut log = vec![0.0; grid.len()];
-        for (code, count) in &pose.counts {
+        for (code, count) in counts {
             for (sum, of) in log.iter_mut().zip(&of_code[code]) {
                 *sum += count * of;
             }
         }
         let top = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        (top, log.into_iter().map(|l| (l - top).exp()).collect())
+        let of: Vec<f64> = log.into_iter().map(|l| (l - top).exp()).collect();
+        let at_any_rate = of.iter().sum::<f64>() / grid.len() as f64;
+        (top, of, at_any_rate)
+    };
+    let one = |pose: &Pose| {
+        let [(top, first, any_first), (above, second, any_second)] =
+            pose.halves.each_ref().map(half);
+        let either = |(a, b): (f64, f64)| (a * b + a * any_second + b * any_first) / 3.0;
+        let of = first.into_iter().zip(second).map(either).collect();
+        (top + above, of)
     };
     poses.iter().map(one).collect()
 }

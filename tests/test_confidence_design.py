@@ -88,6 +88,10 @@ WEAKNESSES = {
     "drift along one of several curves": Weakness(994107, drawn(994107), {"S_f": 4.0}),
     # The noise of the gyro hid that a pause of a slow move goes on turning: S_w was off by 6.3.
     "pause that turns below the noise": Weakness(997867, drawn(997867), {"S_w": 5.0}),
+    # What a pause turned inside an LSB was a change of its bias: S_w was off by 5.7.
+    "pause that turns inside an LSB": Weakness(1050660, drawn(1050660), {"S_w": 4.0}),
+    # Lost samples, which its clock excludes, were to explain what a support turned inside an LSB: b_w was off by 6.4.
+    "support that turns inside a large LSB": Weakness(1050419, drawn(1050419), {"S_w": 3.0, "b_w": 4.0}),
 }
 
 

@@ -45,6 +45,11 @@ def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
     places = np.linspace(-1.2, 1.3, 20)
     found = before_adc([step * np.round(at + noise * rng.normal(size=400)) for at in places], step)
     assert found.sigma == pytest.approx(noise, rel=0.1)
+    # A pose that turns in its second half has the mean of its first.
+    turning = [step * np.round(zero + 0.05 * rng.normal(size=80) + np.repeat([0.0, 0.5 * k % 2], 40)) for k in range(9)]
+    found = before_adc(turning, step)
+    assert np.ptp(np.array([one.mean() for one in turning]) / step) > 0.2
+    assert np.ptp(np.array([one.mean() for one in turning]) / step + found.shift) < 0.1
     # One code shows no grid.
     assert missing_codes([np.zeros(100)] * 5, 0.0, 0.02) is None
 

@@ -152,10 +152,10 @@ def _denied(found: _Fit) -> BoolArray:
 def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
     """The fit with the variance of a rotation below the LSB, as of a settling support, in every move, by likelihood.
 
-    Unchanged where lost samples may explain the tilt errors: these are tested first.
+    Unchanged where lost samples may explain the tilt errors as well: the scale would have to bear these.
     """
     measured = plain.measured
-    if not np.any(measured.is_undithered) or _is_asked_for_losses(log, plain):
+    if not np.any(measured.is_undithered) or _losses(log, plain).possible > 0.0:
         return plain
     known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
     best, likeliest = measured, plain.solution.core.log_marginal
@@ -198,18 +198,13 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
     return np.asarray((size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T)
 
 
-def _is_asked_for_losses(log: Log, found: _Fit) -> bool:
-    return is_asked_for_losses(log.recording.time_s, found.measured, found.outliers, found.solution, found.seen)
-
-
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
     """Undetected lost samples that may explain the tilt errors."""
-    if not _is_asked_for_losses(log, found):
+    time_s = log.recording.time_s
+    if not is_asked_for_losses(time_s, found.measured, found.outliers, found.solution, found.seen):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
-    by_tilt = losses_that_fit(
-        log.recording.time_s, found.measured, found.solution.S_w, log.gravity_m_s2, missed, dof, found.used
-    )
+    by_tilt = losses_that_fit(time_s, found.measured, found.solution.S_w, log.gravity_m_s2, missed, dof, found.used)
     # As many as these errors need would be seen in the motion.
     is_denied = by_tilt.possible > seen_in_motion(log.recording, log.segments)[0].largest_share
     return PossibleLosses() if is_denied else by_tilt
