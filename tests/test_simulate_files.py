@@ -125,7 +125,7 @@ def test_truth_is_written_whole(tmp_path):
 def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, capsys):
     log, truth = tmp_path / "a.csv", tmp_path / "a.npz"
     assert main(["simulate", "table-turns", "-o", str(log), "--truth", str(truth), "--seed", "4"]) == 0
-    assert "21 poses" in capsys.readouterr().out
+    assert "30 poses" in capsys.readouterr().out
     recording, _ = simulate(scenario_by_name("table-turns"), seed=4)
     again = read(log)
     assert np.array_equal(again.gyroscope, recording.gyroscope)

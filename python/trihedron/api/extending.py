@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -67,6 +67,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 
 MAY_RISE = 1.25
 """Largest allowed rise of a cross-validated rms: twice the relative uncertainty (13 %) of an rms over 30 poses."""
+DRIFTS = "accel-bias-drift", "gyro-bias-drift"
+"""Effects that leave b to be that of one time."""
 CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 """Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
 
@@ -107,7 +109,7 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
         if base.gyroscope is None or model.gyroscope is None
         else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
-        findings=(*not_explained(base.findings, diagnosis.remaining), finding),
+        findings=(*not_explained(base.findings, diagnosis.remaining), finding, *_drifts(diagnosis)),
         extensions=MappingProxyType(
             {
                 **base.extensions,
@@ -118,6 +120,26 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
             }
         ),
     )
+
+
+def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
+    """A finding for each bias that changes in the recording: how far, and which one the stated bias is."""
+    for effect in diagnosis.effects:
+        if effect.id not in DRIFTS:
+            continue
+        variant, unit = effect.model["variant"], effect.parameters[0].unit
+        each = np.array([abs(one.value) for one in effect.parameters if one.unit == unit]).reshape(-1, 3)
+        # A cosine goes from 1 to -1.
+        change = (each.sum(axis=0) * (2.0 if variant == "curve" else 1.0)).tolist()
+        yield Finding.of(
+            FindingCode.BIAS_DRIFT,
+            is_gyro=float(effect.id == DRIFTS[1]),
+            change=(max(change), unit),
+            is_warm=variant == "warm-up",
+            change_x=change[0],
+            change_y=change[1],
+            change_z=change[2],
+        )
 
 
 def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:

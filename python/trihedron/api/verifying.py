@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
+from trihedron.arrays import AXES
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
@@ -64,6 +67,8 @@ def verify(
     True
     """
     known = calibration_of(calibration)
+    changed = [one for one in known.findings if one.code is FindingCode.BIAS_DRIFT]
+    known = _with_drifts(known, changed)
     recording = recording_of(recording)
     check_units(known, recording)
     recording, more = without_effects(known, recording)
@@ -85,8 +90,24 @@ def verify(
     of_log = () if own is None else own.findings
     drifts = (f for f in of_log if f.code is FindingCode.GYRO_BIAS_DRIFT and f.severity is Severity.WARNING)
     findings = (*recording.findings, *segments.findings, *missed, *drifts, *more, *_limits(judged, limit_mg, limit_deg))
-    findings = (*doubted(known), *same_recording(known, recording), *findings)
+    findings = (*doubted(known), *same_recording(known, recording), *changed, *findings)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
+
+
+def _with_drifts(known: Calibration, changed: list[Finding]) -> Calibration:
+    """The calibration with what its biases changed by in its own recording: another one is anywhere on the way."""
+    covariance = known.covariance.copy()
+    for one in changed:
+        change = np.array([one.numbers[f"change_{axis}"] for axis in AXES])
+        first = 21 if one.numbers["is_gyro"] else 9
+        covariance[first : first + 3, first : first + 3] += np.diag(change**2 / 3.0)
+    gyroscope = known.gyroscope
+    return replace(
+        known,
+        accelerometer=replace(known.accelerometer, covariance=covariance[:12, :12]),
+        gyroscope=None if gyroscope is None else replace(gyroscope, covariance=covariance[12:, 12:]),
+        covariance=covariance,
+    )
 
 
 def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: float) -> Calibration | None:

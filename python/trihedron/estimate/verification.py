@@ -179,8 +179,8 @@ def _carried(
     seen = carried_by(calibration, gyroscope.S, measured, segments)
     told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2
-    by_scale2 = seen.by_scale2(gyroscope.covariance[:9, :9])
-    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_scale2)[told]) / g
+    by_calibration2 = seen.by_calibration2(calibration.covariance)
+    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_calibration2)[told]) / g
     left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 

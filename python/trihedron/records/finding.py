@@ -93,6 +93,7 @@ class FindingCode(str, Enum):
     TURN_NOT_A_MULTIPLE = "turn-not-a-multiple"
     TURN_UNCHECKED = "turn-unchecked"
     TURN_ANGLE_UNKNOWN = "turn-angle-unknown"
+    BIAS_DRIFT = "bias-drift"
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     GYRO_G_SENSITIVITY = "gyro-g-sensitivity"
     NOT_CONVERGED = "not-converged"

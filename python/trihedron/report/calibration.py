@@ -42,6 +42,8 @@ FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "s
 NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
+DRIFTS = FindingCode.BIAS_DRIFT, FindingCode.GYRO_BIAS_DRIFT
+"""Findings that say which bias the stated one is; the verdict says so too."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
 
@@ -145,7 +147,7 @@ def verdict(calibration: Calibration) -> str:
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]
-    drifts = [f"{capital(opening(f.seen))}." for f in warned if f.code is FindingCode.GYRO_BIAS_DRIFT]
+    drifts = [f"{capital(opening(f.seen))}." for f in warned if f.code in DRIFTS]
     return " ".join([whole, *drifts, *effects])
 
 

@@ -36,6 +36,7 @@ CONSEQUENCE = (
     FindingCode.NOT_OBSERVABLE,
     FindingCode.WEAKLY_OBSERVABLE,
     FindingCode.GYRO_G_SENSITIVITY,
+    FindingCode.BIAS_DRIFT,
     FindingCode.GYRO_BIAS_DRIFT,
 )
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""

@@ -12,6 +12,7 @@ from trihedron.records import (
     AxisKalmanResult,
     Calibration,
     Consistency,
+    FindingCode,
     KalmanCalibration,
     NormKalmanCalibration,
 )
@@ -62,10 +63,21 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections=tuple(sections),
         headlines=(*consistency, *scale_headlines(calibration)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
-        next_step="Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
-        if calibration.is_trustworthy
-        else "",
+        next_step=_next_step(calibration),
     )
+
+
+def _next_step(calibration: Calibration) -> str:
+    """The use of the result; first the cause of innovations that the noise model does not predict."""
+    if not calibration.is_trustworthy:
+        return ""
+    verified = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
+    doubted = [one for one in calibration.findings if one.code is FindingCode.INNOVATIONS_TOO_LARGE]
+    if not doubted:
+        return verified
+    widening = plain_number(max(one.numbers["widening"] for one in doubted), 2)
+    return f"`trihedron diagnose LOG` shows what the readings have beside noise; until it is modelled, every ± is \
+{widening} times too small. {verified}"
 
 
 def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:

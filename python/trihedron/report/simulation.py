@@ -13,6 +13,10 @@ from trihedron.report.document import Block, Document, Facts, Headline, Paragrap
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
 from trihedron.report.segments import truth_chart
+from trihedron.units import degrees_from_radians
+
+ON_A_FACE = 0.99
+"""Cosine of the largest angle (8°) from the vertical of a face on which a case stands."""
 
 
 def simulation_report(recording: Recording, truth: Truth) -> Document:
@@ -38,14 +42,23 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
-        next_step=f"Calibrate the log: `trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g} -o "
-        "calibration.json`; compare with the truth (--truth FILE keeps it).",
+        next_step=f"Calibrate the log: `trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} "
+        "-o calibration.json`; compare with the truth (--truth FILE keeps it).",
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
         ),
         lead=Picture("signals", caption, partial(truth_chart, recording, truth)),
     )
+
+
+def _of_faces(truth: Truth) -> str:
+    """Options for a log whose poses are all on faces of the case, with its turns; empty for other poses."""
+    ups = truth.specific_force_m_s2[[pose.start for pose in truth.poses]] / truth.gravity_m_s2
+    turns = [round(degrees_from_radians(move.turn_rad)) for move in truth.moves if move.kind == "turn"]
+    if not len(ups) or np.any(np.abs(ups).max(axis=1) < ON_A_FACE) or not turns:
+        return ""
+    return f" --method faces --turns {','.join(map(str, turns))}"
 
 
 def _effects(effects: Mapping[str, Mapping[str, object]]) -> Block:

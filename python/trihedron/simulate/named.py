@@ -105,8 +105,8 @@ _SCENARIOS: dict[str, tuple[str, Callable[[], Scenario]]] = {
     ),
     "six-faces": ("Six faces, twice round, consumer 16-bit part.", lambda: _of(MPU, six_faces(2))),
     "table-turns": (
-        "Turns of 90, 180 and 360 deg against a wall on three faces, consumer 16-bit part.",
-        lambda: _of(MPU, table_turns()),
+        "Turns of 90 and 360 deg against a wall on six faces, consumer 16-bit part.",
+        lambda: _of(MPU, table_turns((90.0, -90.0, 360.0, -360.0), faces=FACES)),
     ),
     "manual-example": (
         "The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit ADC, 50 Hz.", _manual,

@@ -109,6 +109,8 @@ def move_quality(
     n = 2 * int(np.count_nonzero(is_used))
     dof = max(n - N_GYROSCOPE, 0)
     total = float(np.sum((g * np.radians(seen.angle_deg[is_used])) ** 2))
+    variance = np.einsum("mii->mi", seen.noise)
+    along = np.einsum("mi,mij,mj->m", seen.up, seen.noise, seen.up)
     held_rms = None
     if held is not None:
         known = is_used & np.isfinite(held.angle_deg)
@@ -116,12 +118,12 @@ def move_quality(
     return FitQuality(
         unit="m/s^2",
         residual=seen.residual,
-        sigma=seen.sigma,
+        sigma=np.sqrt(variance),
         chi2=misfit[0],
         dof=misfit[1],
         rms=float(np.sqrt(total / n)),
         rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
-        floor=float(np.sqrt(np.sum(seen.floor2[is_used]) / n)),
+        floor=float(np.sqrt(np.sum((variance.sum(axis=1) - along)[is_used]) / n)),
         held_out=None if held is None else held.residual,
         held_out_sigma=None if held is None else held.sigma,
         held_out_rms=held_rms,
@@ -135,25 +137,30 @@ def move_quality(
 class Carried:
     """Tilt errors after moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
 
-    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)²; ``up`` (m, 3) the unit
-    vertical after a move, ``wrt_scale`` (m, 3, 9) the derivative of the residual by the gyro's S row by row.
+    ``floor2`` (m,) is the variance across the vertical by poses and samples, (m/s²)²; ``noise`` (m, 3, 3) the
+    covariance by their noise alone, without what the accelerometer leaves unexplained in the poses; ``up`` (m, 3) the
+    unit vertical after a move, ``wrt_scale`` (m, 3, 9) and ``wrt_accelerometer`` (m, 3, 12) the derivatives of the
+    residual by the gyro's S row by row, and by S and b of the accelerometer.
     """
 
     residual: FloatArray
     covariance: FloatArray
     angle_deg: FloatArray
     floor2: FloatArray
+    noise: FloatArray
     up: FloatArray
     wrt_scale: FloatArray
+    wrt_accelerometer: FloatArray
 
     @property
     def sigma(self) -> FloatArray:
         """(m, 3) standard errors of the residual, m/s²."""
         return np.asarray(np.sqrt(np.einsum("mii->mi", self.covariance)))
 
-    def by_scale2(self, covariance: FloatArray) -> FloatArray:
-        """(m,) variance across the vertical by a covariance (9, 9) of the gyro's S, (m/s²)²."""
-        return _across2(self.up, self.wrt_scale @ _root(covariance))
+    def by_calibration2(self, covariance: FloatArray) -> FloatArray:
+        """(m,) variance across the vertical by the covariance (24, 24) of a calibration, (m/s²)²."""
+        derivative = np.concatenate([self.wrt_accelerometer, self.wrt_scale], axis=2)
+        return _across2(self.up, derivative @ _root(covariance[:21, :21]))
 
     def in_plane(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Residual (m, 2), its covariance (m, 2, 2) and derivatives (m, 2, 9) in the plane across the vertical."""
@@ -205,8 +212,10 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
             measured.time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
             np.ascontiguousarray(one.S_w), bias[before[at]], bias[after[at]], 3, noise,
         )  # fmt: skip
-    start = np.einsum("mij,mj->mi", S_a, measured.reading[before]) + b_a
-    end = np.einsum("mij,mj->mi", S_a, measured.reading[after]) + b_a
+    read = measured.reading[before], measured.reading[after]
+    start, end = (np.einsum("mij,mj->mi", S_a, one) + b_a for one in read)
+    by_S = rotation[..., None] * read[0][:, None, None, :] - np.eye(3)[..., None] * read[1][:, None, None, :]
+    wrt_accelerometer = np.concatenate([by_S.reshape(m, 3, 9), rotation - np.eye(3)], axis=2)
     moved = np.einsum("mij,mj->mi", rotation, start)
     residual = moved - end
     unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
@@ -214,17 +223,23 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
     angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
     turn = rotation @ np.cross(np.eye(3), start[:, None, :])
 
-    sigma_force, sigma_bias = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_bias))
+    sigma_bias = np.sqrt(measured.var_bias)[:, None, :]
     # Roots of covariances side by side: sums of squares stay positive under rounding, unlike the differences of large
     # terms that rotations about the vertical cause.
-    roots = [turn @ _root(cov_rate), rotation @ (S_a * sigma_force[before]), S_a * sigma_force[after],
-             turn @ wrt_before @ (S_w * sigma_bias[before]), turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
-    root = np.concatenate(roots, axis=2)
+    of_rate = [turn @ _root(cov_rate), turn @ wrt_before @ (S_w * sigma_bias[before]),
+               turn @ wrt_after @ (S_w * sigma_bias[after])]  # fmt: skip
+
+    def root_with(var_reading: FloatArray) -> FloatArray:
+        sigma = np.sqrt(var_reading)[:, None, :]
+        return np.concatenate([*of_rate, rotation @ (S_a * sigma[before]), S_a * sigma[after]], axis=2)
+
+    root, of_noise = root_with(measured.var_reading), root_with(measured.var_reading_noise)
     # Raw biases z are subtracted: S enters through the rate and through -S z.
     ends = (wrt_before, measured.bias[before]), (wrt_after, measured.bias[after])
     wrt_S = wrt_scale - sum((wrt[:, :, :, None] * bias[:, None, None, :]).reshape(m, 3, 9) for wrt, bias in ends)
-    covariance = root @ np.swapaxes(root, 1, 2)
-    return Carried(residual, covariance, angle, _across2(unit_end, root), unit_end, turn @ wrt_S)
+    covariance, by_noise = (one @ np.swapaxes(one, 1, 2) for one in (root, of_noise))
+    floor2 = _across2(unit_end, root)
+    return Carried(residual, covariance, angle, floor2, by_noise, unit_end, turn @ wrt_S, wrt_accelerometer)
 
 
 def _across2(up: FloatArray, root: FloatArray) -> FloatArray:

@@ -179,6 +179,15 @@ _DIAGNOSE = {
         lines=_RAISED,
         numbers=("n_effects", "n_domains_left"),
     ),
+    (Code.BIAS_DRIFT, "", WARNING): Words(
+        "The bias of the {is_gyro:?gyro|accelerometer} changed by up to {change:quantity} in the recording that was "
+        "calibrated, and b is {is_warm:?that of the warmed-up sensor|its mean}; `trihedron apply` does not follow the "
+        "change.",
+        "{is_warm:?The sensor warms up|Temperature, supply or ageing}.",
+        "{is_warm:?Let it warm up before use, or record again with a warm sensor|Measure the bias in a static pose "
+        "before use}.",
+        numbers=("change_x", "change_y", "change_z"),
+    ),
     (Code.PROTOCOL_DIFFERS, "", NOTE): Words(
         "The simulated recording has {n_simulated} poses and the real one {n_real}.",
         "They do not follow the same protocol, or a pose was not static.",

@@ -7,6 +7,7 @@ from dataclasses import replace
 from trihedron.records import Finding, Severity
 from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with
 from trihedron.report.findings.wording import opening
+from trihedron.report.names import id_in_print
 from trihedron.report.numbers import MINUS, capital, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
@@ -39,13 +40,15 @@ def _weight(finding: Finding) -> tuple[int, int]:
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
-    """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the number of warnings; or
+    """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
     ``good``."""
     serious = serious_ones(findings)
-    n_warnings = sum(finding.severity is Severity.WARNING for finding in combined(findings))
+    warned = [id_in_print(one.code.value) for one in by_weight(findings) if one.severity is Severity.WARNING]
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
-    return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+    if not warned:
+        return good
+    return f"{usable}, with {how_many(len(warned), 'warning')}: {listed(list(dict.fromkeys(warned)))}."
 
 
 def likely(cause: str) -> str:
