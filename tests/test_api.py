@@ -88,6 +88,23 @@ def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted(result,
     assert not [f for f in trihedron.apply(result, recording).findings if f.code is FindingCode.CALIBRATION_DOUBTED]
 
 
+def test_a_bias_that_drifted_in_its_own_recording_is_allowed_that_change_in_another_and_said(result, recording):
+    change = 0.06
+    counts = np.linalg.solve(result.accelerometer.S, [change, -change, 0.5 * change])
+    shifted = replace(recording, accelerometer=recording.accelerometer + counts, sha256="")
+    foremost = trihedron.verify(result, shifted).findings[-3]
+    assert foremost.severity is Severity.SERIOUS
+    assert "Biases have changed since, scales and axes have not" in foremost.cause
+    drift = Finding.of(
+        FindingCode.BIAS_DRIFT, is_gyro=0.0, change=(change, "m/s^2"), is_warm=True,
+        change_x=change, change_y=change, change_z=change,
+    )  # fmt: skip
+    drifted = replace(result.calibration, findings=(drift,))
+    verified = trihedron.verify(drifted, shifted)
+    assert verified.is_passed
+    assert FindingCode.BIAS_DRIFT in [one.code for one in verified.findings]
+
+
 def test_results_cross_processes_and_reports_need_no_matplotlib_as_plot_says_that_it_does(tmp_path, recording, result):
     (tmp_path / "both").write_bytes(pickle.dumps((result, recording)))
     code = (

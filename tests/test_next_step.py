@@ -1,5 +1,7 @@
 """The next step of a report is a command that can be copied, and figures in sample do not lead."""
 
+import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -80,6 +82,15 @@ def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_
     said = with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step
     assert said.count("-o calibration.json") == 1
     assert "--extended -o calibration.json`" in said
+
+
+def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_without_problems(tmp_path, capsys):
+    log, report = tmp_path / "log.csv", tmp_path / "report.txt"
+    assert main(["simulate", "table-turns", "-o", str(log), "--report", str(report)]) == 0
+    command = re.search(r"`(trihedron calibrate [^`]*)`", " ".join(report.read_text().split()))[1]
+    capsys.readouterr()
+    assert main([*shlex.split(command)[1:-1], str(tmp_path / "calibration.json")]) == 0
+    assert "OK: no problems found." in capsys.readouterr().out
 
 
 def test_words_outside_commands_stay_and_a_second_filling_changes_nothing():

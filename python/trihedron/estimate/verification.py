@@ -10,7 +10,7 @@ from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
-from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
+from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, shifted_parameters, uncalibrated
 from trihedron.records import (
     Calibration,
     Finding,
@@ -62,7 +62,10 @@ def verify_calibration(
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, moves.angle_deg))
-    beyond_noise = (*_norm_findings(error, error_sigma, gravity_m_s2), *_angle_findings(moves))
+    shifted = {one.id for one in shifted_parameters(parameters)}
+    is_bias = "accel-bias" in shifted <= {"accel-bias", "gyro-bias"}
+    of_poses = _norm_findings(error, error_sigma, gravity_m_s2, is_bias=is_bias)
+    beyond_noise = (*of_poses, *_angle_findings(moves, is_bias=is_bias))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -185,7 +188,8 @@ def _carried(
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 
 
-def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> Iterator[Finding]:
+def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, *, is_bias: bool) -> Iterator[Finding]:
+    """Finding where gravity errors exceed what is expected; ``is_bias``: only biases differ from the log's own."""
     z2 = (error / sigma) ** 2
     if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return
@@ -199,6 +203,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float) ->
         norm_rms_m_s2=rms,
         times=times,
         is_far=times > FAR_BEYOND,
+        is_bias=is_bias,
         is_single=_is_single(z2, 1),
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
@@ -217,7 +222,7 @@ def _is_single(z2: FloatArray, n_components: int) -> bool:
     return probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM
 
 
-def _angle_findings(moves: Carriage) -> Iterator[Finding]:
+def _angle_findings(moves: Carriage, *, is_bias: bool) -> Iterator[Finding]:
     angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
         return
@@ -234,6 +239,7 @@ def _angle_findings(moves: Carriage) -> Iterator[Finding]:
         angle_rms_deg=rms,
         times=times,
         is_far=times > FAR_BEYOND,
+        is_bias=is_bias,
         is_single=_is_single(z2, 2),
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],

@@ -60,22 +60,27 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
     return tuple(out)
 
 
-def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]:
-    """Finding with the parameters that differ by more than chance allows, where the file states uncertainties."""
+def shifted_parameters(parameters: tuple[JudgedParameter, ...]) -> list[JudgedParameter]:
+    """Parameters that differ by more than chance allows, the farthest first, where the file states uncertainties."""
     judged = [one for one in parameters if one.is_judged]
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
-        return
+        return []
     chance = 1.0 - 0.5 * FALSE_ALARM / len(judged)
     limits = [probability.stdtrit(DRIFT_DOF if one.id.endswith("bias") else NOISE_DOF, chance) for one in judged]
     beyond = [one for one, limit in zip(judged, limits, strict=True) if abs(one.times_sigma) > limit]
-    shifted = sorted(beyond, key=lambda one: -abs(one.times_sigma))
+    return sorted(beyond, key=lambda one: -abs(one.times_sigma))
+
+
+def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]:
+    """Finding with the parameters that differ by more than chance allows."""
+    shifted = shifted_parameters(parameters)
     if not shifted:
         return
     yield Finding.of(
         FindingCode.CALIBRATION_SHIFT,
         parameters=[(one.id + "-" + one.name, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
         n_parameters=len(shifted),
-        n_judged=len(judged),
+        n_judged=sum(one.is_judged for one in parameters),
         times_sigma=abs(shifted[0].times_sigma),
     )
 
