@@ -308,7 +308,7 @@ def _by_faces(
     except INPUT_ERRORS as error:
         if turns_deg is not None:
             raise
-        return _without_gyroscope(alone, error)
+        return _without_gyroscope(alone, error, of_faces=True)
     return _together(alone, gyroscope, more)
 
 
@@ -336,10 +336,12 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
     return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
 
 
-def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:
+def _without_gyroscope(alone: Calibration, error: Exception, *, of_faces: bool = False) -> Calibration:
     if isinstance(error, TurnAngleUnknownError):
         finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
     else:
         why = words("because", sentence=str(error))
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why)
+        finding = Finding.of(
+            FindingCode.GYROSCOPE_LEFT_OUT, "no-known-turns" if of_faces else "not-calibrated", why=why
+        )
     return replace(alone, findings=(*alone.findings, finding))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from trihedron.api.calibrating import COUNTS_OF_POSES, FEWEST_POSES, calibrate
-from trihedron.api.diagnosing_static_log import is_static_log
+from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_static_log
 from trihedron.api.reading import AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
@@ -45,14 +45,17 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     """
     recording = recording_of(recording)
     segments = segment(recording, progress=progress)
+    duration_s = float(recording.time_s[-1] - recording.time_s[0])
+    static = Finding.of(FindingCode.NOT_FIT, "static-log", duration_s=duration_s)
     # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
     except INPUT_ERRORS as error:
+        lasts_s = float(segments.duration_s.sum())
+        if 0 < segments.n_poses <= TWO_ORIENTATIONS and lasts_s > MOSTLY * duration_s:
+            return CheckResult(recording, segments, None, (static, *recording.findings))
         return CheckResult(recording, segments, None, (*recording.findings, *_why_not(recording, segments, str(error))))
     if is_static_log(recording, segments, lambda: result.calibration):
-        duration_s = float(recording.time_s[-1] - recording.time_s[0])
-        static = Finding.of(FindingCode.NOT_FIT, "static-log", duration_s=duration_s)
         return CheckResult(recording, segments, None, (static, *recording.findings, *segments.findings))
     return CheckResult(recording, segments, result.calibration, result.findings)
 

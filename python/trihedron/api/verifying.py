@@ -100,7 +100,7 @@ def _with_drifts(known: Calibration, changed: list[Finding]) -> Calibration:
     for one in changed:
         change = np.array([one.numbers[f"change_{axis}"] for axis in AXES])
         first = 21 if one.numbers["is_gyro"] else 9
-        covariance[first : first + 3, first : first + 3] += np.diag(change**2 / 3.0)
+        covariance[first : first + 3, first : first + 3] += np.diag(change**2 / 12.0)
     gyroscope = known.gyroscope
     return replace(
         known,

@@ -143,7 +143,7 @@ def verdict(calibration: Calibration) -> str:
     said = errors_in_words(calibration)
     above = f"{WITHIN}{said}" if said else "Usable"
     if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
-        above += "; the gyro was not calibrated"
+        above += ", for the accelerometer alone"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]

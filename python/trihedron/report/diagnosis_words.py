@@ -140,10 +140,12 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         steps.append(f"{begun} {first} from {others}: {rivals.separating_experiment}.")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
-    if not any(effect.model.get("applies_to_other_recordings") for effect in diagnosis.effects):
-        return f"No effect is stored: each belongs to this session. {use}{_by_themselves(diagnosis)}"
-    store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`."
-    return store + _by_themselves(diagnosis)
+    of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
+    if len(of_session) == len(diagnosis.effects):
+        return f"{use} No effect goes with them: none is corrected in another log.{_by_themselves(diagnosis)}"
+    store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`"
+    beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
+    return f"{store}{beside}.{_by_themselves(diagnosis)}"
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:

@@ -42,8 +42,7 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
-        next_step=f"Calibrate the log: `trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} "
-        "-o calibration.json`; compare with the truth (--truth FILE keeps it).",
+        next_step=_next_step(truth),
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
@@ -52,13 +51,21 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
     )
 
 
+def _next_step(truth: Truth) -> str:
+    """What the log is for."""
+    if len(truth.poses) == len(truth.segments):
+        return "Identify the noise of the log: `trihedron allan LOG`; compare with the truth (--truth FILE keeps it)."
+    asked = f"`trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} -o calibration.json`"
+    return f"Calibrate the log: {asked}; compare with the truth (--truth FILE keeps it)."
+
+
 def _of_faces(truth: Truth) -> str:
     """Options for a log whose poses are all on faces of the case, with its turns; empty for other poses."""
     ups = truth.specific_force_m_s2[[pose.start for pose in truth.poses]] / truth.gravity_m_s2
     turns = [round(degrees_from_radians(move.turn_rad)) for move in truth.moves if move.kind == "turn"]
-    if not len(ups) or np.any(np.abs(ups).max(axis=1) < ON_A_FACE) or not turns:
+    if np.any(np.abs(ups).max(axis=1) < ON_A_FACE):
         return ""
-    return f" --method faces --turns {','.join(map(str, turns))}"
+    return " --method faces" + (f" --turns {','.join(map(str, turns))}" if turns else "")
 
 
 def _effects(effects: Mapping[str, Mapping[str, object]]) -> Block:

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
 from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
@@ -62,6 +62,10 @@ def verification_report(
     )
 
 
+FAR_ABOVE = 3.0
+"""Error over noise alone from which "within uncertainty" says more of the uncertainty than of the sensor."""
+
+
 def above_noise(v: Verification) -> list[Finding]:
     """Findings about errors beyond noise and uncertainty."""
     return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
@@ -70,9 +74,19 @@ def above_noise(v: Verification) -> list[Finding]:
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
-    verified = "Verified: errors are within noise and uncertainty"
+    verified = f"Verified: errors are within noise and uncertainty{_of_uncertainty(v)}"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
+
+
+def _of_uncertainty(v: Verification) -> str:
+    """How many times noise alone the errors are, where they are far above it and the calibration is as uncertain."""
+    pairs = [("gravity error in static poses", v.norm_rms, v.norm_noise)]
+    if len(v.angle_deg):
+        pairs.append(("tilt error after a rotation", v.angle_rms_deg, v.angle_noise_deg))
+    times = [(name, rms / max(rms_of(noise), TINY)) for name, rms, noise in pairs]
+    far = [f"{name} is {plain_number(one, 2)} times noise alone" for name, one in times if one > FAR_ABOVE]
+    return f", but {listed(far)}: the calibration is that uncertain" if far else ""
 
 
 def use_in_words(v: Verification, what: str) -> str:

@@ -11,6 +11,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.records.words import why_not
+from trihedron.session.rounding import UNIFORM, undithered_axes
 
 NEAR_DEG = 12.0
 """Distance from a multiple of 90° within which an intended one ends; moves by hand end anywhere."""
@@ -167,6 +168,11 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     over angle is robust against single wrong rotations.
     """
     noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
+    quantum, scatter = context.obs.recording.facts.of("gyroscope").step, context.obs.segments.gyroscope_sigma
+    assert scatter is not None
+    is_hidden = undithered_axes(quantum, scatter)
+    steps = np.where(is_hidden, quantum, 0.0) * np.linalg.norm(context.fitted.state.gyro_S, axis=0)
+    rounding = np.sqrt(UNIFORM) * float(steps.max())
     axes = np.array(
         [int(np.abs(context.fitted.state.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
     )
@@ -175,7 +181,9 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     for k, turn in enumerate(turns):
         where = context.moves[turn.move]
         duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
-        sigmas[k] = np.hypot(noise * np.sqrt(duration), 1e-3)
+        # Inside one LSB that noise does not dither, the rate has one error throughout.
+        hidden = rounding * duration
+        sigmas[k] = np.sqrt(noise**2 * duration + hidden**2 + 1e-6)
     for axis in range(3):
         rows = axes == axis
         if rows.sum() < 2:

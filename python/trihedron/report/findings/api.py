@@ -25,6 +25,12 @@ _CALIBRATE = {
         "The recording does not contain what the gyro needs.",
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
     ),
+    (Code.GYROSCOPE_LEFT_OUT, "no-known-turns", WARNING): Words(
+        "The gyro was not calibrated: {why}.",
+        "With faces alone it is calibrated by turns on the table, by known angles, in poses on one face.",
+        "Turn the case flat on the table by known angles on three faces that are not opposite, and state them: "
+        "--turns 90,-90,...; or leave --method faces out, where there are 18 or more different poses.",
+    ),
     (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
         "No calibration can be made from this log: {why}.",
         "The log does not contain what a calibration needs.",
@@ -99,7 +105,7 @@ _USE = {
     ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
-        "This finding was made when it was calibrated; it concerns everything the calibration is applied to.",
+        "Its own recording had this fault, which concerns everything the calibration is applied to.",
         "{action} Calibrate again, or apply another calibration.",
     ),
     (Code.EFFECT_NOT_APPLIED, "of-session", NOTE): Words(
@@ -181,10 +187,9 @@ _DIAGNOSE = {
     ),
     (Code.BIAS_DRIFT, "", WARNING): Words(
         "The bias of the {is_gyro:?gyro|accelerometer} changed by up to {change:quantity} in the recording that was "
-        "calibrated, and b is {is_warm:?that of the warmed-up sensor|its mean}; `trihedron apply` does not follow the "
-        "change.",
+        "calibrated, and b is its mean; `trihedron apply` does not follow the change.",
         "{is_warm:?The sensor warms up|Temperature, supply or ageing}.",
-        "{is_warm:?Let it warm up before use, or record again with a warm sensor|Measure the bias in a static pose "
+        "{is_warm:?Record again with a warm sensor, and let it warm up before use|Measure the bias in a static pose "
         "before use}.",
         numbers=("change_x", "change_y", "change_z"),
     ),
