@@ -7,7 +7,7 @@ from functools import partial
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
-from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
+from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
@@ -162,6 +162,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
     caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
+    caption += f", and a residual disagrees below p {plain_number(diagnosis.alpha / len(DOMAINS), 2)}"
     blocks: list[Block] = [Table(head, tuple(rows), caption), *_time_errors(diagnosis)]
     # Parameters that differ have a section of their own.
     places = tuple(

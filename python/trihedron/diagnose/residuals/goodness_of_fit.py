@@ -9,7 +9,7 @@ from scipy.special import fdtrc
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import f_upper
-from trihedron.records.domains import Domain, DomainTest, Where
+from trihedron.records.domains import DOMAINS, Domain, DomainTest, Where
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF
 
@@ -17,7 +17,7 @@ ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel", STATIC_GYRO: "static-gyro", MOVES: "moves", DYNAMICS: "dynamics"
 }  # fmt: skip
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
-N_DOMAINS_TESTED = 6.0
+N_DOMAINS_TESTED = float(len(DOMAINS))
 """Four domains of poses and moves, two of samples: they share the false-alarm rate."""
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used up a domain."""

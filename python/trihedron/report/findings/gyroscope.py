@@ -31,7 +31,7 @@ _MOVES = {
         "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
         "degrees of freedom; the rotations are weighted by the noise that they show.",
         _OUTSIDE_THE_MODEL,
-        "Run trihedron diagnose to see which.",
+        "`trihedron diagnose LOG` shows which effect it is.",
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
