@@ -31,7 +31,7 @@ _MOVES = {
         "the tilt error after rotations exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
         "degrees of freedom; the rotations are weighted by the noise that they show.",
         _OUTSIDE_THE_MODEL,
-        "`trihedron diagnose LOG` shows which effect it is.",
+        "See which effect it is: `trihedron diagnose LOG`.",
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
