@@ -1,5 +1,6 @@
 """Sessions of the many-factor design (benches/confidence/design.py), one weakness a test."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from confidence.sensor import lower, recorded
 from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.session.averaging import sharpened
-from trihedron.simulate import scenario_by_name, simulate
+from trihedron.simulate import scenario_by_name, simulate, table_turns
 
 
 def calibrated(seed, **levels):
@@ -148,7 +149,7 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
 
 
 def test_turns_on_three_faces_calibrate_the_gyro_and_the_accelerometer_is_not_to_be_trusted():
-    recording, truth = simulate(scenario_by_name("table-turns"), 0)
+    recording, truth = simulate(replace(scenario_by_name("table-turns"), motion=table_turns()), 0)
     faces = np.repeat([3, 1, 2], 7)
     turns = np.tile([90.0, -90.0, 180.0, -180.0, 360.0, -360.0], 3)
     found = calibrate(recording, gravity_m_s2=9.80665, method="faces", faces=faces, turns_deg=turns)

@@ -205,7 +205,7 @@ def test_the_error_that_fails_is_the_first_figure_of_a_verification():
     )  # fmt: skip
     tilted = Finding.of(FindingCode.HELD_OUT_WORSE, "verify-moves", severity=Severity.WARNING, angle_rms_deg=0.5,
                         worst_move=3, worst_deg=0.6, times=10.0,
-                        chi2_per_dof=100.0, is_far=0.0, is_single=0.0)  # fmt: skip
+                        chi2_per_dof=100.0, is_far=0.0, is_bias=0.0, is_single=0.0)  # fmt: skip
     limit = Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=0.05, limit_deg=0.01)
     failing = (replace(plain, angle_deg=high, findings=(tilted,)), replace(plain, findings=(limit,)))
     gravity, tilt = (one.what for one in verification_report(plain).headlines)
