@@ -200,7 +200,16 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         (low, high),
         branch,
         recording.sha256,
+        *_gravity_error(accel),
     )
+
+
+def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
+    """Cross-validated rms in the poses [m/s²], and over noise alone."""
+    quality = sensor.quality
+    if quality is None or quality.held_out_rms is None or not quality.floor > 0.0:
+        return math.nan, math.nan
+    return quality.held_out_rms, quality.held_out_rms / quality.floor
 
 
 def _excess(sensor: SensorCalibration) -> float:

@@ -56,7 +56,8 @@ class Session(Frozen):
     ``numbers`` (9,) or (21,) are the parameters in the order of :data:`PARAMETERS`, ``covariance`` (n, n) that of the
     session's own estimate; ``drift`` (n,) the variance of the bias change from session to session (eq. 9.3), else 0.
     ``group`` is the day or the device. Temperatures are those of the poses, NaN where the log has none; ``branch`` is
-    +1 for heating, -1 for cooling, 0 for neither.
+    +1 for heating, -1 for cooling, 0 for neither. ``gravity_error_m_s2`` is the cross-validated rms in its poses,
+    ``times_noise`` that over noise alone.
     """
 
     name: str
@@ -69,6 +70,8 @@ class Session(Frozen):
     temperature_range_degc: tuple[float, float] = (float("nan"), float("nan"))
     branch: int = 0
     sha256: str = ""
+    gravity_error_m_s2: float = float("nan")
+    times_noise: float = float("nan")
 
 
 @dataclass(frozen=True)

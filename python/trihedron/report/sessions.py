@@ -15,8 +15,8 @@ from trihedron.report.document import Block, Document, Facts, Headline, Paragrap
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
-from trihedron.report.numbers import each_with_sigma, how_many, plain_number, shown, with_sigma
-from trihedron.report.verification import USES
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.report.verification import FAR_ABOVE, USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
@@ -52,6 +52,7 @@ def sessions_report(model: SessionsModel) -> Document:
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
         usable = f"Usable with the spread below: {parameters} changed between {used}"
+    usable += _worst(model)
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
@@ -62,6 +63,16 @@ def sessions_report(model: SessionsModel) -> Document:
         lead=_lead(model),
         next_step=NEXT if model.is_trustworthy else "",
     )
+
+
+def _worst(model: SessionsModel) -> str:
+    """The largest gravity error of a recording, where it is far above noise: recordings may agree and be wrong."""
+    known = [one for one in model.sessions if one.times_noise > FAR_ABOVE]
+    if not known:
+        return ""
+    worst = max(known, key=lambda one: one.gravity_error_m_s2)
+    size = f"{in_mm_s2(worst.gravity_error_m_s2)} ({plain_number(worst.times_noise, 2)} times noise alone)"
+    return f"; gravity error in static poses up to {size}, cross-validated"
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
