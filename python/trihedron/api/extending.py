@@ -130,7 +130,7 @@ def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
     for effect in diagnosis.effects:
         if effect.id not in DRIFTS:
             continue
-        variant, unit = effect.model["variant"], effect.parameters[0].unit
+        variant, unit = effect.model.get("variant"), effect.parameters[0].unit
         each = np.array([abs(one.value) for one in effect.parameters if one.unit == unit]).reshape(-1, 3)
         # A cosine goes from 1 to -1.
         change = (each.sum(axis=0) * (2.0 if variant == "curve" else 1.0)).tolist()
@@ -148,7 +148,7 @@ def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
 def _warming(diagnosis: Diagnosis, result: CalibrationResult, effect_id: str) -> FloatArray:
     """Mean over the poses (3,) of a bias that warms up, SI: S and b were fitted beside it as of the warm sensor."""
     for effect in diagnosis.effects:
-        if effect.id == effect_id and effect.model["variant"] == "warm-up":
+        if effect.id == effect_id and effect.model.get("variant") == "warm-up":
             values = {one.name: one.value for one in effect.parameters}
             since_s = result.segments.time_mid_s - result.recording.time_s[0]
             fades = np.exp(-since_s / values["time_constant"])
