@@ -69,7 +69,7 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 MAY_RISE = 1.25
 """Largest allowed rise of a cross-validated rms: twice the relative uncertainty (13 %) of an rms over 30 poses."""
 DRIFTS = "accel-bias-drift", "gyro-bias-drift"
-"""Effects that leave b to be that of one time."""
+"""Effects by which a bias changes within the recording."""
 CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
 """Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
 
@@ -126,7 +126,7 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
 
 
 def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
-    """A finding for each bias that changes in the recording: how far, and which one the stated bias is."""
+    """A finding for each bias that changes in the recording, with how far it does per axis."""
     for effect in diagnosis.effects:
         if effect.id not in DRIFTS:
             continue

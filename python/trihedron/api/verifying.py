@@ -68,7 +68,6 @@ def verify(
     """
     known = calibration_of(calibration)
     changed = [one for one in known.findings if one.code is FindingCode.BIAS_DRIFT]
-    known = _with_drifts(known, changed)
     recording = recording_of(recording)
     check_units(known, recording)
     recording, more = without_effects(known, recording)
@@ -77,7 +76,7 @@ def verify(
     segments = segments_of(segments, recording, progress)
     gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, gravity_of(known))
     own = own_calibration(recording, segments, gravity)
-    judged = verify_calibration(known, recording, segments, gravity, source, own)
+    judged = verify_calibration(_with_drifts(known, changed), recording, segments, gravity, source, own)
     accepted = {
         FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
         FindingCode.HELD_OUT_WORSE: limit_deg is not None,
