@@ -102,7 +102,7 @@ def test_an_extended_calibration_holds_on_another_session_where_the_linear_one_d
     assert found.verdict == "consistent"
     capsys.readouterr()
     assert main(["export", str(extended), "--to", "c"]) == 0
-    assert "has no field for it: accel-quadratic" in capsys.readouterr().err
+    assert "no fields for these effects: accel-quadratic" in capsys.readouterr().err
 
 
 def test_what_cannot_be_taken_off_is_said(folder):

@@ -39,7 +39,7 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_rad
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`; then use it: {USES}."
+NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: {USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 DRIFTS = FindingCode.BIAS_DRIFT, FindingCode.GYRO_BIAS_DRIFT

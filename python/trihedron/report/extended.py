@@ -24,6 +24,10 @@ FIRST = "static-accel"
 """The domain that is always drawn: gravity error in static poses."""
 PREDICTED = ("static-accel", "moves")
 """Domains whose cross-validated error with the effects is on the first screen."""
+NEXT = (
+    "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: `trihedron apply FILE LOG -o "
+    "corrected.csv`; of what `trihedron export` writes, few formats hold the effects."
+)
 
 
 def calibration_result_report(result: CalibrationResult) -> Document:
@@ -37,10 +41,14 @@ def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diag
     """The report with the residuals without and with the effects as its lead, and every effect after the result."""
     pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
     effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
+    headlines = _headlines(diagnosis)
+    errors = [f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in headlines]
     return replace(
         document,
+        verdict=f"{document.verdict} In this log: {listed(errors)}." if errors else document.verdict,
+        next_step=NEXT if document.next_step else "",
         sections=(document.sections[0], effects, *document.sections[1:]),
-        headlines=(*_headlines(diagnosis), *document.headlines),
+        headlines=(*headlines, *document.headlines),
         lead=_changed_picture(diagnosis),
     )
 

@@ -70,14 +70,19 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
 
     ``det S_ω < 0`` is not due to the accelerometer's sign conventions: a reflection ``R`` of its frame makes
     ``S_ω → −R S_ω``, whose determinant keeps its sign. Two gyro axes opposite to the accelerometer's show a reflection
-    of the accelerometer.
+    of the accelerometer, three a reflection that both sensors share.
     """
-    if np.linalg.det(S) < 0.0:
-        yield Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=np.linalg.det(S))
+    determinant = float(np.linalg.det(S))
+    if determinant < 0.0:
+        is_shared = bool((np.diag(S) < 0.0).all()) and np.array_equal(np.argmax(np.abs(S), axis=0), np.arange(3))
+        if is_shared:
+            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors", determinant=determinant)
+        else:
+            yield Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=determinant)
     if np.linalg.det(S_accelerometer) < 0.0:
         return
     order = np.argmax(np.abs(S), axis=0)
-    if len(set(order.tolist())) < 3 or np.linalg.det(S) <= 0.0:
+    if len(set(order.tolist())) < 3 or determinant <= 0.0:
         return
     reversed_axes = [f"{i + 1}" for i in range(3) if S[order[i], i] < 0.0]
     if not np.array_equal(order, np.arange(3)):

@@ -132,7 +132,7 @@ def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ())
         rows.append("One of the triads is mirrored against the other: check the signs of the axes before use.")
     effects = [effect for effect in effect_ids(calibration) if effect not in held]
     if effects:
-        rows.append(f"Not in this file, which has no field for it: {', '.join(effects)}.")
+        rows.append(f"Not in this file, which has no fields for these effects: {', '.join(effects)}.")
     if "thermal" not in held:
         rows += lost_temperature(calibration)
     return [row.replace("\n", " ").replace("\r", " ") for row in rows]

@@ -176,10 +176,9 @@ SESSION = {
         "the documented axes do not form one right-handed triad",
         "tilt each axis up in turn and turn about it by hand: the signs show which axis is documented wrongly",
         {
-            "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad: reversed "
-            "is {is_one:?gyro {reversed:axes}, or both other gyro axes and that accelerometer axis|"
-            "{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
-            "{is_three:?all accelerometer axes (the log contains gravity instead of specific force), or all gyro axes|"
+            "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad. In "
+            "question: {is_one:?gyro {reversed:axes}|{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
+            "{is_three:?one axis of the board alike for both sensors (or two are exchanged), or every gyro axis|"
             "the order of the axes}}}."
         },
     ),

@@ -45,6 +45,14 @@ _MOVES = {
         "Check the axis directions of the board; the calibration itself corrects them.",
         numbers=("determinant",),
     ),
+    (Code.LEFT_HANDED, "both-sensors", WARNING): Words(
+        "the axes of both sensors as logged form a left-handed triad: each gyro axis turns against the accelerometer's.",
+        "one documented axis of the board is reversed, or two are exchanged, alike for both sensors; or all three gyro "
+        "axes are reversed.",
+        "Check the axis directions of the board and state the accelerometer's with --axis-signs, for example "
+        "--axis-signs=-++; the calibration itself corrects the gyro's.",
+        numbers=("determinant",),
+    ),
     (Code.LEFT_HANDED, "gyro-against-accelerometer", WARNING): Words(
         "gyro {axes:axes and} point against the accelerometer's axes of the same name.",
         "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
@@ -80,7 +88,8 @@ _MOVES = {
         "the gyro's bias drifts while the log runs, by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times "
         "its noise; the stated b is its mean, valid neither before nor after. S accounts for the drift.",
         _BIAS_CHANGES,
-        "Let the sensor warm up and record again, or measure the bias in a static pose before use.",
+        "Where the log has a temperature, calibrate with --extended; else let the sensor warm up and record again, or "
+        "measure the bias in a static pose before use.",
     ),
     (Code.NOT_OBSERVABLE, "moves-rank", SERIOUS): Words(
         "the moves determine {rank} of {n_parameters} gyro parameters; least certain: {weakest}.",
@@ -107,7 +116,8 @@ _MOVES = {
         "{sigma_scale:.2g %}.",
         "A soft support; a link or a logger that drops samples and renumbers the others, or timestamps them anew; or "
         "another cause of the error, for which `trihedron diagnose` looks.",
-        "Put the sensor on a firm support, log its own sample counter or time, and record again.",
+        "Put the sensor on a firm support, log the count of samples or the time that the sensor itself gives (not one of "
+        "the logger), and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
