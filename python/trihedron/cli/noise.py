@@ -8,7 +8,7 @@ from trihedron.files.output import write_whole
 
 FIRST_SCREEN = 2
 OPTIONS = {
-    "static": ("STATIC", "A static log of the unit, or the JSON of trihedron allan."),
+    "static": ("STATIC", "Static log of the unit, or JSON of trihedron allan; default: poses of 20 s in the log."),
     "reference": ("MOTION", "Known motion beside the log: attitude, or pose."),
     "band": ("HZ", "Look for vibration above this; default: a quarter of the sampling rate."),
     "horizon": ("LIST", "Seconds without updates of the filter: '1,10,60'."),

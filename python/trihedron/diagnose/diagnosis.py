@@ -166,8 +166,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.rejected | (sought - named))
     remaining = with_relations(accounted_for(answer, remaining), found.related)
-    if not answer.ids and not any(one.disagrees for one in remaining):
-        domains = remaining  # 1/f noise inside the poses explains the disagreement
+    if not answer.ids:
+        domains = remaining  # nothing was added to the linear model: one judgement of it
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
 
 

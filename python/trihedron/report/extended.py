@@ -25,8 +25,8 @@ FIRST = "static-accel"
 PREDICTED = ("static-accel", "moves")
 """Domains whose cross-validated error with the effects is on the first screen."""
 NEXT = (
-    "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: `trihedron apply FILE LOG -o "
-    "corrected.csv`; of what `trihedron export` writes, few formats hold the effects."
+    "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: "
+    "`trihedron apply FILE LOG -o corrected.csv`; of what `trihedron export` writes, few formats hold the effects."
 )
 
 
@@ -42,10 +42,11 @@ def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diag
     pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
     effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
     headlines = _headlines(diagnosis)
-    errors = [f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in headlines]
+    errors = listed([f"{one.what} {with_unit(one.value, one.unit)}" for one in headlines])
+    predicted = f" Errors in this log, {HELD_OUT} with the effects: {errors}." if errors else ""
     return replace(
         document,
-        verdict=f"{document.verdict} In this log: {listed(errors)}." if errors else document.verdict,
+        verdict=document.verdict + predicted,
         next_step=NEXT if document.next_step else "",
         sections=(document.sections[0], effects, *document.sections[1:]),
         headlines=(*headlines, *document.headlines),

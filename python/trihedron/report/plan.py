@@ -32,11 +32,8 @@ def plan_report(plan: ExperimentPlan) -> Document:
             f"gyro noise {plain_number(degrees_from_radians(plan.gyroscope_density), 2)} °/s/√Hz, accelerometer noise "
             f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
-        verdict=f"Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
-        f"{_percent(turns.scale)}."
-        if best is None
-        else f"{best.name}: all {ALL_NUMBERS} parameters of the accelerometer even if any one pose is lost (scale "
-        f"{_percent(best.scale)}, 1 σ).",
+        verdict=f"{_enough(best)}Turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
+        f"{_percent(turns.scale)}.",
         is_trustworthy=True,
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
@@ -64,6 +61,16 @@ def plan_report(plan: ExperimentPlan) -> Document:
             ),
             Section("Known turns", (_turns(plan),)),
         ),
+    )
+
+
+def _enough(best: PosePlan | None) -> str:
+    """The smallest set of poses that determines the accelerometer with one to spare; empty without any."""
+    if best is None:
+        return ""
+    return (
+        f"{best.name}: all {ALL_NUMBERS} parameters of the accelerometer even if any one pose is lost (scale "
+        f"{_percent(best.scale)}, 1 σ). "
     )
 
 

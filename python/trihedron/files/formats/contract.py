@@ -94,7 +94,7 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
 
     Raises ``InputError`` when it is for counts and the LSB is not given.
     """
-    made = {}
+    made, unsaid = {}, []
     for name, sensor in calibration.sensors:
         if name == "accelerometer":
             unit, lsb = acceleration_to_si(AccelerationUnit(sensor.raw_unit)), options.accel_lsb
@@ -103,11 +103,14 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
             unit, lsb = rate_to_si(RateUnit(sensor.raw_unit)), options.gyro_lsb
             lsb_to_si, said = rate_lsb_to_si, "--gyro-lsb '0.0305 deg/s'"
         if unit is None and not lsb:
-            raise InputError(
-                f"{target} expects {name} readings in SI and this calibration maps counts: say the size of a count "
-                f"that its driver assumes with {said}, or export to c, rust or python."
-            )
-        made[name] = _rescaled(sensor, lsb_to_si(lsb) if unit is None else unit)
+            unsaid.append(said)
+        else:
+            made[name] = _rescaled(sensor, lsb_to_si(lsb) if unit is None else unit)
+    if unsaid:
+        raise InputError(
+            f"{target} expects readings in SI and this calibration maps counts: say the size of a count that its driver "
+            f"assumes with {' '.join(unsaid)}, or export to c, rust or python."
+        )
     return replace(calibration, **made)  # type: ignore[arg-type]
 
 

@@ -192,8 +192,8 @@ SESSION = {
         "the resolution (LSB) is too coarse for the noise: means of poses are quantised",
         "choose a finer range, or add a little motion or noise (dither) while averaging",
         {
-            "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of 0|have "
-            "a resolution of {step:.4g} raw units (LSB), {times:.2g} times their noise}: averaging does not "
+            "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of 0|change "
+            "in steps of {step:.4g} in raw units (LSB), {times:.2g} times their noise}: averaging does not "
             "resolve less."
         },
     ),

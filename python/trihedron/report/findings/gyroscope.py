@@ -46,7 +46,8 @@ _MOVES = {
         numbers=("determinant",),
     ),
     (Code.LEFT_HANDED, "both-sensors", WARNING): Words(
-        "the axes of both sensors as logged form a left-handed triad: each gyro axis turns against the accelerometer's.",
+        "the axes of both sensors as logged form a left-handed triad: every gyro axis turns against the "
+        "accelerometer's.",
         "one documented axis of the board is reversed, or two are exchanged, alike for both sensors; or all three gyro "
         "axes are reversed.",
         "Check the axis directions of the board and state the accelerometer's with --axis-signs, for example "
@@ -116,8 +117,8 @@ _MOVES = {
         "{sigma_scale:.2g %}.",
         "A soft support; a link or a logger that drops samples and renumbers the others, or timestamps them anew; or "
         "another cause of the error, for which `trihedron diagnose` looks.",
-        "Put the sensor on a firm support, log the count of samples or the time that the sensor itself gives (not one of "
-        "the logger), and record again.",
+        "Put the sensor on a firm support, log the count of samples or the time that the sensor itself gives (not "
+        "one of the logger), and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
