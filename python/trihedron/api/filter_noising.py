@@ -119,7 +119,7 @@ def filter_noise(
     else:
         if own is None:
             why = (
-                "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG -o corrected.csv` makes them SI)"
+                "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)"
                 if rate_to_si(recording.gyroscope_unit) is None
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )

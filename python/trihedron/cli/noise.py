@@ -1,5 +1,6 @@
 """``trihedron noise``."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from trihedron.cli.options import GravitySource, LogSource, numbers, progress, with_options
@@ -55,6 +56,8 @@ def noise(
         )
     text = "" if to is None else filter_noise_text(found, to)
     document = filter_noise_report(found)
+    if text:
+        document = replace(document, next_step=f"Put the values of {to} into your filter.")
     if text and str(output) == "-":
         put(text)
     else:

@@ -108,8 +108,8 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
             made[name] = _rescaled(sensor, lsb_to_si(lsb) if unit is None else unit)
     if unsaid:
         raise InputError(
-            f"{target} expects readings in SI and this calibration maps counts: say the size of a count that its driver "
-            f"assumes with {' '.join(unsaid)}, or export to c, rust or python."
+            f"{target} expects readings in SI and this calibration maps counts: say the size of a count that its "
+            f"driver assumes with {' '.join(unsaid)}, or export to c, rust or python."
         )
     return replace(calibration, **made)  # type: ignore[arg-type]
 
