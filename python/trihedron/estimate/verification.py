@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
+from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import norms
 
 FALSE_ALARM = 1e-3
@@ -29,6 +31,8 @@ FAR_BEYOND = 10.0
 """Ratio of an error to noise and stated uncertainty above which the calibration is not, or no longer, this sensor's.
 Other sessions of one unit reach 0.5 to 3 in poses and 2 to 9 after moves (kim, mimu4444, phone), another unit 8 to 60.
 """
+FEW = 2
+"""Parameters that may have changed alone; gravity or a unit that is wrong changes the scale of three axes."""
 
 
 def verify_calibration(
@@ -62,10 +66,9 @@ def verify_calibration(
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, moves.angle_deg))
-    shifted = {one.id for one in shifted_parameters(parameters)}
-    is_bias = "accel-bias" in shifted <= {"accel-bias", "gyro-bias"}
-    of_poses = _norm_findings(error, error_sigma, gravity_m_s2, is_bias=is_bias)
-    beyond_noise = (*of_poses, *_angle_findings(moves, is_bias=is_bias))
+    changed = _changed(shifted_parameters(parameters))
+    of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
+    beyond_noise = (*of_poses, *_angle_findings(moves, changed))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -188,8 +191,22 @@ def _carried(
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 
 
-def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, *, is_bias: bool) -> Iterator[Finding]:
-    """Finding where gravity errors exceed what is expected; ``is_bias``: only biases differ from the log's own."""
+class _Changed(NamedTuple):
+    """What differs from the calibration of the log itself: biases alone, or a few parameters by name."""
+
+    is_bias: bool
+    is_few: bool
+    shifted: list[str]
+
+
+def _changed(shifted: list[JudgedParameter]) -> _Changed:
+    ids = {one.id for one in shifted}
+    is_bias = "accel-bias" in ids <= {"accel-bias", "gyro-bias"}
+    return _Changed(is_bias, 0 < len(shifted) <= FEW, [f"{one.id}-{one.name}" for one in shifted[:FEW]])
+
+
+def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, changed: _Changed) -> Iterator[Finding]:
+    """Finding where gravity errors exceed what is expected, with the parameters that differ from the log's own."""
     z2 = (error / sigma) ** 2
     if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return
@@ -203,7 +220,9 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, *,
         norm_rms_m_s2=rms,
         times=times,
         is_far=times > FAR_BEYOND,
-        is_bias=is_bias,
+        is_bias=changed.is_bias,
+        is_few=changed.is_few,
+        shifted=changed.shifted,
         is_single=_is_single(z2, 1),
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
@@ -222,7 +241,7 @@ def _is_single(z2: FloatArray, n_components: int) -> bool:
     return probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM
 
 
-def _angle_findings(moves: Carriage, *, is_bias: bool) -> Iterator[Finding]:
+def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
     angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
         return
@@ -239,7 +258,9 @@ def _angle_findings(moves: Carriage, *, is_bias: bool) -> Iterator[Finding]:
         angle_rms_deg=rms,
         times=times,
         is_far=times > FAR_BEYOND,
-        is_bias=is_bias,
+        is_bias=changed.is_bias,
+        is_few=changed.is_few,
+        shifted=changed.shifted,
         is_single=_is_single(z2, 2),
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],

@@ -142,10 +142,17 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return " ".join(steps) + _by_themselves(diagnosis)
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
     if len(of_session) == len(diagnosis.effects):
-        return f"{use} No effect goes with them: none is corrected in another log.{_by_themselves(diagnosis)}"
+        alone = "No effect goes with them: none is corrected in another log."
+        return f"{use} {alone}{_in_the_next_log(diagnosis)}{_by_themselves(diagnosis)}"
     store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     return f"{store}{beside}.{_by_themselves(diagnosis)}"
+
+
+def _in_the_next_log(diagnosis: Diagnosis) -> str:
+    """What to do about the first effect of this session alone."""
+    first = next((one for one in diagnosis.effects if one.separating_experiment), None)
+    return "" if first is None else f" To avoid {id_in_print(first.id)} or to tell it: {first.separating_experiment}."
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:

@@ -30,8 +30,8 @@ CONSEQUENCE = (
     FindingCode.FILTER_NOISE_INCONSISTENT,
     FindingCode.FILTER_NOISE_UNCERTAIN,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
+    FindingCode.LEFT_HANDED,
     FindingCode.GRAVITY_DEFAULTED,
-    FindingCode.NONLINEAR_RESIDUAL,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
     FindingCode.NOT_OBSERVABLE,
@@ -39,6 +39,7 @@ CONSEQUENCE = (
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.BIAS_DRIFT,
     FindingCode.GYRO_BIAS_DRIFT,
+    FindingCode.NONLINEAR_RESIDUAL,
 )
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 WITHIN = "Usable where these errors are acceptable: "

@@ -137,12 +137,13 @@ _MOVES = {
         "; largest in move {worst_move} ({worst_deg:.3g}°){is_single:?, without which they are as expected|}, "
         "χ²/dof {chi2_per_dof:.2g} with each move weighted by its uncertainty.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
-        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_far:?The file "
-        "is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed since; else samples "
-        "were lost or the gyro clipped}}.",
+        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
+        "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
+        "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
+        "since; else samples were lost or the gyro clipped}}}.",
         "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_bias:?Let the sensor "
-        "warm up, then calibrate|{is_far:?Check that file, sensor and unit belong together; if they do, "
-        "calibrate|Calibrate}}} again near the conditions of use.",
+        "warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that "
+        "file, sensor and unit belong together; if they do, calibrate|Calibrate}}}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }
