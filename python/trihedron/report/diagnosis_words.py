@@ -10,6 +10,7 @@ from trihedron.records.finding import FindingCode
 from trihedron.report.calibration import errors_in_words
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.document import Headline, Level, action_in_words
+from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -151,8 +152,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
 
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
     """What to do about the first effect of this session alone."""
-    first = next((one for one in diagnosis.effects if one.separating_experiment), None)
-    return "" if first is None else f" To avoid {id_in_print(first.id)} or to tell it: {first.separating_experiment}."
+    advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
+    return next((f" Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:
