@@ -117,7 +117,7 @@ _COLUMNS = {
     (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log contains raw and corrected readings, or several devices.",
-        "A calibration wants the uncorrected ones; if this is wrong, give --columns, which names all to read: "
+        "If {taken} are not the uncorrected readings of the sensor, give --columns, which names all to read: "
         "{mapping}.",
     ),
     (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
