@@ -123,9 +123,14 @@ def filter_noise(
                 if rate_to_si(recording.gyroscope_unit) is None
                 else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
             )
+            remedy = (
+                "for static values run `trihedron allan` on a static log of ten minutes or more"
+                if static is None
+                else "static values alone are those of `trihedron allan`"
+            )
             raise InputError(
-                f"{recording.source}: {why}, so it does not show the sensor's own noise; give known motion beside it "
-                "(--reference), or run `trihedron allan` on a static log of ten minutes or more."
+                f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion beside "
+                f"it (--reference); {remedy}."
             )
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:

@@ -38,7 +38,7 @@ def apply(
     known = read_calibration(calibration)
     recording = source.read()
     from trihedron.api import applying
-    from trihedron.records import FindingCode
+    from trihedron.records import FindingCode, Severity
     from trihedron.report.machine import recording_record
 
     done = applying.apply(known, recording)
@@ -47,5 +47,8 @@ def apply(
         is_even = any(finding.code is FindingCode.EVEN_CLOCK for finding in recording.findings)
         clock = f", timestamps of an even clock of {done.rate_hz:.6g} Hz" if is_even else ""
         say(f"{done.n_samples} samples{clock}: {output}")
+    for finding in done.findings:
+        if finding not in recording.findings and finding.severity is not Severity.SERIOUS:
+            say(finding.seen)
     write_json(lambda: recording_record(done), json, force=force)
     leave(done.findings)

@@ -66,14 +66,12 @@ def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """Cross-validated errors with the effects, beside those without."""
-    stages = {stage.stage: {one.domain: one for one in stage.domains} for stage in diagnosis.stages}
+    """Cross-validated errors with the effects."""
     found = []
-    for one in stages.get("effects", {}).values():
+    for one in (one for stage in diagnosis.stages if stage.stage == "effects" for one in stage.domains):
         if one.domain in PREDICTED:
             factor, unit = shown(one.unit)
-            without = stages["parameters"][one.domain].rms
-            beside = f"rms, {HELD_OUT}, with the effects; {with_unit(plain_number(factor * without), unit)} without"
+            beside = f"rms, {HELD_OUT}, with the effects"
             found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 

@@ -161,6 +161,8 @@ def _worth(pose: PosePlan) -> str:
         return f"{which} necessary: without it a parameter is not determined"
     # Rounded to 0.001 %: smaller differences are rounding errors.
     share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
+    if share == least:
+        return f"all poses are equally useful: +{plain_number(share, 2)} % uncertainty without any one"
     return (
         f"most useful pose: {best.pose}, +{plain_number(share, 2)} % uncertainty without it; least useful pose: "
         f"+{plain_number(least, 2)} %"

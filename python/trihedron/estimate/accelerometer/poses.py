@@ -125,7 +125,7 @@ class PoseDesign:
         return float(np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows).max()))
 
     def advice(self, relative_sigma: float, n_poses: int) -> tuple[Words, ...]:
-        """The poses that most reduce the largest variance among the nine parameters, one after another (greedy)."""
+        """The poses that most reduce the sum of the nine parameters' variances, one after another (greedy)."""
         information = self.information.copy()
         # A prior of one (100 % of scale, |g| of bias) makes undetermined and weakly determined parameters comparable.
         information += np.eye(9)
@@ -135,10 +135,7 @@ class PoseDesign:
             covariance = np.linalg.inv(information)
             seen = rows @ covariance
             gain = seen**2 / (1.0 + np.einsum("ij,ij->i", seen, rows))[:, None]
-            left = np.diag(covariance) - gain
-            # The largest variance decides; the sum breaks ties, so that a pose also helps the second largest.
-            score = left.max(axis=1) + 1e-3 * left.sum(axis=1)
-            best = int(np.argmin(score))
+            best = int(np.argmax(gain.sum(axis=1)))
             advised.append(pose_in_words(CANDIDATES[best]))
             information += np.outer(rows[best], rows[best])
         return tuple(advised)

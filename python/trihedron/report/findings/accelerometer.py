@@ -52,7 +52,7 @@ ENTRIES = {
         "nonlinearity|a scale that differs between + and -}} (p = {p:.1g}): S and b are off by up to "
         "{shift_m_s2:.2g mm/s²} at 1 g, {shift_sigma:.2g} σ of what noise alone would leave.",
         "An accelerometer that is not linear, or one driven near its range limit.",
-        "Run `trihedron diagnose LOG`: it names the effect and calibrates with it.",
+        "Run `trihedron diagnose LOG`: it looks for the effect.",
     ),
     (Code.NONLINEAR_RESIDUAL, "not-excluded", WARNING): Words(
         "The gravity error in static poses exceeds noise: bias repeatability or nonlinearity. Nonlinearity may put the "

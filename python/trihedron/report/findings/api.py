@@ -115,7 +115,7 @@ _USE = {
     (Code.EFFECT_NOT_APPLIED, "", WARNING): Words(
         "The {effect:ids} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
-        "Log that channel, or update the program that applies the calibration.",
+        "Record again ({why}), or update the program that applies the calibration.",
     ),
     (Code.LIMIT_EXCEEDED, "static", SERIOUS): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "

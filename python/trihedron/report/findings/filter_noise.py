@@ -44,7 +44,7 @@ ENTRIES = {
         "with the one and too cautious with the other.",
         "The reference's own error, or a residual calibration error, is larger than the sensor's noise.",
         "Give a static log of the unit (--static STATIC), a better reference or a longer log; for a filter that "
-        "must not be too sure replace N {in_file:.3g} by {upper:.3g}.",
+        "must not be too sure replace N {in_file:.3g} of the {sensor} by {upper:.3g}.",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",

@@ -1,6 +1,7 @@
 """Findings in reading order, with equal ones merged, and the verdict that follows from them."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -43,12 +44,13 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
     ``good``."""
     serious = serious_ones(findings)
-    warned = [id_in_print(one.code.value) for one in by_weight(findings) if one.severity is Severity.WARNING]
+    warned = Counter(id_in_print(one.code.value) for one in by_weight(findings) if one.severity is Severity.WARNING)
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
         return good
-    return f"{usable}, with {how_many(len(warned), 'warning')}: {listed(list(dict.fromkeys(warned)))}."
+    named = [name if n == 1 else f"{name} ({n})" for name, n in warned.items()]
+    return f"{usable}, with {how_many(warned.total(), 'warning')}: {listed(named)}."
 
 
 def likely(cause: str) -> str:
