@@ -129,8 +129,8 @@ def filter_noise(
                 else "static values alone are those of `trihedron allan`"
             )
             raise InputError(
-                f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion beside "
-                f"it (--reference); {remedy}."
+                f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
+                f"beside it (--reference); {remedy}."
             )
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
