@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.draws import NAMES
-from trihedron.comparison.noise import SENSORS, UNIT, Sampled, Sensor, measured_row
+from trihedron.comparison.noise import Sampled
+from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow

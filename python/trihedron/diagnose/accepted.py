@@ -15,7 +15,7 @@ from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
@@ -62,11 +62,11 @@ class Answer:
     @property
     def gains(self) -> list[tuple[Effect, float, float | None]]:
         """Every effect, its gain (twice a log-likelihood) and the share that its own test states, or ``None``."""
-        out: list[tuple[Effect, float, float | None]] = [
-            (term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)
+        return [
+            *((term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)),
+            *((one.effect, one.gain, None) for one in self.biases),
+            *((one.effect, one.gain, one.evidence.share) for one in self.seen),
         ]
-        out += [(one.effect, one.gain, None) for one in self.biases]
-        return out + [(one.effect, one.gain, one.evidence.share) for one in self.seen]
 
     @property
     def shares(self) -> list[float]:
@@ -187,9 +187,9 @@ def held_out_stages(answer: Answer) -> tuple[Stage, ...]:
 
 def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
     prediction = model.prediction
-    rms, unit = physical_rms(model.fitted, prediction.innovation)
+    rms = physical_rms(model.fitted, prediction.innovation)
     return tuple(
-        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), unit[d])
+        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), ROW_UNITS[d])
         for d, name in ROW_DOMAINS.items()
         if d in rms and prediction.n_rows[d] >= 1.0
     )

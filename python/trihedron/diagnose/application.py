@@ -129,13 +129,11 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
     elif not effect.applies_elsewhere:
         left_out[effect_id] = words("effect-of-session")
     else:
+        label, n = model["variant"], len(model["values"])
         try:
-            for variant in effect.variants(context):
-                if variant.label == model["variant"] and variant.distortion.n_parameters == len(model["values"]):
-                    return variant
-            raise InputError(
-                f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
-            )
+            return next(v for v in effect.variants(context) if v.label == label and v.distortion.n_parameters == n)
         except SignalMissing as missing:
             left_out[effect_id] = words("because", sentence=missing)
+        except StopIteration:
+            raise InputError(f"effect {effect_id!r} has no variant {label!r} of {n} values") from None
     return None

@@ -269,15 +269,16 @@ class Context:
         return out
 
     @cached_property
-    def noise_floor(self) -> npt.NDArray[np.float64]:
-        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
+    def noise_density(self) -> FloatArray:
+        """(2, 3) white noise, SI per √Hz: accelerometer, gyro."""
         obs, state = self.obs, self.fitted.state
-        root_rate = np.sqrt(obs.recording.rate_hz)
-        out = np.zeros((2, 3))
-        out[0] = np.sqrt((state.accel_S**2) @ obs.force_density**2) * root_rate
-        if obs.rate_density is not None:
-            out[1] = np.sqrt((state.gyro_S**2) @ obs.rate_density**2) * root_rate
-        return out
+        raw = obs.force_density, np.zeros(3) if obs.rate_density is None else obs.rate_density
+        return np.array([np.sqrt(S**2 @ of**2) for S, of in zip((state.accel_S, state.gyro_S), raw, strict=True)])
+
+    @property
+    def noise_floor(self) -> FloatArray:
+        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
+        return np.asarray(self.noise_density * np.sqrt(self.obs.recording.rate_hz))
 
 
 def _sensor_axes(S: FloatArray) -> FloatArray:

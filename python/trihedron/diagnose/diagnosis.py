@@ -12,7 +12,7 @@ from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.diagnose.effects.contract import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
@@ -123,18 +123,17 @@ def _diagnosed(
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise density, noise corner time and bias changes of both sensors."""
-    state, obs = model.fitted.state, model.obs
+    corners, density = model.strengths[0], model.context.noise_density
     accel, gyro = hidden_biases(model.fitted)
-    density = None if obs.rate_density is None else np.sqrt((state.gyro_S**2) @ obs.rate_density**2).tolist()
     return MappingProxyType(
         {
-            "accelerometer_density": np.sqrt((state.accel_S**2) @ obs.force_density**2).tolist(),
+            "accelerometer_density": density[0].tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
-            "accelerometer_corner_s": state.strengths[0][0],
+            "accelerometer_corner_s": corners[0],
             "accelerometer_bias": asdict(accel),
-            "gyroscope_density": density,
+            "gyroscope_density": None if gyro is None else density[1].tolist(),
             "gyroscope_unit": "rad/s/sqrt(Hz)",
-            "gyroscope_corner_s": state.strengths[0][1],
+            "gyroscope_corner_s": corners[1],
             "gyroscope_bias": None if gyro is None else asdict(gyro),
         }
     )

@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
 from trihedron.diagnose.session.state import Distortion, stacked
@@ -158,14 +158,10 @@ class Hypothesis:
         value, covariance = self.value(k)
         if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
             return False
-        before, _ = physical_rms(without.fitted, without.prediction.innovation)
-        after, _ = physical_rms(self.fitted, self.prediction.innovation)
-        return any(after[d] < before[d] for d in self._domains(k) if d in after and d in before)
-
-    def _domains(self, k: int) -> set[int]:
-        """Row domains of the sensors whose readings term ``k`` changes."""
-        distortion = self.terms[k].distortion
-        return {d for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None for d in own}
+        before = physical_rms(without.fitted, without.prediction.innovation)
+        after = physical_rms(self.fitted, self.prediction.innovation)
+        changed = [own for side, own in OWN_DOMAINS.items() if getattr(self.terms[k].distortion, side) is not None]
+        return any(after[d] < before[d] for own in changed for d in own if d in after and d in before)
 
 
 def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
@@ -205,8 +201,7 @@ def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
 def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
     """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
     was, now = before.prediction, after.prediction
-    rms_before, unit = physical_rms(before.fitted, was.innovation)
-    rms_after, _ = physical_rms(after.fitted, now.innovation)
+    rms_before, rms_after = physical_rms(before.fitted, was.innovation), physical_rms(after.fitted, now.innovation)
     out = []
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
@@ -215,5 +210,5 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
         before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2
-        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
+        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], ROW_UNITS[d])))
     return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

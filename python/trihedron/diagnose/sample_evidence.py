@@ -7,13 +7,15 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.probability import chdtri
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState, misfits
 
+MUST_HALVE = 0.5
+"""Largest share of the misfit of its move that may remain after samples were inserted: a jolt leaves more."""
 VISIBLE = 0.98
 """A correction of the readings must lower the held-out misfit of some domain by at least this factor."""
 

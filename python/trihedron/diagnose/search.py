@@ -25,6 +25,7 @@ best score on: one step predicts a large effect poorly."""
 N_RIVALS = 3
 """Rivals fitted in full."""
 N_SENSORS = 2
+"""Processes that may be replaced by effects: one of either sensor."""
 MOST_EFFECTS = 4
 """Largest number of mechanisms in one session; disturbed poses do not count."""
 MOST_STEPS = 8

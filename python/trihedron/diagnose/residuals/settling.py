@@ -8,9 +8,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
+from trihedron.session.noise import FEWEST_POSES
 
-FEWEST_POSES = 6
-"""Poses below which settling is not estimated."""
 N_BLOCKS = 6
 """Parts of a pose whose means separate a rate that decays from a constant one."""
 SETTLES_S = (0.7, 1.4, 2.8, 5.6)

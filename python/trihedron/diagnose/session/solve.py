@@ -169,11 +169,6 @@ def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
     return np.asarray(obs.model(state.gravity, None).move_residuals(core_state(state)))
 
 
-def wrt_lost_time(obs: Observations, state: SessionState, m: int) -> FloatArray:
-    """(samples, 5) derivatives of the residuals after move m by time [s] lost at each of its samples."""
-    return obs.model(state.gravity, None).wrt_lost_time(core_state(state), m)
-
-
 @dataclass(frozen=True, eq=False)
 class Prediction:
     """Held-out prediction of rows: innovation chi-square per fold and domain, log-determinant, and the innovations.
