@@ -10,7 +10,6 @@ import numpy as np
 from trihedron.arrays import TINY
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried, wald_p
-from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
@@ -76,19 +75,16 @@ class Answer:
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
-    def are_footnotes(self) -> bool:
-        """Whether only minor effects were accepted: disturbed poses, a faint line, bias repeatability, and effects of
-        the samples that change nothing in the fit."""
+    def says_why(self) -> bool:
+        """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and an effect that is not minor: a
+        faint line, or one of the samples that changes nothing in the fit."""
         beside = {one.effect.id for one in self.seen if not one.reobserves}
-        return all(
-            share < HEADLINE and (own is not None or effect.is_spread or effect.is_local or effect.id in beside)
-            for (effect, _, own), share in zip(self.gains, self.shares, strict=True)
-        )
-
-    @property
-    def are_spread(self) -> bool:
-        """Whether every accepted effect is a scatter or a disturbed pose, which names no mechanism."""
-        return all(effect.is_spread or effect.is_local for effect, *_ in self.gains)
+        is_weak = [effect.is_spread or effect.is_local for effect, *_ in self.gains]
+        is_minor = [
+            share < HEADLINE and (own is not None or weak or effect.id in beside)
+            for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
+        ]
+        return not all(is_weak) and not all(is_minor)
 
 
 def excess(fitted: Fit) -> float:
@@ -149,10 +145,10 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
 
 
 def _of_samples(answer: Answer) -> list[AcceptedEffect]:
-    context, out = Context(answer.numbers.obs, answer.numbers.fitted), []
+    out = []
     for one in answer.seen:
         said = one.evidence
-        parameters = said.parameters if said.restate is None else said.restate(context)
+        parameters = said.parameters if said.restate is None else said.restate(answer.numbers.context)
         out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
 

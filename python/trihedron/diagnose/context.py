@@ -33,8 +33,12 @@ class Context:
     Everything is computed from the fitted session when first used.
     """
 
-    obs: Observations
     fitted: Fit
+
+    @property
+    def obs(self) -> Observations:
+        """Poses and moves of the session."""
+        return self.fitted.obs
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property

@@ -141,19 +141,19 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
     notify(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
-    context = Context(predicted.obs, predicted)
+    predicted = _with_settling(tune_noise(obs, start, prior), start, alpha)
+    context = Context(predicted)
     notify(0.2, "looking at the samples")
-    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
+    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
     domains = _all_domains(context, alpha, observed.rejected)
     notify(0.3, "letting effects compete")
-    bare, found = _searched(observed, prior, alpha)
+    bare, found = _searched(observed, alpha)
     # Effects hidden by another effect, or mistaken for it, are tested once more.
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
-    more, _ = look(observed, found.model.context, alpha, start, prior, sought)
+    more, _ = look(observed, found.model.context, alpha, start, sought)
     if len(more.seen) > len(observed.seen):
         observed = more
-        bare, found = _searched(observed, prior, alpha)
+        bare, found = _searched(observed, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
     biases, asked = bias_strengths(found.related.model, alpha)
@@ -173,21 +173,22 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
 LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
 
 
-def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    first = hypothesis(observed.obs, observed.fitted.state, prior)
+def _searched(observed: Observed, alpha: float) -> tuple[Hypothesis, Found]:
+    obs, prior = observed.obs, observed.fitted.prior
+    first = hypothesis(obs, observed.fitted.state, prior)
     # Two starts, low and high noise strengths: the evidence may have an optimum at each.
-    loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
+    loud = hypothesis(obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
 
 
-def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alpha: float) -> Fit:
+def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> Fit:
     """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
-    context = Context(predicted.obs, predicted)
+    context = Context(predicted)
     found = settling(context)
     if found.score < threshold(alpha):
         return predicted
-    return tune_noise(with_settling(context, found), start, prior)
+    return tune_noise(with_settling(context, found), start, predicted.prior)
 
 
 def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
@@ -258,8 +259,7 @@ def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
     """
     if answer.ids:
         is_left = has_relations or any(d.disagrees for d in answer.remaining)
-        says_why = not answer.are_footnotes and not answer.are_spread
-        return "missing-physics" if says_why or not is_left else "unexplained"
+        return "missing-physics" if answer.says_why or not is_left else "unexplained"
     if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.

@@ -87,11 +87,14 @@ class AtStrengths:
 class Hypothesis:
     """A session fitted with the effects of its ``terms``; its noise strengths are bounded by ``within``."""
 
-    obs: Observations
-    prior: Prior | None
     terms: tuple[Term, ...]
     fitted: Fit
     within: Bounds = ANYTHING
+
+    @property
+    def obs(self) -> Observations:
+        """Poses and moves of the session."""
+        return self.fitted.obs
 
     @property
     def log_evidence(self) -> float:
@@ -106,7 +109,7 @@ class Hypothesis:
     @cached_property
     def context(self) -> Context:
         """The signals that effects are computed from, in this fit."""
-        return Context(self.obs, self.fitted)
+        return Context(self.fitted)
 
     @cached_property
     def prediction(self) -> Prediction:
@@ -141,15 +144,11 @@ class Hypothesis:
         ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
         return max(self.log_evidence, float(found))
 
-    def span(self, k: int) -> slice:
-        """Place of term ``k``'s parameters among those of all effects."""
-        first = sum(term.distortion.n_parameters for term in self.terms[:k])
-        return slice(first, first + self.terms[k].distortion.n_parameters)
-
     def value(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Parameters of term ``k`` and their covariance."""
-        covariance = self.fitted.covariance()
-        n, at = self.fitted.distortion.n_parameters, self.span(k)
+        covariance, n = self.fitted.covariance(), self.fitted.distortion.n_parameters
+        first = sum(term.distortion.n_parameters for term in self.terms[:k])
+        at = slice(first, first + self.terms[k].distortion.n_parameters)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
 
@@ -182,14 +181,14 @@ def hypothesis(
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
     fitted = solved(obs, start, prior, distortion, strengths, within, sizes, has_free_strengths=True)
-    return Hypothesis(obs, prior, tuple(terms), fitted, within)
+    return Hypothesis(tuple(terms), fitted, within)
 
 
 def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
     """The same observations fitted with other effects or bounds, started from the known fit."""
     state = replace(known.fitted.state, effect=np.zeros(0))
     within = known.within if within is None else within
-    return hypothesis(known.obs, state, known.prior, terms, within, known.strengths)
+    return hypothesis(known.obs, state, known.fitted.prior, terms, within, known.strengths)
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:

@@ -223,9 +223,9 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term, state = as_fits_best(model, tried), model.fitted.state
-    start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
-    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, tried.asked.strengths)
+    term, known = as_fits_best(model, tried), model.fitted
+    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
+    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:

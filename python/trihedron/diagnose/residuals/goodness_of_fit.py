@@ -143,13 +143,15 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> dict[i
     direct, state = system.walk == 0, fitted.state
 
     def errors(domains: tuple[int, ...], white: FloatArray) -> FloatArray:
+        """(n, k) errors in SI, by the matrices ``white`` (n, k, k) from these to whitened rows."""
         rows = np.flatnonzero(np.isin(system.domain, domains) & direct)
         return np.asarray(np.linalg.solve(white, r[rows].reshape(len(white), -1, 1))[:, :, 0])
 
-    error = errors((STATIC_ACCEL,), fitted.accel_white)
+    error = errors((STATIC_ACCEL,), fitted.obs.core_poses().force_white() @ np.linalg.inv(state.accel_S))
     out = {STATIC_ACCEL: rms_of(np.einsum("ni,ni->n", error, state.up))}
-    if fitted.gyro_white is not None:
-        out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), fitted.gyro_white))
+    sigma = fitted.obs.pose_rate_sigma
+    if sigma is not None:
+        out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), np.linalg.inv(state.gyro_S) / sigma[:, :, None]))
     if fitted.obs.n_moves:
         # Of a move, in order: gravity after it (2), velocity over it (3).
         error = errors((MOVES, DYNAMICS), fitted.core.whitening())

@@ -97,17 +97,6 @@ class Fit:
         mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
         return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
-    @property
-    def accel_white(self) -> FloatArray:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
-        return self.obs.core_poses().force_white() @ np.linalg.inv(self.state.accel_S)
-
-    @property
-    def gyro_white(self) -> FloatArray | None:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static rate; ``None`` without a gyro."""
-        sigma = self.obs.pose_rate_sigma
-        return None if sigma is None else np.linalg.inv(self.state.gyro_S) / sigma[:, :, None]
-
     def bias(self, sensor: int) -> FloatArray:
         """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
         return (self.state.accel_bias, self.state.gyro_bias)[sensor]

@@ -284,9 +284,8 @@ def _lines(
     samples = cast(Observations, _Samples(recording, t, np.hstack(quick), SimpleNamespace(poses=poses)))
     test = judge_within_poses(samples, alpha)
     state = SimpleNamespace(accel_S=_matrix(model, ACCELEROMETER), gyro_S=_matrix(model, GYRO))
-    fitted = cast(Fit, SimpleNamespace(state=state))
     effect = PeriodicInterference()
-    found = effect.find(Context(samples, fitted))
+    found = effect.find(Context(cast(Fit, SimpleNamespace(obs=samples, state=state))))
     if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
         return test, None
     return test, AcceptedEffect(
