@@ -10,7 +10,7 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import chdtrc
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)

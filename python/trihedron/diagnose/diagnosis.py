@@ -38,8 +38,6 @@ from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
 from trihedron.session.noise import strengths_of_all
 
-FEWEST_RECORDINGS = 2
-
 
 def diagnose_recording(
     recording: Recording,
@@ -66,7 +64,7 @@ def diagnose_recordings(
 ) -> SharedDiagnosis:
     """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
     all of them (eq. 11.21). Refused with fewer than two."""
-    if len(given) < FEWEST_RECORDINGS:
+    if len(given) < 2:
         raise InputError(f"what recordings share needs two or more, got {len(given)}.")
     notify = progress or _silently
     each = []

@@ -13,7 +13,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
@@ -38,6 +38,8 @@ NOWHERE = Where()
 MIN_FALL = 15.0
 """Chi-square that a correction of the readings (samples inserted, poses cut) must gain: it allows for the search over
 place and size."""
+MOST_NAMED = 4
+"""Places of one kind that a sentence names: more do not fit a line."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 

@@ -6,7 +6,15 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import (
+    MIN_FALL,
+    MOST_NAMED,
+    DirectEffect,
+    Evidence,
+    Variant,
+    force_only,
+    per_axis,
+)
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
@@ -31,8 +39,6 @@ SHAKES_P = 1e-6
 healthy sessions stay above 0.02, and real noise is not as white."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
-MOST_NAMED = 4
-"""Poses of each kind that the sentence names."""
 LEAST_DOF = 0.1
 """Smallest degrees of freedom of a pose: where the fit uses up its rows, rounding errors are no deviation."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import MIN_FALL, MOST_NAMED, DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
@@ -30,8 +30,6 @@ CONTRADICTS, FEWEST_MOVES = 10.0, 3
 """Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 MOST_OF_INTERVALS = 0.02
 """Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
-NAMED = 4
-"""Places that the sentence lists."""
 FEWEST_OF_PARABOLA = 6
 """Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
@@ -281,8 +279,8 @@ class DroppedSamples(DirectEffect):
             ),
         )
         statement = self.reported(
-            "losses", losses=[(loss.count, t[loss.sample]) for loss in losses[:NAMED]],
-            has_more=len(losses) > NAMED, more=len(losses) - NAMED,
+            "losses", losses=[(loss.count, t[loss.sample]) for loss in losses[:MOST_NAMED]],
+            has_more=len(losses) > MOST_NAMED, more=len(losses) - MOST_NAMED,
         )  # fmt: skip
 
         def reweigh(old: Observations) -> Observations:
