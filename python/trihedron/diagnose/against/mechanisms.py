@@ -20,9 +20,9 @@ FRAME_TOLERANCE = 0.03
 """Relative difference of parameters that is ignored: each side states them along the axes of its own fit, and
 the angle between the two frames and the first order of the mechanisms make up to 3 %."""
 
-FREE_CURVES = frozenset({"curve", "smooth"})
-"""Variants of a drift without a mechanism: cosines over a session, and a curve through its biases. Sessions of
-different length, or started at another temperature, have no comparable parameters."""
+FREE_CURVE = "curve"
+"""Variant of a drift without a mechanism: cosines over a session. Sessions of different length, or started at another
+temperature, have no comparable parameters."""
 
 CODE = "raw_"
 """Prefix of a parameter that states another one as an exact ADC code."""
@@ -198,7 +198,7 @@ def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
 
 
 def _is_free(effect: AcceptedEffect) -> bool:
-    return effect.model.get("variant") in FREE_CURVES
+    return effect.model.get("variant") == FREE_CURVE
 
 
 def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:
