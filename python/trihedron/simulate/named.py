@@ -36,8 +36,8 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
 """Sessions that a scenario file can name, and the functions that make them."""
 
 
-def _of(profile: Profile, motion: Motion) -> Scenario:
-    return Scenario(motion, "", *profile.unit(1), profile.clock)
+def _of(profile: Profile, motion: Motion, name: str = "", unit: int = 1) -> Scenario:
+    return Scenario(motion, name, *profile.unit(unit), profile.clock)
 
 
 def _linear() -> Scenario:
