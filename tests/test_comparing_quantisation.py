@@ -28,7 +28,7 @@ EQUAL = N / (2.0 * RATE**0.5)
 def sampled(Q, seed):
     x = make_noise(NoiseTerms(N=(N,) * 3, Q=Q), 30 * 500, 1.0 / RATE, seed, "quantisation")
     axes = tuple(noise_of_poses(x, RATE, [(k * 500, k * 500 + 450) for k in range(30)]))
-    return Sampled({"gyroscope": axes}, {}, {}, {}, RATE, 0.0)
+    return Sampled({"gyroscope": axes}, {}, RATE, 0.0)
 
 
 def test_quantisation_noise_is_recovered_axis_by_axis_beside_white_noise():

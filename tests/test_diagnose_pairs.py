@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -18,6 +19,10 @@ def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share
     parameter = EffectParameter("bias_per_kelvin_x", 0.01, 3e-4, "m/s^2/K")
     held = (HeldOut(domain, 50.0, 1.0, before, after, "m/s^2"),)
     return AcceptedEffect(effect_id, "Said.", (parameter,), 0.0, 99.0, held, model={"variant": variant}, share=share)
+
+
+def found(*effects, candidates=()):
+    return SimpleNamespace(effects=effects, candidates=candidates, domains=(), remaining=())
 
 
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
@@ -46,12 +51,12 @@ def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     pushed = effect("disturbed-pose", share=0.7, variant="")
     faint = effect("periodic-interference", share=0.05, variant="")
     strong = effect("periodic-interference", share=0.25, variant="")
-    assert not compare_effects([], [pushed, faint], [], alpha=0.01).differ
-    assert compare_effects([], [pushed, strong], [], alpha=0.01).differ
-    assert compare_effects([], [pushed, effect("accel-cubic")], [], alpha=0.01).differ
+    assert not compare_effects([], found(pushed, faint), alpha=0.01).differ
+    assert compare_effects([], found(pushed, strong), alpha=0.01).differ
+    assert compare_effects([], found(pushed, effect("accel-cubic")), alpha=0.01).differ
     # What only the model has is no footnote of the recording.
     tried = [Candidate("periodic-interference", 0.4, True)]
-    assert compare_effects([faint], [], tried, alpha=0.01).differ
+    assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ
 
 
 def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():

@@ -45,7 +45,7 @@ def session(lean_rad, scatter_rad_s, seed=1):
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
-    return Context(obs, tune_noise(obs, start_state(obs, calibration), None))
+    return Context(tune_noise(obs, start_state(obs, calibration), None))
 
 
 def test_supports_that_give_are_told_from_zeros_that_scatter():

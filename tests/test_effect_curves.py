@@ -9,7 +9,7 @@ from diagnosed_session import diagnosed
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
 from trihedron.diagnose.effects.thermal import GyroThermalBias
-from trihedron.diagnose.session.state import NO_DISTORTION
+from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
 
 G = 9.80665

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from trihedron import _core, probability
-from trihedron.diagnose.session.state import smoothed_slope
+from trihedron.diagnose.context import smoothed_slope
 from trihedron.ranges import edges_of, ranges_of
 from trihedron.segment.noise import MeanNoise
 

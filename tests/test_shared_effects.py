@@ -11,7 +11,7 @@ from diagnosed_session import simulated
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, Term
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.shared_diagnosis import shared_diagnosis_report

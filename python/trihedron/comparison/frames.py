@@ -1,6 +1,7 @@
 """Frame of a simulated log's readings (rates in the world frame, gravity upside down), and its errors in motion."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -8,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
+from trihedron.comparison.rows import Sensor, difference
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import fdtrc, stdtrit
 from trihedron.records import Calibration, Recording, Segments
@@ -61,21 +63,19 @@ def missed_alike(scenario: Scenario, beside: Moved, alpha: float) -> tuple[Noise
     ``p_value``: one-sided, against the nearer end of ``AIMED_AT``; ``interval``: of 1 − 2 ``alpha``, so that a ratio is
     significant exactly where its interval lies outside.
     """
-    made = [beside.missed_by(scenario, FIRST_SEED + k) for k in range(FEW)]
-    rows = _rows(made, beside, alpha)
-    if any(row.p_value is not None and row.p_value < OPEN_P for row in rows):
-        made += [beside.missed_by(scenario, FIRST_SEED + k) for k in range(FEW, MANY)]
-        rows = _rows(made, beside, alpha)
+    made: list[tuple[float | None, float | None]] = []
+    rows: tuple[NoiseDifference, ...] = ()
+    for enough in (FEW, MANY):
+        made += [beside.missed_by(scenario, FIRST_SEED + k) for k in range(len(made), enough)]
+        poses, moves = zip(*made, strict=True)
+        both = _row("poses", poses, beside.poses, alpha), _row("moves", moves, beside.moves, alpha)
+        rows = tuple(row for row in both if row is not None)
+        if not any(row.p_value is not None and row.p_value < OPEN_P for row in rows):
+            break
     return rows
 
 
-def _rows(made: list[tuple[float | None, float | None]], beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
-    poses = _row("poses", [one for one, _ in made], beside.poses, alpha)
-    moves = _row("moves", [one for _, one in made], beside.moves, alpha)
-    return tuple(row for row in (poses, moves) if row is not None)
-
-
-def _row(what: What, squares: list[float | None], seen: float | None, alpha: float) -> NoiseDifference | None:
+def _row(what: What, squares: Sequence[float | None], seen: float | None, alpha: float) -> NoiseDifference | None:
     known = [one for one in squares if one is not None and one > 0.0]
     # Where half of the simulations have no value, the model differs from the recording in another way.
     if seen is None or seen <= 0.0 or 2 * len(known) <= len(squares):
@@ -93,10 +93,12 @@ def _row(what: What, squares: list[float | None], seen: float | None, alpha: flo
     interval = (math.exp(apart - half), math.exp(apart + half))
     model, recording = math.exp(float(np.mean(logs))), math.sqrt(seen)
     remark = _remark(what, math.exp(apart), interval, k, alpha) if differs else ""
-    rest = (model, recording, model / recording, interval, "m/s^2" if what == "poses" else "rad", p, differs, remark)
-    return NoiseDifference("accelerometer" if what == "poses" else "gyroscope", "", what, *rest)
+    sensor, unit = _OF[what]
+    ratio = model / recording
+    return NoiseDifference(sensor, "", what, model, recording, ratio, interval, unit, p, differs, remark)
 
 
+_OF: dict[What, tuple[Sensor, str]] = {"poses": ("accelerometer", "m/s^2"), "moves": ("gyroscope", "rad")}
 _CAUSE = {
     ("poses", True): "noise inside the poses (a tremor, a line) does not go on between them as the model's does",
     ("poses", False): "the bias changes from pose to pose by more than the model's noise",
@@ -129,7 +131,7 @@ def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference 
         f"after rotations is {body:.0f}° if they are the body's and {world:.1f}° if they are the world's. Turn them by "
         "the transpose of the attitude; until then only its accelerometer is compared."
     )
-    return NoiseDifference("gyroscope", "", "frame", None, None, None, None, "1", None, True, remark)
+    return difference("gyroscope", "frame", (None, None), "1", remark)
 
 
 def sign_of_gravity(
@@ -145,7 +147,7 @@ def sign_of_gravity(
         "Gravity has the opposite sign in the model, pose by pose: a static accelerometer reads +g along the axis "
         "that points up (specific force), not −g."
     )
-    return NoiseDifference("accelerometer", "", "frame", -1.0, 1.0, -1.0, None, "1", None, True, remark)
+    return difference("accelerometer", "frame", (-1.0, 1.0), "1", remark, ratio=-1.0)
 
 
 def _gravity(segments: Segments, calibration: Calibration) -> FloatArray | None:

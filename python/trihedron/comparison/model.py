@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.comparison.noise import SENSORS, Sampled, sampled
+from trihedron.comparison.noise import Sampled, sampled
+from trihedron.comparison.rows import SENSORS, difference
 from trihedron.diagnose.against.fitted import FittedModel, as_read, model_of_calibration, model_of_diagnosis
-from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
+from trihedron.diagnose.against.mechanisms import FREE_CURVE, compare_effects, left_open_by
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
 from trihedron.estimate.verification import verify_calibration
 from trihedron.probability import f_upper
@@ -107,13 +108,8 @@ def compared(
     own = model_of_diagnosis(found)
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
     given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
-    unexplained = {test.domain for test in found.remaining if test.disagrees}
-    effects = compare_effects(
-        given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained,
-        misses={test.domain: test.rms for test in found.domains},
-        freedom={test.domain: test.dof for test in found.domains},
-        tried_on_model=() if simulated is None else simulated[0].candidates,
-    )  # fmt: skip
+    tried_on_model = () if simulated is None else simulated[0].candidates
+    effects = compare_effects(given_effects, found, alpha=alpha, tried_on_model=tried_on_model)
     numbers = compare_numbers(
         model,
         own,
@@ -168,7 +164,7 @@ def _without_walk(
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
             drawn.add(drift)
-    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") not in FREE_CURVES)
+    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") != FREE_CURVE)
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:
@@ -197,13 +193,13 @@ def _factor(one: CommonFactor) -> NoiseDifference:
     name = "gyro" if one.sensor == "gyroscope" else one.sensor
     if not one.written:
         remark = f"The {name} of the model counts {ratio:g} times as many per unit: another range of the part."
-        return NoiseDifference(one.sensor, "", "range", None, None, ratio, None, "1", None, True, remark)
-    remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
-    if one.side:
+    elif one.side:
+        remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
         remark += f": the {one.side} writes {one.written} where it says {one.taken}."
     else:
+        remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
         remark += f", the ratio of {one.taken} to {one.written}: one of the two is in the wrong unit."
-    return NoiseDifference(one.sensor, "", "unit", None, None, ratio, None, "1", None, True, remark)
+    return difference(one.sensor, "unit" if one.written else "range", (None, None), "1", remark, ratio=ratio)
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:

@@ -1,28 +1,23 @@
 """Noise and sampling of a simulated log against those of a recording, axis by axis, and likely causes of a ratio."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.draws import NAMES, one_draw_for_all, uniform_for_normal
+from trihedron.comparison.draws import Draws, compare_draws
+from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, difference, measured_row
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.probability import chdtrc
 from trihedron.records import Pose, Recording
-from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
+from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import TimestampKind
-
-Sensor = Literal["accelerometer", "gyroscope"]
-SENSORS: tuple[Sensor, Sensor] = ("accelerometer", "gyroscope")
-UNIT: Mapping[Sensor, str] = MappingProxyType({"accelerometer": "m/s^2", "gyroscope": "rad/s"})
 
 SHARE = 0.125
 """Share of alpha for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is used for
@@ -63,15 +58,10 @@ _SCATTERED = (TimestampKind.LATE, TimestampKind.SCATTERED)
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Noise of both sensors in SI along their own axes, and the clock.
-
-    ``likeness`` is the smallest absolute correlation of the noise of any two axes.
-    """
+    """Noise of both sensors in SI along their own axes, how it is drawn, and the clock."""
 
     noise: dict[Sensor, tuple[PoseNoise, ...]]
-    excess: dict[Sensor, FloatArray]
-    n_differences: dict[Sensor, int]
-    likeness: dict[Sensor, float]
+    draws: dict[Sensor, Draws]
     rate_hz: float
     jitter_steps: float
     has_timestamps: bool = True
@@ -81,9 +71,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     """Noise inside poses of a recording, scaled by its own fit."""
     ranges = [(pose.start, pose.stop) for pose in poses]
     noise: dict[Sensor, tuple[PoseNoise, ...]] = {}
-    excess: dict[Sensor, FloatArray] = {}
-    count: dict[Sensor, int] = {}
-    likeness: dict[Sensor, float] = {}
+    draws: dict[Sensor, Draws] = {}
     for sensor in SENSORS:
         readings, fitted = getattr(recording, sensor), getattr(model, sensor)
         if readings is None or fitted is None:
@@ -94,13 +82,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
         except INPUT_ERRORS:
             continue  # no pose is long enough: nothing to compare
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in ranges if b - a > 2])
-        differences = differences[np.isfinite(differences).all(axis=1)]
-        centred = differences - differences.mean(axis=0)
-        power = np.maximum((centred**2).mean(axis=0), 1e-150)
-        excess[sensor] = (centred**4).mean(axis=0) / power**2 - 3.0
-        count[sensor] = len(differences)
-        products = np.abs(centred.T @ centred / len(centred)) / np.sqrt(np.outer(power, power))
-        likeness[sensor] = float(products.min())
+        draws[sensor] = Draws.of(differences[np.isfinite(differences).all(axis=1)])
     steps = np.diff(recording.time_s)
     nominal = 1.0 / recording.rate_hz
     away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
@@ -110,7 +92,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
     if clock.is_even and clock.kind in _SCATTERED:
         # The reader replaced the timestamps by an even clock: their scatter is in its report.
         jitter = max(jitter, clock.timestamp_error_s * recording.rate_hz)
-    return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter, has_timestamps)
+    return Sampled(noise, draws, recording.rate_hz, jitter, has_timestamps)
 
 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
@@ -136,35 +118,14 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
             corners = [] if is_one_part and axis != AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
             out += [replace(row, axis="") if is_one_part else row for row in corners]
             out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
-        n = min(model.n_differences[sensor], recording.n_differences[sensor])
         noise = (*model.noise[sensor], *recording.noise[sensor])
-        out += uniform_for_normal(sensor, model.excess[sensor], recording.excess[sensor], n, noise)
-        out += one_draw_for_all(sensor, model.likeness[sensor], recording.likeness[sensor], n)
+        out += compare_draws(sensor, model.draws[sensor], recording.draws[sensor], noise)
     out += _sampling(model, recording)
     return tuple(out)
 
 
-def measured_row(
-    sensor: Sensor,
-    axis: str,
-    term: NoiseTerm,
-    pair: tuple[Measured, Measured],
-    unit: str,
-    least: float,
-    alpha: float,
-    remark: str = "",
-) -> NoiseDifference:
-    """A figure that both sides have; it differs beyond chance and the ratio ``least``, and then has the ``remark``."""
-    ratio = ratio_of(*pair)
-    differs = bool(ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > least)
-    return NoiseDifference(
-        sensor, axis, term, pair[0].value, pair[1].value, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value,
-        differs, remark.format(ratio=ratio.value) if differs else "",
-    )  # fmt: skip
-
-
-def _value(figure: Measured | None) -> float | None:
-    return None if figure is None else figure.value
+def _values(m: Measured | None, r: Measured | None) -> tuple[float | None, float | None]:
+    return None if m is None else m.value, None if r is None else r.value
 
 
 def _white(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> NoiseDifference | None:
@@ -183,8 +144,7 @@ def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) ->
     name = NAMES[sensor]
     hides = f"The resolution (LSB) of the {side} hides the noise of its {name}."
     remark = f"The {side} has no noise on the {name}; the {other} has." if would_show else hides
-    values = _value(m.white), _value(r.white)
-    return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, would_show, remark)
+    return replace(difference(sensor, "N", _values(m.white, r.white), unit, remark, axis=axis), significant=would_show)
 
 
 def _resembling(
@@ -246,12 +206,9 @@ def _step(
     if not (m_shows and r_shows):
         # Readings finer than their noise shows: only an LSB larger than the noise is missed.
         coarse = m if m_shows else r
-        matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
-        remark = f"The {side} has no resolution (LSB) on the {name}." if matters else ""
-        yield NoiseDifference(
-            sensor, axis, "resolution", m.step, r.step, None, None, UNIT[sensor], None, matters, remark
-        )
+        remark = f"The {side} has no resolution (LSB) on the {name}." if coarse.step > coarse.reading_sigma else ""
+        yield difference(sensor, "resolution", (m.step, r.step), UNIT[sensor], remark, axis=axis)
         return
     ratio = m.step / r.step
     levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
@@ -259,7 +216,7 @@ def _step(
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
-    yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, UNIT[sensor], None, is_far, remark)
+    yield difference(sensor, "resolution", (m.step, r.step), UNIT[sensor], remark, axis=axis, ratio=ratio)
 
 
 def _shows_steps(one: PoseNoise, axes: Sequence[PoseNoise]) -> bool:
@@ -281,13 +238,11 @@ def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float)
     if seen.corner_hz is None:
         return
     is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
-    values = _value(m.corner_hz), _value(r.corner_hz)
     side = "recording" if seen is r else "model"
     name = f"{NAMES[sensor]} {axis.upper()}"
     remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
-    yield NoiseDifference(
-        sensor, axis, "bandwidth", *values, None, None, "Hz", None, is_clear, remark if is_clear else ""
-    )
+    values = _values(m.corner_hz, r.corner_hz)
+    yield difference(sensor, "bandwidth", values, "Hz", remark if is_clear else "", axis=axis)
 
 
 def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -> Iterator[NoiseDifference]:
@@ -321,11 +276,10 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
 
 def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     ratio = model.rate_hz / recording.rate_hz
+    remark = f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz."
     is_far = max(ratio, 1.0 / ratio) > LEAST_RATE_RATIO
-    remark = (
-        f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
-    )
-    yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
+    rates = model.rate_hz, recording.rate_hz
+    yield difference("both", "rate", rates, "Hz", remark if is_far else "", ratio=ratio)
     if not recording.has_timestamps:
         return
     # Timestamps on an even grid scatter by their rounding only.
@@ -338,6 +292,4 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     )
     if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
         remark = f"The clock of the model is perfect; the timestamps of the recording scatter by {1e3 * r:.2g} ms."
-    yield NoiseDifference(
-        "both", "", "jitter", m, r, m / r if r > 0.0 else None, None, "s", None, is_far, remark if is_far else ""
-    )
+    yield difference("both", "jitter", (m, r), "s", remark if is_far else "", ratio=m / r if r > 0.0 else None)

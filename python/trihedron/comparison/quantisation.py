@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import AXES
-from trihedron.comparison.draws import NAMES
-from trihedron.comparison.noise import SENSORS, Sampled, Sensor, measured_row
+from trihedron.comparison.noise import Sampled
+from trihedron.comparison.rows import NAMES, SENSORS, Sensor, difference, measured_row
 from trihedron.estimate.noise.correlation_time import Octaves
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
@@ -93,11 +93,11 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
         remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {{ratio:.2g}} times the recording's."
         yield measured_row(sensor, axis, "Q", (made.measured(), seen.measured()), unit, LEAST_RATIO, alpha, remark)
         return
-    difference = abs(made.quantisation - seen.quantisation)
-    p_value = math.erfc(difference / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
+    apart = abs(made.quantisation - seen.quantisation)
+    p_value = math.erfc(apart / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
     less, more = sorted((made, seen), key=lambda one: one.quantisation)
     is_off = p_value < alpha and more.quantisation > LEAST_RATIO**2 * (less.quantisation + 2.0 * less.sigma)
     side = "model" if made.is_shown else "recording"
     remark = f"Only the {side} has quantisation noise on the {NAMES[sensor]} {axis}: noise that rises with frequency."
     values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
-    yield NoiseDifference(sensor, axis, "Q", *values, None, None, unit, p_value, is_off, remark if is_off else "")
+    yield difference(sensor, "Q", values, unit, remark if is_off else "", axis=axis, p_value=p_value)

@@ -10,12 +10,11 @@ import numpy as np
 from trihedron.arrays import TINY
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried, wald_p
-from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit
@@ -62,11 +61,11 @@ class Answer:
     @property
     def gains(self) -> list[tuple[Effect, float, float | None]]:
         """Every effect, its gain (twice a log-likelihood) and the share that its own test states, or ``None``."""
-        out: list[tuple[Effect, float, float | None]] = [
-            (term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)
+        return [
+            *((term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)),
+            *((one.effect, one.gain, None) for one in self.biases),
+            *((one.effect, one.gain, one.evidence.share) for one in self.seen),
         ]
-        out += [(one.effect, one.gain, None) for one in self.biases]
-        return out + [(one.effect, one.gain, one.evidence.share) for one in self.seen]
 
     @property
     def shares(self) -> list[float]:
@@ -76,19 +75,16 @@ class Answer:
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
-    def are_footnotes(self) -> bool:
-        """Whether only minor effects were accepted: disturbed poses, a faint line, bias repeatability, and effects of
-        the samples that change nothing in the fit."""
+    def says_why(self) -> bool:
+        """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and an effect that is not minor: a
+        faint line, or one of the samples that changes nothing in the fit."""
         beside = {one.effect.id for one in self.seen if not one.reobserves}
-        return all(
-            share < HEADLINE and (own is not None or effect.is_spread or effect.is_local or effect.id in beside)
-            for (effect, _, own), share in zip(self.gains, self.shares, strict=True)
-        )
-
-    @property
-    def are_spread(self) -> bool:
-        """Whether every accepted effect is a scatter or a disturbed pose, which names no mechanism."""
-        return all(effect.is_spread or effect.is_local for effect, *_ in self.gains)
+        is_weak = [effect.is_spread or effect.is_local for effect, *_ in self.gains]
+        is_minor = [
+            share < HEADLINE and (own is not None or weak or effect.id in beside)
+            for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
+        ]
+        return not all(is_weak) and not all(is_minor)
 
 
 def excess(fitted: Fit) -> float:
@@ -149,10 +145,10 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
 
 
 def _of_samples(answer: Answer) -> list[AcceptedEffect]:
-    context, out = Context(answer.numbers.obs, answer.numbers.fitted), []
+    out = []
     for one in answer.seen:
         said = one.evidence
-        parameters = said.parameters if said.restate is None else said.restate(context)
+        parameters = said.parameters if said.restate is None else said.restate(answer.numbers.context)
         out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
 
@@ -187,9 +183,9 @@ def held_out_stages(answer: Answer) -> tuple[Stage, ...]:
 
 def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
     prediction = model.prediction
-    rms, unit = physical_rms(model.fitted, prediction.innovation)
+    rms = physical_rms(model.fitted, prediction.innovation)
     return tuple(
-        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), unit[d])
+        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), ROW_UNITS[d])
         for d, name in ROW_DOMAINS.items()
         if d in rms and prediction.n_rows[d] >= 1.0
     )

@@ -16,7 +16,6 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.errors import InputError
 from trihedron.records import Recording
@@ -62,11 +61,10 @@ class SampleContext(Context):
 
 @dataclass(frozen=True, eq=False)
 class Compensated:
-    """Raw readings (n, 3) with effects compensated, or ``None``; ``applied`` ids; ``left_out`` id → reason."""
+    """Raw readings (n, 3) with effects compensated, or ``None``; ``left_out`` id of others → reason."""
 
     accelerometer: FloatArray | None
     gyroscope: FloatArray | None
-    applied: tuple[str, ...]
     left_out: MappingProxyType[str, str]
 
 
@@ -97,8 +95,8 @@ def compensate(
     force, rate = read_f, read_w
     for _ in range(N_ITERATIONS):
         path = SimpleNamespace(force=force, rate=rate, move_slices=(slice(0, len(every)),), point_samples=every)
-        fitted = SimpleNamespace(path=path, state=state)
-        context = SampleContext(cast(Observations, obs), cast(Fit, fitted), reference=references)
+        fitted = cast(Fit, SimpleNamespace(path=path, state=state, obs=obs))
+        context = SampleContext(fitted, reference=references)
         force, rate = read_f, read_w
         for entry in effects:
             variant = _variant(entry, context, left_out)
@@ -109,11 +107,9 @@ def compensate(
                 force = force - variant.distortion.force @ values
             if variant.distortion.rate is not None:
                 rate = rate - variant.distortion.rate @ values
-    ids = tuple(str(entry["id"]) for entry in effects)
     return Compensated(
         None if raw_f is None else raw_f + np.linalg.solve(S_f, (force - read_f).T).T,
         recording.gyroscope if raw_w is None else raw_w + np.linalg.solve(S_w, (rate - read_w).T).T,
-        tuple(i for i in ids if i not in left_out),
         MappingProxyType(left_out),
     )
 
@@ -129,13 +125,11 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
     elif not effect.applies_elsewhere:
         left_out[effect_id] = words("effect-of-session")
     else:
+        label, n = model["variant"], len(model["values"])
         try:
-            for variant in effect.variants(context):
-                if variant.label == model["variant"] and variant.distortion.n_parameters == len(model["values"]):
-                    return variant
-            raise InputError(
-                f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
-            )
+            return next(v for v in effect.variants(context) if v.label == label and v.distortion.n_parameters == n)
         except SignalMissing as missing:
             left_out[effect_id] = words("because", sentence=missing)
+        except StopIteration:
+            raise InputError(f"effect {effect_id!r} has no variant {label!r} of {n} values") from None
     return None

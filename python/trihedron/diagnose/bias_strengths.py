@@ -122,18 +122,14 @@ def _times_error(model: Hypothesis, sensor: int) -> float:
     return float(np.max(model.fitted.bias(sensor).std(axis=0) / unit)) if model.obs.n_poses else 0.0
 
 
-def _scatter(model: Hypothesis, sensor: int) -> tuple[float, ...]:
-    """Scatter from pose to pose in its unit: one of the accelerometer, of a gyro by axis."""
-    scatter = model.strengths[1]
-    return scatter[1:] if sensor else scatter[:1]
-
-
 def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
     """(3,) SI by axis, and its standard uncertainty: one sigma of a scatter, the peak-to-peak range of a drift."""
     sensor, obs = effect.sensor, model.obs
     si_per_raw = model.context.si_per_raw(sensor)
     if not effect.walks:
-        size = np.array(_scatter(model, sensor)) * model.obs.scatter_unit()[sensor] * si_per_raw
+        # One strength of the accelerometer, of a gyro one by axis.
+        scatter = model.strengths[1][1:] if sensor else model.strengths[1][:1]
+        size = np.array(scatter) * obs.scatter_unit()[sensor] * si_per_raw
         return size, size / np.sqrt(2.0 * max(obs.n_poses - 1, 1))
     sigma = (obs.pose_force_sigma, obs.pose_rate_sigma)[sensor]
     assert sigma is not None

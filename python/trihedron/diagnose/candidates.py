@@ -10,7 +10,7 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import chdtrc
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
@@ -23,8 +23,6 @@ SHAPES_KEPT = 2
 """Shapes kept per effect, counted separately for those with a plausible and those with an implausible size."""
 NEAR = 6.0
 """Difference of scores below which two explanations are named together: odds of twenty to one."""
-FAMILY = NEAR
-"""Extra penalty of a shape that represents a family (a filter of any order): odds of twenty to one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +79,8 @@ def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: flo
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.cost
         known = best.get(term.effect.id)
-        if (known is None or score > known.score) and _is_possible(term, one):
+        is_plausible = term.effect.is_plausible(term.variant, one.value, one.covariance)
+        if (known is None or score > known.score) and is_plausible:
             best[term.effect.id] = Tried(term, score, one)
     return sorted(best.values(), key=lambda one: -one.score)
 
@@ -99,8 +98,8 @@ def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term
             continue
         variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
         cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
-        # A shape that represents a family, a filter of any order, has an extra penalty.
-        terms += [Term(effect, v, effect.sizes(context, v), cost + FAMILY * v.is_family) for v in variants]
+        # A shape that represents a family, a filter of any order, needs odds of twenty to one beside plain ones.
+        terms += [Term(effect, v, effect.sizes(context, v), cost + NEAR * v.is_family) for v in variants]
     return terms, missing
 
 
@@ -134,10 +133,6 @@ def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
     effect = term.effect
     is_plausible = effect.is_plausible(term.variant, look.value, look.covariance)
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
-
-
-def _is_possible(term: Term, asked: AddedTerms) -> bool:
-    return term.effect.is_plausible(term.variant, asked.value, asked.covariance)
 
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.

@@ -6,16 +6,18 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import convolve1d, uniform_filter1d
+from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
 
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.state import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
+BLOCKS_OF_WIDTH = 10
+"""Blocks of samples per smoothing width: the blocks widen it by a part in 2400, and reduce windows of thousands of
+samples to dozens of means."""
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
 QUIET = 0.1
@@ -33,8 +35,12 @@ class Context:
     Everything is computed from the fitted session when first used.
     """
 
-    obs: Observations
     fitted: Fit
+
+    @property
+    def obs(self) -> Observations:
+        """Poses and moves of the session."""
+        return self.fitted.obs
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
@@ -269,15 +275,31 @@ class Context:
         return out
 
     @cached_property
-    def noise_floor(self) -> npt.NDArray[np.float64]:
-        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
+    def noise_density(self) -> FloatArray:
+        """(2, 3) white noise, SI per √Hz: accelerometer, gyro."""
         obs, state = self.obs, self.fitted.state
-        root_rate = np.sqrt(obs.recording.rate_hz)
-        out = np.zeros((2, 3))
-        out[0] = np.sqrt((state.accel_S**2) @ obs.force_density**2) * root_rate
-        if obs.rate_density is not None:
-            out[1] = np.sqrt((state.gyro_S**2) @ obs.rate_density**2) * root_rate
-        return out
+        raw = obs.force_density, np.zeros(3) if obs.rate_density is None else obs.rate_density
+        return np.array([np.sqrt(S**2 @ of**2) for S, of in zip((state.accel_S, state.gyro_S), raw, strict=True)])
+
+    @property
+    def noise_floor(self) -> FloatArray:
+        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
+        return np.asarray(self.noise_density * np.sqrt(self.obs.recording.rate_hz))
+
+
+def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
+    """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
+
+    Timestamps are smoothed too: a straight line keeps its slope across pauses, and to the ends.
+    """
+    length = max(round(width / BLOCKS_OF_WIDTH), 1)
+    starts = np.arange(0, len(values), length)
+    if len(starts) < 2:
+        return np.zeros(len(values))
+    n = np.diff(starts, append=len(values))
+    level, time = (np.add.reduceat(of, starts) / n for of in (values, time_s))
+    smooth, at = (gaussian_filter1d(of, max(width / length, 1.0), mode="nearest") for of in (level, time))
+    return np.interp(time_s, time, np.gradient(smooth, at))
 
 
 def _sensor_axes(S: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.diagnose.effects.contract import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
@@ -37,8 +37,6 @@ from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
 from trihedron.session.noise import strengths_of_all
-
-FEWEST_RECORDINGS = 2
 
 
 def diagnose_recording(
@@ -66,7 +64,7 @@ def diagnose_recordings(
 ) -> SharedDiagnosis:
     """Diagnose every recording of one unit as :func:`diagnose_recording`, and find the effects with one size common to
     all of them (eq. 11.21). Refused with fewer than two."""
-    if len(given) < FEWEST_RECORDINGS:
+    if len(given) < 2:
         raise InputError(f"what recordings share needs two or more, got {len(given)}.")
     notify = progress or _silently
     each = []
@@ -123,18 +121,17 @@ def _diagnosed(
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise density, noise corner time and bias changes of both sensors."""
-    state, obs = model.fitted.state, model.obs
+    corners, density = model.strengths[0], model.context.noise_density
     accel, gyro = hidden_biases(model.fitted)
-    density = None if obs.rate_density is None else np.sqrt((state.gyro_S**2) @ obs.rate_density**2).tolist()
     return MappingProxyType(
         {
-            "accelerometer_density": np.sqrt((state.accel_S**2) @ obs.force_density**2).tolist(),
+            "accelerometer_density": density[0].tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
-            "accelerometer_corner_s": state.strengths[0][0],
+            "accelerometer_corner_s": corners[0],
             "accelerometer_bias": asdict(accel),
-            "gyroscope_density": density,
+            "gyroscope_density": None if gyro is None else density[1].tolist(),
             "gyroscope_unit": "rad/s/sqrt(Hz)",
-            "gyroscope_corner_s": state.strengths[0][1],
+            "gyroscope_corner_s": corners[1],
             "gyroscope_bias": None if gyro is None else asdict(gyro),
         }
     )
@@ -142,19 +139,19 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
     notify(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, prior), start, prior, alpha)
-    context = Context(predicted.obs, predicted)
+    predicted = _with_settling(tune_noise(obs, start, prior), start, alpha)
+    context = Context(predicted)
     notify(0.2, "looking at the samples")
-    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start, prior)
+    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
     domains = _all_domains(context, alpha, observed.rejected)
     notify(0.3, "letting effects compete")
-    bare, found = _searched(observed, prior, alpha)
+    bare, found = _searched(observed, alpha)
     # Effects hidden by another effect, or mistaken for it, are tested once more.
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
-    more, _ = look(observed, found.model.context, alpha, start, prior, sought)
+    more, _ = look(observed, found.model.context, alpha, start, sought)
     if len(more.seen) > len(observed.seen):
         observed = more
-        bare, found = _searched(observed, prior, alpha)
+        bare, found = _searched(observed, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
     biases, asked = bias_strengths(found.related.model, alpha)
@@ -174,21 +171,22 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
 LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
 
 
-def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:
-    first = hypothesis(observed.obs, observed.fitted.state, prior)
+def _searched(observed: Observed, alpha: float) -> tuple[Hypothesis, Found]:
+    obs, prior = observed.obs, observed.fitted.prior
+    first = hypothesis(obs, observed.fitted.state, prior)
     # Two starts, low and high noise strengths: the evidence may have an optimum at each.
-    loud = hypothesis(observed.obs, first.fitted.state, prior, strengths=LOUD)
+    loud = hypothesis(obs, first.fitted.state, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
 
 
-def _with_settling(predicted: Fit, start: SessionState, prior: Prior | None, alpha: float) -> Fit:
+def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> Fit:
     """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
-    context = Context(predicted.obs, predicted)
+    context = Context(predicted)
     found = settling(context)
     if found.score < threshold(alpha):
         return predicted
-    return tune_noise(with_settling(context, found), start, prior)
+    return tune_noise(with_settling(context, found), start, predicted.prior)
 
 
 def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
@@ -259,8 +257,7 @@ def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
     """
     if answer.ids:
         is_left = has_relations or any(d.disagrees for d in answer.remaining)
-        says_why = not answer.are_footnotes and not answer.are_spread
-        return "missing-physics" if says_why or not is_left else "unexplained"
+        return "missing-physics" if answer.says_why or not is_left else "unexplained"
     if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.

@@ -11,10 +11,9 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, solved
-from trihedron.diagnose.session.state import Distortion, stacked
+from trihedron.diagnose.session.solve import Distortion, Fit, Prediction, folds_of, predict_held_out, solved, stacked
 from trihedron.records.domains import HeldOut
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
@@ -87,11 +86,14 @@ class AtStrengths:
 class Hypothesis:
     """A session fitted with the effects of its ``terms``; its noise strengths are bounded by ``within``."""
 
-    obs: Observations
-    prior: Prior | None
     terms: tuple[Term, ...]
     fitted: Fit
     within: Bounds = ANYTHING
+
+    @property
+    def obs(self) -> Observations:
+        """Poses and moves of the session."""
+        return self.fitted.obs
 
     @property
     def log_evidence(self) -> float:
@@ -106,7 +108,7 @@ class Hypothesis:
     @cached_property
     def context(self) -> Context:
         """The signals that effects are computed from, in this fit."""
-        return Context(self.obs, self.fitted)
+        return Context(self.fitted)
 
     @cached_property
     def prediction(self) -> Prediction:
@@ -141,15 +143,11 @@ class Hypothesis:
         ((found, *_),) = self.fitted.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
         return max(self.log_evidence, float(found))
 
-    def span(self, k: int) -> slice:
-        """Place of term ``k``'s parameters among those of all effects."""
-        first = sum(term.distortion.n_parameters for term in self.terms[:k])
-        return slice(first, first + self.terms[k].distortion.n_parameters)
-
     def value(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Parameters of term ``k`` and their covariance."""
-        covariance = self.fitted.covariance()
-        n, at = self.fitted.distortion.n_parameters, self.span(k)
+        covariance, n = self.fitted.covariance(), self.fitted.distortion.n_parameters
+        first = sum(term.distortion.n_parameters for term in self.terms[:k])
+        at = slice(first, first + self.terms[k].distortion.n_parameters)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
 
@@ -158,14 +156,10 @@ class Hypothesis:
         value, covariance = self.value(k)
         if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
             return False
-        before, _ = physical_rms(without.fitted, without.prediction.innovation)
-        after, _ = physical_rms(self.fitted, self.prediction.innovation)
-        return any(after[d] < before[d] for d in self._domains(k) if d in after and d in before)
-
-    def _domains(self, k: int) -> set[int]:
-        """Row domains of the sensors whose readings term ``k`` changes."""
-        distortion = self.terms[k].distortion
-        return {d for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None for d in own}
+        before = physical_rms(without.fitted, without.prediction.innovation)
+        after = physical_rms(self.fitted, self.prediction.innovation)
+        changed = [own for side, own in OWN_DOMAINS.items() if getattr(self.terms[k].distortion, side) is not None]
+        return any(after[d] < before[d] for own in changed for d in own if d in after and d in before)
 
 
 def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
@@ -186,14 +180,14 @@ def hypothesis(
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
     fitted = solved(obs, start, prior, distortion, strengths, within, sizes, has_free_strengths=True)
-    return Hypothesis(obs, prior, tuple(terms), fitted, within)
+    return Hypothesis(tuple(terms), fitted, within)
 
 
 def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
     """The same observations fitted with other effects or bounds, started from the known fit."""
     state = replace(known.fitted.state, effect=np.zeros(0))
     within = known.within if within is None else within
-    return hypothesis(known.obs, state, known.prior, terms, within, known.strengths)
+    return hypothesis(known.obs, state, known.fitted.prior, terms, within, known.strengths)
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
@@ -205,8 +199,7 @@ def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
 def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
     """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
     was, now = before.prediction, after.prediction
-    rms_before, unit = physical_rms(before.fitted, was.innovation)
-    rms_after, _ = physical_rms(after.fitted, now.innovation)
+    rms_before, rms_after = physical_rms(before.fitted, was.innovation), physical_rms(after.fitted, now.innovation)
     out = []
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
@@ -215,5 +208,5 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
         before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2
-        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
+        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], ROW_UNITS[d])))
     return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))

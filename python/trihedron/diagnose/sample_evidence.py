@@ -7,13 +7,15 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import MIN_FALL, MUST_HALVE, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.probability import chdtri
 from trihedron.records.diagnosis import Candidate
-from trihedron.session.model import DYNAMICS, MOVES, Prior, SessionState, misfits
+from trihedron.session.model import DYNAMICS, MOVES, SessionState, misfits
 
+MUST_HALVE = 0.5
+"""Largest share of the misfit of its move that may remain after samples were inserted: a jolt leaves more."""
 VISIBLE = 0.98
 """A correction of the readings must lower the held-out misfit of some domain by at least this factor."""
 
@@ -49,12 +51,7 @@ class Observed:
 
 
 def look(
-    observed: Observed,
-    context: Context,
-    alpha: float,
-    start: SessionState,
-    prior: Prior | None,
-    only: Collection[str] = (),
+    observed: Observed, context: Context, alpha: float, start: SessionState, only: Collection[str] = ()
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations corrected for every effect that its own test detects, and the result of every test."""
     held = {one.effect.id for one in observed.seen if not one.effect.is_local} | observed.rejected
@@ -74,19 +71,17 @@ def look(
         if evidence is not None and evidence.p_value * len(catalogue()) < alpha / 2.0:
             found.append((effect, evidence))
     for effect, evidence in sorted(found, key=lambda pair: -pair[1].strength):
-        observed = _with_one(observed, effect, evidence, start, prior)
+        observed = _with_one(observed, effect, evidence, start)
     return observed, candidates
 
 
-def _with_one(
-    observed: Observed, effect: DirectEffect, evidence: Evidence, start: SessionState, prior: Prior | None
-) -> Observed:
+def _with_one(observed: Observed, effect: DirectEffect, evidence: Evidence, start: SessionState) -> Observed:
     gain, fitted = float(evidence.strength), observed.fitted
     if evidence.reweigh is not None:
         found = [*(one.evidence for one in observed.seen), evidence]
         obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
-        fitted = tune_noise(obs, begin, prior)
+        fitted = tune_noise(obs, begin, fitted.prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, rejected=observed.rejected | {effect.id})
         gain = _explained(observed.fitted, fitted)

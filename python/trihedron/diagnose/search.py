@@ -25,6 +25,7 @@ best score on: one step predicts a large effect poorly."""
 N_RIVALS = 3
 """Rivals fitted in full."""
 N_SENSORS = 2
+"""Processes that may be replaced by effects: one of either sensor."""
 MOST_EFFECTS = 4
 """Largest number of mechanisms in one session; disturbed poses do not count."""
 MOST_STEPS = 8
@@ -222,9 +223,9 @@ def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Te
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term, state = as_fits_best(model, tried), model.fitted.state
-    start = replace(state, effect=np.concatenate([state.effect, np.zeros(term.distortion.n_parameters)]))
-    return term, hypothesis(model.obs, start, model.prior, (*model.terms, term), model.within, tried.asked.strengths)
+    term, known = as_fits_best(model, tried), model.fitted
+    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
+    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:

@@ -15,8 +15,7 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, terms_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import Effect
-from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.diagnose.effects.contract import DirectEffect, Effect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import MOST_EFFECTS, threshold
 from trihedron.probability import chdtrc

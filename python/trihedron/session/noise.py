@@ -109,7 +109,7 @@ def measure_noise(
     if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
         sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY))
         densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
-        of_rate = expected_scatter_of_axes(recording.gyroscope, spans)
+        of_rate = expected_scatter(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
     variances = np.zeros((len(ranges), 4, 3))
     for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
@@ -187,6 +187,7 @@ def coloured_variance(
 PARTS = 8
 """Parts of a pose: neighbouring ones differ by white noise, its halves by white noise and flicker."""
 FEWEST_POSES = 6
+"""Fewer poses do not separate two processes (drift, scatter, settling) on three axes."""
 FEWEST_READINGS = 4 * PARTS
 FAR = 9.0
 """Squares beyond so many variances are disturbances by hand, not noise."""
@@ -194,31 +195,23 @@ SEEN = 1.0
 """Standard errors by which the mean square of halves must exceed white noise: low, as it only widens uncertainties."""
 
 
-def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> float:
-    """Standard deviation [raw] of a pose's bias about that of the session by flicker alone, along the vertical.
+def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray | None = None) -> float:
+    """Standard deviation [raw] of a pose's bias about that of the session by flicker alone, along the vertical ``up``,
+    or, of a gyro, whose bias shows along all axes, their rms.
 
     Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h for white noise N² and a flicker of
     one-sided density h/f. Below the frequencies that a pose of length T sees, down to those of a session of length L,
     lies a variance h ln(L/2T). It is 0 where white noise explains the differences of halves. ``spans`` (h, 2) are the
     half-open ranges of the poses, ``up`` (h, 3) raw unit verticals, NaN where unknown.
     """
-    size = spans[:, 1] - spans[:, 0]
-    usable = (size >= FEWEST_READINGS) & np.isfinite(up).all(axis=1)
+    usable = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
+    if up is not None:
+        usable &= np.isfinite(up).all(axis=1)
     if np.count_nonzero(usable) < FEWEST_POSES:
         return 0.0
-    spans, size, up = spans[usable], size[usable], up[usable]
-    halves, parts = (_steps(readings, spans, up[:, None, :], n) for n in (2, PARTS))
-    return float(_between_poses(halves, parts, spans)[0])
-
-
-def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
-    """The same for a gyro, rms over its axes: its bias shows along all of them."""
-    spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
-    if len(spans) < FEWEST_POSES:
-        return 0.0
-    halves, parts = (_steps(readings, spans, np.eye(3)[None], n) for n in (2, PARTS))
-    found = _between_poses(halves, parts, spans)
-    return float(np.sqrt(np.mean(found**2)))
+    spans, along = spans[usable], np.eye(3)[None] if up is None else up[usable, None, :]
+    halves, parts = (_steps(readings, spans, along, n) for n in (2, PARTS))
+    return float(np.sqrt(np.mean(_between_poses(halves, parts, spans) ** 2)))
 
 
 def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> FloatArray:

@@ -37,8 +37,7 @@ SESSIONS: dict[str, Callable[..., Motion]] = {
 
 
 def _of(profile: Profile, motion: Motion, name: str = "", unit: int = 1) -> Scenario:
-    accelerometer, gyroscope = profile.unit(unit)
-    return Scenario(motion, name, accelerometer, gyroscope, profile.clock)
+    return Scenario(motion, name, *profile.unit(unit), profile.clock)
 
 
 def _linear() -> Scenario:
@@ -63,8 +62,8 @@ def _manual() -> Scenario:
         steps += poses_in_order([face], pose_s=4.0, move_s=3.0, arrive=True).steps
         for angle in (1440.0, -1440.0):
             steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "static")]
-    accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
-    return Scenario(Motion(tuple(steps), start=poses.start), "", accel, gyro, ANALOG_6DOF.clock)
+    part = ANALOG_6DOF
+    return Scenario(Motion(tuple(steps), start=poses.start), "", part.accelerometer, part.gyroscope, part.clock)
 
 
 def _static_manual() -> Scenario:

@@ -78,7 +78,6 @@ ANALOG_6DOF = Profile(
         S=_MANUAL_S_F,
         b=_MANUAL_B_F,
         unit=AccelerationUnit.COUNTS,
-        mass=ProofMass(resonance_hz=triple(3500.0), gap_m=triple(1.5e-6)),
         noise=NoiseTerms(N=triple(0.35 * _MG), B=triple(0.3 * _MG), K=triple(2e-5)),
         adc=Adc(1.0, 0.0, 1023.0),
     ),
@@ -102,7 +101,7 @@ MPU = Profile(
     accelerometer=Accelerometer(
         S=_diagonal(STANDARD_GRAVITY_M_S2 / 16384.0),
         unit=AccelerationUnit.COUNTS,
-        mass=ProofMass(resonance_hz=triple(3000.0), gap_m=triple(1.5e-6)),
+        mass=ProofMass(resonance_hz=triple(3000.0)),
         noise=NoiseTerms(N=triple(0.4 * _MG), B=triple(0.05 * _MG), K=triple(1e-5)),
         adc=Adc(1.0, -32768.0, 32767.0),
     ),

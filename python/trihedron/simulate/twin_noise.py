@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar, nnls
 
 from trihedron.arrays import FloatArray
 from trihedron.simulate.noise import NoiseTerms
-from trihedron.simulate.readout import Smoother, Triple
+from trihedron.simulate.readout import Smoother, triple
 
 _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 # Corner frequencies, as fractions of the sampling rate, and orders that are tried.
@@ -47,12 +47,8 @@ def noise_of_poses(
         [_fit(axis, dt, window @ power) for axis, window in zip(measured, windows, strict=True)] for power in powers
     ]
     best = int(np.argmin([sum(misfit for _, misfit in fit) for fit in fits]))
-    columns = [terms for terms, _ in fits[best]]
-
-    def triple(j: int) -> Triple:
-        return (columns[0][j], columns[1][j], columns[2][j])
-
-    return NoiseTerms(N=triple(0), B=triple(1)), filters[best]
+    N, B = (triple(column) for column in np.array([terms for terms, _ in fits[best]]).T)
+    return NoiseTerms(N=N, B=B), filters[best]
 
 
 def _filters(dt: float) -> list[Smoother]:
@@ -107,7 +103,7 @@ def noise_of_octaves(
     # Above the corner rounding and the filter's shape dominate: no octave there separates white noise from flicker.
     n_below = int(np.count_nonzero(bands_hz[:, 0] < low_pass.corner_hz))
     below = slice(n_below if low_pass.corner_hz > 0.0 and n_below >= FEWEST_BELOW else None)
-    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass, below)[0]).T)
+    N, B = (triple(column) for column in np.array(fitted(low_pass, below)[0]).T)
     return NoiseTerms(N=N, B=B), low_pass
 
 

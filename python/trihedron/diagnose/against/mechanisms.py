@@ -1,7 +1,7 @@
 """Effects of the recording against those of the given model: missing, surplus, or common with other parameters."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
@@ -11,7 +11,7 @@ import numpy as np
 from trihedron.diagnose.accepted import HEADLINE
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.probability import f_upper, ndtr
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
 from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
@@ -20,9 +20,9 @@ FRAME_TOLERANCE = 0.03
 """Relative difference of parameters that is ignored: each side states them along the axes of its own fit, and
 the angle between the two frames and the first order of the mechanisms make up to 3 %."""
 
-FREE_CURVES = frozenset({"curve", "smooth"})
-"""Variants of a drift without a mechanism: cosines over a session, and a curve through its biases. Sessions of
-different length, or started at another temperature, have no comparable parameters."""
+FREE_CURVE = "curve"
+"""Variant of a drift without a mechanism: cosines over a session. Sessions of different length, or started at another
+temperature, have no comparable parameters."""
 
 CODE = "raw_"
 """Prefix of a parameter that states another one as an exact ADC code."""
@@ -95,57 +95,53 @@ class ComparedEffects:
 
 
 def compare_effects(
-    model: Sequence[AcceptedEffect],
-    recording: Sequence[AcceptedEffect],
-    candidates: Sequence[Candidate],
-    *,
-    alpha: float,
-    unexplained: Collection[Domain] = (),
-    misses: Mapping[Domain, float] = MappingProxyType({}),
-    tried_on_model: Sequence[Candidate] = (),
-    freedom: Mapping[Domain, float] = MappingProxyType({}),
+    model: Sequence[AcceptedEffect], found: Diagnosis, *, alpha: float, tried_on_model: Sequence[Candidate] = ()
 ) -> ComparedEffects:
-    """Pair the effects of both sides by id, or by what was confounded with them.
+    """Pair the effects of a model with those ``found`` in a recording, by id or by what was confounded with them.
 
     Effects of one session (a disturbed pose, a table that was not level, the arm to the centre of rotation) are never
-    surplus. Nor is an effect that shows in a domain in which the recording has ``unexplained`` misfit: it may be
-    hidden there. ``misses``: rms of the recording's residuals in each domain before any effect. An effect of a channel
-    that the recording did not log, or a scatter, is surplus only if it makes more than that; a scatter only beyond the
-    chance difference of two draws with the domain's degrees of ``freedom``.
+    surplus. Nor is an effect that shows in a domain in which the recording has unexplained misfit: it may be hidden
+    there. An effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than
+    the rms of the recording's residuals before any effect; a scatter only beyond the chance difference of two draws.
     ``tried_on_model``: candidates of the simulation's own diagnosis. An effect of the recording is not missing if the
     simulation's own test calls it likely and no other effect there could be mistaken for it.
     """
     of_session = {effect.id for effect in catalogue() if effect.is_of_session or effect.is_of_motion}
+    misses = {test.domain: test.rms for test in found.domains}
     # An effect that the recording's own test calls likely, corrected for multiple testing, is not called surplus,
     # even where it was not accepted.
-    tried = [c for c in candidates if c.applicable]
+    tried = [c for c in found.candidates if c.applicable]
     excluded = {c.id for c in tried if c.p_value is None or len(tried) * c.p_value > alpha}
-    drifting = {effect.id for effect in recording}
+    not_logged = {c.id for c in found.candidates if not c.applicable}
+    drifts = excluded - {effect.id for effect in found.effects}
     excluded |= {
         effect.id
         for effect in model
-        if any(c.id == effect.id and not c.applicable for c in candidates)
-        and by_id()[effect.id].drifts_as in excluded - drifting
-        and _would_show(effect, misses)
+        if effect.id in not_logged and by_id()[effect.id].drifts_as in drifts and _would_show(effect, misses)
     }
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
     missing: list[AcceptedEffect] = []
     left = list(model)
-    for effect in recording:
+    for effect in found.effects:
         partner = next((m for m in left if _are_one(m, effect)), None)
-        if partner is None:
-            if not _is_likely(effect, tried_on_model, model, alpha):
-                missing.append(effect)
-        else:
+        if partner is not None:
             left.remove(partner)
             pairs.append((partner, effect))
+        elif not _is_likely(effect, tried_on_model, model, alpha):
+            missing.append(effect)
+    unexplained = {test.domain for test in found.remaining if test.disagrees}
+    # Largest rms of a second draw of the recording's scatter.
+    by_chance = {
+        test.domain: test.rms * (math.sqrt(f_upper(test.dof, test.dof, alpha)) if test.dof >= 1.0 else 1.0)
+        for test in found.domains
+    }
     surplus = [
-        replace(effect, side="model", share=None, statement=_only_there(effect, candidates))
+        replace(effect, side="model", share=None, statement=_only_there(effect, found.candidates))
         for effect in left
         if effect.id not in of_session
         and effect.id in excluded
-        and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
-        and (not by_id()[effect.id].is_spread or _would_show(effect, _beyond_chance(misses, freedom, alpha)))
+        and not _shows_in(effect) & unexplained
+        and (not by_id()[effect.id].is_spread or _would_show(effect, by_chance))
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
@@ -154,17 +150,19 @@ def compare_effects(
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
 
 
+def _shows_in(effect: AcceptedEffect) -> set[Domain]:
+    """The domain that the effect improves most."""
+    return {seen.domain for seen in effect.held_out[:1]}
+
+
 def _is_likely(
     effect: AcceptedEffect, tried: Sequence[Candidate], others: Sequence[AcceptedEffect], alpha: float
 ) -> bool:
     """Whether a log's own test, corrected for multiple testing, calls an effect likely that was not accepted there."""
     applicable = [c for c in tried if c.applicable]
     own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
-    domains = {seen.domain for seen in effect.held_out[:1]}
     # Any effect of the poses looks like a scatter until it is identified.
-    is_shown_otherwise = any(
-        domains & {seen.domain for seen in one.held_out[:1]} for one in others if not by_id()[one.id].is_spread
-    )
+    is_shown_otherwise = any(_shows_in(effect) & _shows_in(one) for one in others if not by_id()[one.id].is_spread)
     return bool(own) and len(applicable) * own[0] < alpha and not is_shown_otherwise
 
 
@@ -192,17 +190,6 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
     )
 
 
-def _beyond_chance(
-    misses: Mapping[Domain, float], freedom: Mapping[Domain, float], alpha: float
-) -> dict[Domain, float]:
-    """Largest rms of a second draw of the recording's scatter, at false-alarm rate ``alpha``, per domain."""
-    return {
-        domain: rms * (math.sqrt(f_upper(dof, dof, alpha)) if dof >= 1.0 else 1.0)
-        for domain, rms in misses.items()
-        for dof in (freedom.get(domain, 0.0),)
-    }
-
-
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
     reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
     return effect_words(
@@ -211,7 +198,7 @@ def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
 
 
 def _is_free(effect: AcceptedEffect) -> bool:
-    return effect.model.get("variant") in FREE_CURVES
+    return effect.model.get("variant") == FREE_CURVE
 
 
 def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:

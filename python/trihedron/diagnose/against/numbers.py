@@ -95,11 +95,6 @@ class ComparedNumbers:
     parameters: tuple[ParameterDifference, ...]
     factors: tuple[CommonFactor, ...]
 
-    @property
-    def differ(self) -> bool:
-        """Whether any group is significant."""
-        return any(p.significant for p in self.parameters)
-
 
 def compare_numbers(
     model: FittedModel,
@@ -216,10 +211,8 @@ def _never_added(
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
     is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, NO_BIAS)
     would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
-    if not (is_none and would_show):
-        return ""
     name = "accelerometer" if prefix == "accel" else "gyro"
-    return words("biases-never-added", sensor=name)
+    return words("biases-never-added", sensor=name) if is_none and would_show else ""
 
 
 def _relative_to(prefix: str, a: Invariants, r: Invariants, *, is_recording: bool) -> str:

@@ -9,9 +9,11 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
+"""Half-widths tried, a twentieth to half of g, then refined; above g the play never reverses in poses."""
 PLAY_M_S2, CREEP = 0.02, 0.005
 """Prior sigma: 2 mg of play; half a percent of a change of force that settles slowly."""
 CREEP_TIMES_S = (5.0, 20.0, 60.0)
+"""Time constants tried, s, the length of one pose by hand to ten, then refined."""
 
 
 class AccelHysteresis(Effect):

@@ -4,8 +4,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.records.diagnosis import EffectParameter
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence, per_axis_parameters
 from trihedron.records.domains import Where
 
 SIGN_SIGMA = 5.0
@@ -33,16 +32,13 @@ class AxisHandedness(DirectEffect):
             return None
         if (signs > 0).all() and (main == np.arange(3)).all():
             return None
-        n_reversed = int((signs < 0).sum())
-        reversed_axes = [AXES[j] for j in range(3) if signs[j] < 0]
-        kept = [AXES[j] for j in range(3) if signs[j] > 0]
+        reversed_axes, kept = ([AXES[j] for j in np.flatnonzero(one)] for one in (signs < 0, signs > 0))
+        n = len(reversed_axes)
         # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
         statement = self.reported(
-            "reversed", is_one=n_reversed == 1, is_two=n_reversed == 2, is_three=n_reversed == 3,
-            reversed=reversed_axes, kept=kept,
+            "reversed", is_one=n == 1, is_two=n == 2, is_three=n == 3, reversed=reversed_axes, kept=kept,
         )  # fmt: skip
-        signed = zip(AXES, signs, strict=True)
-        parameters = tuple(EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in signed)
+        parameters = per_axis_parameters("gyro_sign", signs, np.zeros(3), "1")
         return Evidence(
             0.0, CERTAIN, parameters, statement, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes))
         )

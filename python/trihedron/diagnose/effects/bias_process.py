@@ -1,20 +1,37 @@
-"""Random changes of a bias from pose to pose: a strength of the session's noise, not columns of the readings."""
+"""Bias that drifts in time, or differs from pose to pose, and that no logged channel explains."""
 
 from abc import abstractmethod
 from typing import ClassVar
 
-from trihedron.arrays import AXES, FloatArray
+import numpy as np
+
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import GYRO, SENSORS, Effect
+from trihedron.diagnose.effects.contract import (
+    ACCELEROMETER,
+    GYRO,
+    SENSORS,
+    Effect,
+    Variant,
+    on_axes,
+    per_axis,
+    per_axis_parameters,
+)
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words, why_not
+from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
+from trihedron.session.noise import FEWEST_POSES
 
-FEWEST_POSES = 6
-"""Fewer poses do not separate two processes on three axes."""
+MOST_M_S2, MOST_RAD_S = 0.6, 0.09
+"""Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
+indicates a disturbed pose."""
+COSINES = (1, 2, 3, 4)
+"""Half periods of a slow curve in the session: as many bends as a fit of S and b leaves to twenty poses."""
 
 
 class BiasProcess(Effect):
-    """A bias random walk or scatter beyond what the part's noise explains (:mod:`diagnose.bias_strengths`)."""
+    """Random changes of a bias: a strength of the session's noise beyond what the part explains
+    (:mod:`diagnose.bias_strengths`), not columns of the readings."""
 
     sensor: ClassVar[int]
     """0 accelerometer, 1 gyro."""
@@ -36,7 +53,91 @@ class BiasProcess(Effect):
         """Parameters and sentence for the size along every axis, SI (3,), with standard uncertainties."""
 
 
-def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
-    """One parameter per axis."""
-    named = zip(AXES, size, std, strict=True)
-    return tuple(EffectParameter(f"{symbol}_{axis}", float(v), float(s), unit) for axis, v, s in named)
+class BiasDrift(BiasProcess):
+    """Warm-up exponential, straight line or slow curve per axis, or a walk stronger than the part's noise explains."""
+
+    walks = True
+    typical: ClassVar[float]
+    """Bias change of typical parts, SI."""
+
+    def variants(self, context: Context) -> list[Variant]:
+        """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
+        x = context.elapsed[:, None]
+        out = [self._along(context, [x - 0.5], per_axis("drift"), "line")]
+        out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
+        names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
+        out.append(self._along(context, [np.cos(np.pi * x * k) for k in COSINES], names, "curve"))
+        return out
+
+    def _warm_up(self, context: Context, tau_s: float) -> Variant:
+        """An exponential with one time constant; its parameters are the bias per axis at the first sample."""
+        tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * _duration_s(context))
+        fades = np.exp(-(context.time_s - context.obs.time_s[0]) / tau_s)[:, None]
+        return self._along(context, [fades], per_axis("warm_up"), "warm-up", {"time_constant": (tau_s, "s")})
+
+    def _along(
+        self, context: Context, curves: list[FloatArray], names: tuple[str, ...], label: str,
+        shape: dict[str, tuple[float, str]] | None = None,
+    ) -> Variant:  # fmt: skip
+        columns = on_axes(context, self.sensor, *curves)
+        return Variant(columns, names, (self.unit,) * len(names), shape or {}, label)
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
+        return np.full(variant.distortion.n_parameters, self.typical)
+
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
+        return self._warm_up(context, value) if variant.label == "warm-up" else None
+
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        """Whether the peak-to-peak range of the curve is at most that of a part's bias."""
+        for side, most in ((variant.distortion.force, MOST_M_S2), (variant.distortion.rate, MOST_RAD_S)):
+            if side is not None:
+                # Contiguous per axis: ptp over rows of three takes ten times as long.
+                drift = np.ascontiguousarray((side.reshape(-1, len(value)) @ value).reshape(len(side), 3).T)
+                if float(np.ptp(drift, axis=1).max(initial=0.0)) > most:
+                    return False
+        return True
+
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        return per_axis_parameters("range", size, std, self.unit), self.reported("walk", range=size)
+
+
+class AccelBiasDrift(BiasDrift):
+    """Accelerometer bias drift: seen in the norm of gravity from pose to pose."""
+
+    id, sensor = "accel-bias-drift", ACCELEROMETER
+    confounded_with = ("accel-bias",)
+    typical = TYPICAL[0]
+
+
+class GyroBiasDrift(BiasDrift):
+    """Gyro bias drift: seen in the static rates from pose to pose."""
+
+    id, sensor = "gyro-bias-drift", GYRO
+    confounded_with = ("gyro-bias",)
+    typical = TYPICAL[1]
+
+
+def _duration_s(context: Context) -> float:
+    return float(context.obs.time_s[-1] - context.obs.time_s[0])
+
+
+class GyroBiasRepeatability(BiasProcess):
+    """The bias of every axis is drawn anew in every pose, beyond noise and drift."""
+
+    is_spread = True
+    id, sensor, walks = "gyro-bias-repeatability", GYRO, False
+
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        return per_axis_parameters("sigma", size, std, self.unit), self.reported("scatter", sigma=size)
+
+
+class AccelBiasRepeatability(BiasProcess):
+    """Bias drawn anew in every pose, one sigma for all axes: the norm of gravity does not separate the axes."""
+
+    is_spread = True
+    id, sensor, walks = "accel-bias-repeatability", ACCELEROMETER, False
+
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        sigma, error = float((size**2).mean() ** 0.5), float((std**2).mean() ** 0.5)
+        return (EffectParameter("sigma", sigma, error, self.unit),), self.reported("scatter", sigma=sigma)

@@ -3,6 +3,8 @@
 To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
 """
 
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -10,9 +12,11 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.state import Distortion
+from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.solve import Distortion
+from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.domains import Domain
+from trihedron.records.domains import Domain, HeldOut, Where
 from trihedron.records.words import Words, effect_words, experiment_for, why_not
 
 
@@ -30,6 +34,12 @@ LEAST_RMS = 1e-12
 """Smallest rms of a column, so that a column of zeros does not divide by zero."""
 ACCELEROMETER, GYRO = 0, 1
 SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
+NOWHERE = Where()
+MIN_FALL = 15.0
+"""Chi-square that a correction of the readings (samples inserted, poses cut) must gain: it allows for the search over
+place and size."""
+MOST_NAMED = 4
+"""Places of one kind that a sentence names: more do not fit a line."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 
@@ -151,9 +161,58 @@ class Effect:
         return experiment_for(self.id) or self.experiment
 
 
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Result of a direct test.
+
+    ``p_value`` is not corrected for the number of effects tested; ``held_out`` compares before and after on data that
+    the parameters were not fitted to; ``reweigh`` changes the observations (noise, excluded moves), or is None;
+    ``strength`` is the gain in twice a log-likelihood, for ranking.
+    ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: these moves must improve.
+    ``share`` is the share of its domain's misfit that it explains, for effects that do not show in poses and moves.
+    ``statement`` is the catalogue's (:meth:`Effect.reported`), or that of a user's own effect.
+    ``restate`` gives the parameters again from the session fitted with ``reweigh`` applied.
+    """
+
+    p_value: float
+    strength: float
+    parameters: tuple[EffectParameter, ...]
+    statement: str
+    domain: Domain
+    where: Where = NOWHERE
+    held_out: tuple[HeldOut, ...] = ()
+    reweigh: Callable[[Observations], Observations] | None = None
+    restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
+    share: float | None = None
+    touched: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Keep the p-value where its logarithm exists."""
+        object.__setattr__(self, "p_value", min(max(float(self.p_value), LEAST_P), 1.0))
+
+
+class DirectEffect(Effect):
+    """An effect detected by a test on the samples, with evidence of its own, not by columns over poses."""
+
+    is_sought_again: ClassVar[bool] = False
+    """Whether the test is repeated after the search: another effect may have hidden it or been mistaken for it."""
+    is_proof: ClassVar[bool] = False
+    """Whether the samples alone prove it (a range limit); otherwise its correction must improve held-out moves."""
+
+    @abstractmethod
+    def find(self, context: Context) -> Evidence | None:
+        """The evidence for the effect in this recording, or ``None``."""
+
+
 def per_axis(symbol: str) -> tuple[str, ...]:
     """Names of one parameter per axis."""
     return tuple(f"{symbol}_{axis}" for axis in AXES)
+
+
+def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
+    """One parameter per axis, from sizes (3,) and their standard uncertainties (3,)."""
+    named = zip(per_axis(symbol), size, std, strict=True)
+    return tuple(EffectParameter(name, float(v), float(s), unit) for name, v, s in named)
 
 
 def force_only(columns: FloatArray) -> Distortion:

@@ -6,9 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.effects.contract import (
+    MIN_FALL,
+    MOST_NAMED,
+    DirectEffect,
+    Evidence,
+    Variant,
+    force_only,
+    per_axis,
+)
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
@@ -19,11 +26,8 @@ from trihedron.session.model import STATIC_ACCEL
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
-
-
-MIN_GAIN = 15.0
-"""Held-out chi-square that cutting the disturbances must gain in one domain; the largest share that may remain."""
 MUST_FALL = 0.9
+"""Largest share of a domain's held-out chi-square per row that may remain after cutting the disturbances."""
 OWN_SIGMA = 4.0
 """Deviation of a pose's own readings, in sigma, from which a disturbance of it is considered."""
 BUMP_SIGMA = 7.0
@@ -35,8 +39,6 @@ SHAKES_P = 1e-6
 healthy sessions stay above 0.02, and real noise is not as white."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
-MOST_NAMED = 4
-"""Poses of each kind that the sentence names."""
 LEAST_DOF = 0.1
 """Smallest degrees of freedom of a pose: where the fit uses up its rows, rounding errors are no deviation."""
 
@@ -82,14 +84,13 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     fits = (fit(whole, start, context.fitted.prior), context.fitted)
     before, after = (predict_held_out(one, folds_of(one)) for one in fits)
     gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
-    if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
+    if gain.max() < MIN_FALL or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
         return ()
-    rms_before, unit = physical_rms(fits[0], before.residual)
-    rms_after, _ = physical_rms(fits[1], after.residual)
+    was, now = physical_rms(fits[0], before.residual), physical_rms(fits[1], after.residual)
     return tuple(
-        HeldOut(ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), rms_before[d], rms_after[d], unit[d])
+        HeldOut(ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), was[d], now[d], ROW_UNITS[d])
         for d in np.argsort(-gain)
-        if d in rms_before and d in rms_after
+        if d in was and d in now
     )
 
 

@@ -1,4 +1,4 @@
-"""The accelerometer triad is away from the centre of rotation."""
+"""Places of the accelerometers: the triad away from the centre of rotation, or its axes apart (size effect)."""
 
 from dataclasses import dataclass, replace
 
@@ -9,9 +9,8 @@ from scipy.special import fdtrc
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.plateaus import clipped_samples
-from trihedron.records.diagnosis import EffectParameter
+from trihedron.diagnose.effects.contract import DirectEffect, Effect, Evidence, Variant, force_only, per_axis_parameters
+from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
 
@@ -30,8 +29,9 @@ N_SHAPES = 24
 """Polynomials of time per move. The travel of a hand is made of slow ones: of five simulated hands with arms of 2 to
 3 cm none is detected at 1e-5 with equal weights of the samples, one with 10 polynomials, three with 24."""
 SAMPLES_PER_SHAPE = 3
-"""Readings per polynomial in a short move (the 20 % quantile of the lengths)."""
+"""Readings per polynomial in a short move."""
 SHORT = 0.2
+"""Quantile of the lengths that is a short move: a fifth of the moves may be shorter, with fewer readings."""
 FEWEST_PER_SHAPE = 2
 """Readings per polynomial below which a move is excluded: its polynomials are not independent."""
 SHRUNK = (0.02, 100.0)
@@ -79,9 +79,7 @@ class LeverArm(DirectEffect):
         noise = float(np.sqrt((context.noise_floor[0] ** 2).mean()))
         held = HeldOut("dynamics", (before_rms / noise) ** 2, (after_rms / noise) ** 2, before_rms, after_rms, "m/s^2")
         arm, sigma = found.by.value[:N_ARM], np.sqrt(np.diag(found.covariance))
-        parameters = tuple(
-            EffectParameter(f"r_{axis}", float(v), float(s), "m") for axis, v, s in zip(AXES, arm, sigma, strict=True)
-        )
+        parameters = per_axis_parameters("r", arm, sigma, "m")
         statement = self.reported("arm", arm_m=float(np.linalg.norm(arm)), share=share)
         strength = float(len(moves.target) * np.log(before / after))
         return Evidence(p_value, strength, parameters, statement, "dynamics", Where(("ax", "ay", "az")), (held,))
@@ -215,3 +213,27 @@ def _cross(v: FloatArray) -> FloatArray:
 def _smooth(x: FloatArray, width: int) -> FloatArray:
     """Running mean, applied alike to both sides of the comparison, so that differences are less noisy."""
     return x if len(x) < width else np.asarray(uniform_filter1d(x, width, axis=0, mode="nearest"))
+
+
+class AccelSizeEffect(Effect):
+    """Accelerometers Y and Z displaced from accelerometer X: each reads its own α×r + ω×(ω×r)."""
+
+    id = "accel-size-effect"
+    needs_moves = True
+    applies_elsewhere = True
+    size = 5e-3
+    """m: distance between dies in one package."""
+
+    def variants(self, context: Context) -> list[Variant]:
+        w, a = context.rate, context.angular_acceleration
+        axes, to_axes = context.accel_axes, np.linalg.inv(context.accel_axes)
+        square = np.sum(w**2, axis=1)[:, None]
+        sides = []
+        for j in (1, 2):
+            n = to_axes[j]
+            # n · (α × r + ω × (ω × r)) as a row vector that multiplies r.
+            along = np.cross(n, a) + (w @ n)[:, None] * w - square * n
+            sides.append(axes[:, j, None] * along[:, None, :])
+        columns = np.concatenate(sides, axis=2)
+        names = tuple(f"r{j + 1}{axis}-r1{axis}" for j in (1, 2) for axis in AXES)
+        return [Variant(force_only(columns), names, ("m",) * 6)]

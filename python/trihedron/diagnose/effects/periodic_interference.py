@@ -3,8 +3,7 @@
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import SENSORS
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import SENSORS, DirectEffect, Evidence
 from trihedron.diagnose.residuals.within_poses import find_lines
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter

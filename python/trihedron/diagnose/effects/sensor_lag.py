@@ -1,4 +1,4 @@
-"""A low-pass of first or second order in one of the sensors, to all orders that a recording can determine.
+"""A delay between the sensors, or a low-pass of one of them, to all orders that a recording can determine.
 
 A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass of first order
 x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All begin with τ y'; the next term separates
@@ -78,3 +78,27 @@ def _second_order(context: Context, sensor: int, time_s: float, label: str) -> V
     column = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
     distortion = (rate_only if sensor else force_only)(column[:, :, None])
     return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s, is_family=True)
+
+
+class AccelGyroTimeOffset(Effect):
+    """Accelerometer readings belong to an earlier instant: the reading at t is f(t − δ); at δ < 0 the gyro is late."""
+
+    id = "accel-gyro-time-offset"
+    needs_moves = True
+    size = 0.015
+    """s: one or two samples of a slow log, or the delay of a filter."""
+
+    def variants(self, context: Context) -> list[Variant]:
+        return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]
+
+    def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
+        return _offset(context, variant.scale * float(value[0]), variant.label)
+
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        return is_near_one(value, covariance) and value[0] > 0.0
+
+
+def _offset(context: Context, delay_s: float, label: str) -> Variant:
+    """What a delay adds to readings: y(t) - y(t + δ)."""
+    column = context.force - context.shifted(context.force, delay_s)
+    return Variant(force_only(column[:, :, None]), ("accelerometer_delay",), ("s",), label=label, scale=delay_s)

@@ -7,7 +7,7 @@ from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.records.words import why_not

@@ -8,8 +8,8 @@ from scipy.special import ndtr
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.plateaus import HALF_WINDOW, clipped_samples
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence
+from trihedron.diagnose.effects.saturation import HALF_WINDOW, clipped_samples
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records.diagnosis import EffectParameter

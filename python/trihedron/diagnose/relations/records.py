@@ -1,5 +1,7 @@
 """Empirical relations as the records that reports and files show."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
@@ -8,7 +10,6 @@ from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import NOT_TURNED, WORLD_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
-from trihedron.records.domains import HeldOut
 from trihedron.records.words import relation_experiment, relation_resembles, words
 
 OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -24,19 +25,15 @@ def records(found: Related) -> tuple[Relation, ...]:
     for k, (one, before, after) in enumerate(zip(found.relations, found.steps, models, strict=True)):
         value, covariance = found.model.value(first + k)
         held = next((h for h in held_out_records(before, after) if h.domain == one.domain), None)
-        is_world = one.signal.family == "world"
-        out.append(_of_world_vector(value, covariance, held) if is_world else _of_signal(one, value, covariance, held))
+        # Share of the held-out sum of squares of its domain that the relation removes.
+        left = 1.0 if held is None or not held.rms_before > 0.0 else held.rms_after / held.rms_before
+        share = float(np.clip(1.0 - left**2, 0.0, 1.0))
+        made = _of_world_vector if one.signal.family == "world" else _of_signal
+        out.append(replace(made(one, value, covariance, share), held_out=held))
     return tuple(sorted(out, key=lambda relation: -relation.share))
 
 
-def _share(held: HeldOut | None) -> float:
-    """Share of the held-out sum of squares of a domain that the relation removes."""
-    if held is None or not held.rms_before > 0.0:
-        return 0.0
-    return float(np.clip(1.0 - (held.rms_after / held.rms_before) ** 2, 0.0, 1.0))
-
-
-def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
+def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
     signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
     # The column of poses without a known previous rotation is no coefficient of the relation.
     told = [k for k, name in enumerate(signal.names) if name != NOT_TURNED]
@@ -54,18 +51,18 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, held: He
             for i, axis in enumerate(axes)
             for j, name in enumerate(names)
         ),
-        share=_share(held),
-        held_out=held,
+        share=share,
+        held_out=None,
         resembles=relation_resembles(signal.family),
         experiment=relation_experiment(signal.family),
         statement=words(
             "relation-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
-            is_static=not signal.is_motion, axes=axes, depends=names, share=_share(held),
+            is_static=not signal.is_motion, axes=axes, depends=names, share=share,
         ),
     )  # fmt: skip
 
 
-def _of_world_vector(value: FloatArray, covariance: FloatArray, held: HeldOut | None) -> Relation:
+def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
     """``bias = K Rᵀ m``: the coefficients are the products of K with the one vector m along the level axes."""
     coupling, inclination = _coupling(value.reshape(9, 3))
     rng = np.random.default_rng(0)
@@ -74,7 +71,6 @@ def _of_world_vector(value: FloatArray, covariance: FloatArray, held: HeldOut | 
     spread = float(np.std([angle for _, angle in drawn]))
     away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
     family = "earth" if away < WORLD_SIGMAS else "world"
-    share = _share(held)
     return Relation(
         sensor="gyroscope",
         depends_on=(WORLD_VECTOR,),
@@ -82,13 +78,12 @@ def _of_world_vector(value: FloatArray, covariance: FloatArray, held: HeldOut | 
         coefficients=(
             *(
                 EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
-                for i in range(3)
-                for j in range(3)
+                for i, j in np.ndindex(3, 3)
             ),
             EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"),
         ),
         share=share,
-        held_out=held,
+        held_out=None,
         resembles=relation_resembles(family),
         experiment=relation_experiment(family),
         statement=words(

@@ -115,8 +115,8 @@ def _by_evidence(model: Hypothesis, known: Collection[Name]) -> Iterator[Follows
 
 def _by_levels(context: Context, known: Collection[Name]) -> Iterator[Follows]:
     """Every random telegraph signal, which has a score of its own."""
-    for one in telegraphs(context):
-        found = replace(_follows(context, one.signal, (one.axis,)), score=one.score)
+    for signal, axis, score in telegraphs(context):
+        found = replace(_follows(context, signal, (axis,)), score=score)
         if found.name not in known:
             yield found
 

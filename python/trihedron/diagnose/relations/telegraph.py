@@ -6,7 +6,7 @@ they have.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
@@ -48,41 +48,23 @@ ROUNDING = 1e-9
 """Relative gain below which a change of one state is none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Telegraph:
-    """Path of the signal of one ``axis``, and its ``score``: twice the log-likelihood that it gains over biases that
-    scatter and drift, less the penalty of the choice among axes."""
+def telegraphs(context: Context) -> Iterator[tuple[Signal, int, float]]:
+    """The likeliest path on each axis of each sensor that has both levels, that axis, and its score: twice the
+    log-likelihood that it gains over biases that scatter and drift, less the penalty of the choice among axes.
 
-    signal: Signal
-    axis: int
-    score: float
-
-
-def telegraphs(context: Context) -> list[Telegraph]:
-    """The likeliest path on each axis of each sensor that has both levels.
-
-    Its score is that of the poses alone: in moves it switches at times that no column tells.
+    The score is that of the poses alone: in moves the signal switches at times that no column tells.
     """
     inside = _inside_poses(context.obs)
-    sensors: list[tuple[int, Sensor]] = [(0, "accelerometer")]
-    if context.obs.raw_rate is not None:
-        sensors.append((1, "gyroscope"))
-    out = []
-    for number, sensor in sensors:
+    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+    sensors = sensors[: 1 if context.obs.raw_rate is None else 2]
+    for number, sensor in enumerate(sensors):
         for axis in range(3):
             levels = _levels(context, number, axis, inside[number][axis])
             if levels is not None:
-                state = context.between_poses(levels.state - levels.state.mean())
-                signal = Signal(sensor, TELEGRAPH, ("a random telegraph signal",), state[:, None], ("1",))
-                out.append(Telegraph(signal, axis, 2.0 * (levels.gain - float(np.log(3 * len(sensors))))))
-    return out
-
-
-class _Levels(NamedTuple):
-    """State in every pose, between -1 and 1, and what it gains in log-likelihood."""
-
-    state: FloatArray
-    gain: float
+                state, gain = levels
+                column = context.between_poses(state - state.mean())[:, None]
+                signal = Signal(sensor, TELEGRAPH, ("a random telegraph signal",), column, ("1",))
+                yield signal, axis, 2.0 * (gain - float(np.log(3 * len(sensors))))
 
 
 class _Inside(NamedTuple):
@@ -94,7 +76,8 @@ class _Inside(NamedTuple):
     gain: float
 
 
-def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> _Levels | None:
+def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> tuple[FloatArray, float] | None:
+    """State in every pose, between -1 and 1, and what it gains in log-likelihood; ``None`` with one level."""
     error, up = _static_errors(context, sensor), context.fitted.state.up
     if sensor:
         reading, seen = error @ np.linalg.inv(context.gyro_axes)[axis], np.ones(len(error))
@@ -112,7 +95,7 @@ def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> _Level
     time, dof = context.time_s[: len(error)], float(np.trace(rest))
     levels = np.column_stack([known, seen * state])
     gain += _likelihood(reading, levels, time, dof) - _likelihood(reading, known, time, dof)
-    return _Levels(state, gain - 0.5 * float(np.log(len(error))))
+    return state, gain - 0.5 * float(np.log(len(error)))
 
 
 def _static_errors(context: Context, sensor: int) -> FloatArray:

@@ -16,6 +16,8 @@ from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel", STATIC_GYRO: "static-gyro", MOVES: "moves", DYNAMICS: "dynamics"
 }  # fmt: skip
+ROW_UNITS = {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
+"""Units of :func:`physical_rms`."""
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 N_DOMAINS_TESTED = float(len(DOMAINS))
 """Four domains of poses and moves, two of samples: they share the false-alarm rate."""
@@ -33,7 +35,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     ``alpha`` is the chance that a healthy recording disagrees in any domain; six domains share it.
     """
     used, share = fitted.leverage, alpha / N_DOMAINS_TESTED
-    physical, rms_unit = physical_rms(fitted)
+    physical = physical_rms(fitted)
     tests = []
     for label, name in ROW_DOMAINS.items():
         rows = fitted.system.domain == label
@@ -53,8 +55,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
             if ratio is not None:
                 p, disagrees, where = 0.0, True, Where(_CHANNELS[label])
                 per_dof, limit = max(per_dof, ratio), None
-        rms, unit = physical.get(label, 0.0), rms_unit.get(label, "")
-        tests.append(DomainTest(name, per_dof, dof, p, disagrees, where, rms, unit, limit))
+        tests.append(DomainTest(name, per_dof, dof, p, disagrees, where, physical[label], ROW_UNITS[label], limit))
     return tuple(tests)
 
 
@@ -101,18 +102,15 @@ class HiddenBias:
 def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
     """Accelerometer, gyro: biases of the poses about their session mean, as the random walk absorbed them."""
     state, obs = fitted.state, fitted.obs
-    edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.core.strengths[0]]
 
-    def of(bias: FloatArray, noise: FloatArray, is_at_edge: bool) -> HiddenBias:
-        rms = float(np.sqrt(np.mean((bias - bias.mean(axis=0)) ** 2)))
-        return HiddenBias(rms, float(np.median(noise)), bool(is_at_edge))
+    def of(sensor: int, noise: FloatArray) -> HiddenBias:
+        bias, corner = fitted.bias(sensor), fitted.core.strengths[0][sensor]
+        return HiddenBias(
+            rms_of(bias - bias.mean(axis=0)), float(np.median(noise)), bool(corner <= AT_END * NOISE_CORNER_S)
+        )
 
-    accel = of(state.accel_bias, obs.norm_sigma(state.up @ state.accel_S), edge[0])
-    if obs.pose_rate_sigma is None:
-        return accel, None
-    return accel, of(
-        state.gyro_bias, obs.pose_rate_sigma / np.linalg.norm(np.linalg.inv(state.gyro_S), axis=1), edge[1]
-    )
+    accel, of_rate = of(0, obs.norm_sigma(state.up @ state.accel_S)), obs.pose_rate_sigma
+    return accel, None if of_rate is None else of(1, of_rate / np.linalg.norm(np.linalg.inv(state.gyro_S), axis=1))
 
 
 def locate(fitted: Fit, label: int) -> Where:
@@ -135,7 +133,7 @@ def locate(fitted: Fit, label: int) -> Where:
     return Where(channels, obs.pose_names(heavy) if is_pose else obs.move_names(heavy), tuple(spans))
 
 
-def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[dict[int, float], dict[int, str]]:
+def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> dict[int, float]:
     """Rms of each row domain in physical units: norm error of poses, static rate, degrees after moves, velocity.
 
     ``rows_residual`` replaces the fit's own whitened residuals, e.g. by held-out ones.
@@ -145,16 +143,18 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
     direct, state = system.walk == 0, fitted.state
 
     def errors(domains: tuple[int, ...], white: FloatArray) -> FloatArray:
+        """(n, k) errors in SI, by the matrices ``white`` (n, k, k) from these to whitened rows."""
         rows = np.flatnonzero(np.isin(system.domain, domains) & direct)
         return np.asarray(np.linalg.solve(white, r[rows].reshape(len(white), -1, 1))[:, :, 0])
 
-    error = errors((STATIC_ACCEL,), fitted.accel_white)
+    error = errors((STATIC_ACCEL,), fitted.obs.core_poses().force_white() @ np.linalg.inv(state.accel_S))
     out = {STATIC_ACCEL: rms_of(np.einsum("ni,ni->n", error, state.up))}
-    if fitted.gyro_white is not None:
-        out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), fitted.gyro_white))
+    sigma = fitted.obs.pose_rate_sigma
+    if sigma is not None:
+        out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), np.linalg.inv(state.gyro_S) / sigma[:, :, None]))
     if fitted.obs.n_moves:
         # Of a move, in order: gravity after it (2), velocity over it (3).
         error = errors((MOVES, DYNAMICS), fitted.core.whitening())
         out[MOVES] = float(np.degrees(np.sqrt(np.mean((error[:, :2] ** 2).sum(axis=1) / state.gravity**2))))
         out[DYNAMICS] = rms_of(error[:, 2:])
-    return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
+    return out

@@ -8,9 +8,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
+from trihedron.session.noise import FEWEST_POSES
 
-FEWEST_POSES = 6
-"""Poses below which settling is not estimated."""
 N_BLOCKS = 6
 """Parts of a pose whose means separate a rate that decays from a constant one."""
 SETTLES_S = (0.7, 1.4, 2.8, 5.6)
@@ -23,20 +22,13 @@ CONTRASTS = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:,
 
 @dataclass(frozen=True)
 class Settling:
-    """Gain in twice the log-likelihood of static rates by scatter alone, and by settling with it.
-
-    ``rate_rad_s`` is the standard deviation of the settling rate at the start of poses, ``tau_s`` its time constant.
+    """``score``: twice the log-likelihood that settling gains beside scatter, less the cost of the time constants
+    tried; ``rate_rad_s``: standard deviation of the settling rate at the start of poses, ``tau_s`` its time constant.
     """
 
-    scatter: float
-    both: float
+    score: float
     rate_rad_s: float = 0.0
     tau_s: float = SETTLES_S[0]
-
-    @property
-    def score(self) -> float:
-        """Twice the log-likelihood that settling gains beside scatter, less the cost of the time constants tried."""
-        return self.both - self.scatter - 2.0 * math.log(len(SETTLES_S))
 
 
 def settling(context: Context) -> Settling:
@@ -47,10 +39,9 @@ def settling(context: Context) -> Settling:
     """
     directions = _directions(context)
     if directions is None:
-        return Settling(0.0, 0.0)
+        return Settling(0.0)
     tables = [_table(directions, tau) for tau in SETTLES_S]
     scale = tables[0].unit
-    none = tables[0].log_likelihood(np.zeros(1), np.zeros(1))[0]
     scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
     a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
     both = []
@@ -59,7 +50,7 @@ def settling(context: Context) -> Settling:
         best = int(values.argmax())
         both.append((float(values[best]), float(np.sqrt(b[best])), tau))
     most, rate, tau = max(both)
-    return Settling(2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
+    return Settling(2.0 * (most - scatter - math.log(len(SETTLES_S))), rate, tau)
 
 
 def with_settling(context: Context, found: Settling) -> Observations:

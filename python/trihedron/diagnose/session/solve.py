@@ -12,7 +12,6 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.state import NO_DISTORTION, Distortion
 from trihedron.session.model import (
     DYNAMICS,
     MOVES,
@@ -28,6 +27,44 @@ from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds, Strengt
 
 FOLDS = 8
 """Blocks of poses, and of moves, that are held out in turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """What effects add to the corrected readings, linear in their parameters: SI, body frame.
+
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of ``Trajectory`` (poses, then move samples).
+    """
+
+    force: FloatArray | None
+    rate: FloatArray | None
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of effect parameters."""
+        given = self.force if self.force is not None else self.rate
+        return 0 if given is None else int(given.shape[2])
+
+
+NO_DISTORTION = Distortion(None, None)
+
+
+def stacked(parts: list[Distortion]) -> Distortion:
+    """Several distortions side by side."""
+    parts = [p for p in parts if p.n_parameters]
+    if len(parts) < 2:
+        return parts[0] if parts else NO_DISTORTION
+
+    def side(name: str) -> FloatArray | None:
+        given = [getattr(p, name) for p in parts]
+        present = next((g for g in given if g is not None), None)
+        if present is None:
+            return None
+        shape = present.shape[:2]
+        blocks = [np.zeros((*shape, p.n_parameters)) if g is None else g for p, g in zip(parts, given, strict=True)]
+        return np.concatenate(blocks, axis=2)
+
+    return Distortion(side("force"), side("rate"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +134,6 @@ class Fit:
         mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
         return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
-    @property
-    def accel_white(self) -> FloatArray:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static accelerometer reading."""
-        return self.obs.core_poses().force_white() @ np.linalg.inv(self.state.accel_S)
-
-    @property
-    def gyro_white(self) -> FloatArray | None:
-        """(poses, 3, 3) matrix from an error in SI to the whitened rows of a static rate; ``None`` without a gyro."""
-        sigma = self.obs.pose_rate_sigma
-        return None if sigma is None else np.linalg.inv(self.state.gyro_S) / sigma[:, :, None]
-
     def bias(self, sensor: int) -> FloatArray:
         """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
         return (self.state.accel_bias, self.state.gyro_bias)[sensor]
@@ -167,11 +193,6 @@ def tune_noise(obs: Observations, start: SessionState, prior: Prior | None) -> F
 def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
     """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
     return np.asarray(obs.model(state.gravity, None).move_residuals(core_state(state)))
-
-
-def wrt_lost_time(obs: Observations, state: SessionState, m: int) -> FloatArray:
-    """(samples, 5) derivatives of the residuals after move m by time [s] lost at each of its samples."""
-    return obs.model(state.gravity, None).wrt_lost_time(core_state(state), m)
 
 
 @dataclass(frozen=True, eq=False)

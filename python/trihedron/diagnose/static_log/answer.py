@@ -10,7 +10,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, per_axis_parameters
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
@@ -203,20 +203,13 @@ def _thermal(side: _Side, curve: Curve, n_effects: int) -> AcceptedEffect:
     size, unit = side.size, side.unit
     units = {"bias_per_kelvin": f"{unit}/K", "bias_per_kelvin2": f"{unit}/K^2", "bias_per_kelvin3": f"{unit}/K^3",
              "bias_per_kelvin_per_s": f"{unit}/(K/s)", "half_gap": unit}  # fmt: skip
-    parameters = [
-        EffectParameter(
-            f"{name}_{axis}", float(curve.value[k, j] * size[k]), float(curve.std[k, j] * size[k]), units[name]
-        )
-        for j, name in enumerate(curve.names)
-        for k, axis in enumerate(AXES)
-    ]
+    parameters: list[EffectParameter] = []
+    for name, value, std in zip(curve.names, curve.value.T, curve.std.T, strict=True):
+        parameters += per_axis_parameters(name, value * size, std * size, units[name])
     raw, rest = side.biases, curve.rest * size
     gap = branch_gap(side.pieces, rest)
     if gap is not None:
-        parameters += [
-            EffectParameter(f"branch_difference_{axis}", float(g), float(s), unit)
-            for axis, g, s in zip(AXES, *gap, strict=True)
-        ]
+        parameters += per_axis_parameters("branch_difference", *gap, unit)
     effect_id, is_accelerometer = side.id("thermal-bias"), side.sensor == ACCELEROMETER
     order, heat = sum(name in POWERS for name in curve.names), side.pieces.temperature
     assert heat is not None
@@ -265,13 +258,10 @@ def _drifting(side: _Side, curve: DriftCurve, p: float, n_effects: int) -> Accep
     whole = float(side.biases.var(axis=0).sum())
     series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
               "sigma": (curve.sigma * size[:, None]).tolist(), "unit": side.unit}  # fmt: skip
-    parameters = [
-        EffectParameter(f"range_{axis}", float(r), e * float(s), side.unit)
-        for axis, r, e, s in zip(AXES, spans, errors, size, strict=True)
-    ]
     return AcceptedEffect(
         id=side.id("bias-drift"), statement=effect_words(side.id("bias-drift"), side.case, range=spans),
-        parameters=tuple(parameters), p_adjusted=float(min(1.0, p * n_effects)),
+        parameters=per_axis_parameters("range", spans, np.array(errors) * size, side.unit),
+        p_adjusted=float(min(1.0, p * n_effects)),
         delta_bic=float(max(-2.0 * np.log(p), 0.0)), held_out=(), separating_experiment="",
         model=_model("static-drift", series),
         share=float(np.clip(((curve.rms * size) ** 2).sum() / whole, 0.0, 1.0)),
@@ -294,9 +284,8 @@ def _lines(
     samples = cast(Observations, _Samples(recording, t, np.hstack(quick), SimpleNamespace(poses=poses)))
     test = judge_within_poses(samples, alpha)
     state = SimpleNamespace(accel_S=_matrix(model, ACCELEROMETER), gyro_S=_matrix(model, GYRO))
-    fitted = cast(Fit, SimpleNamespace(state=state))
     effect = PeriodicInterference()
-    found = effect.find(Context(samples, fitted))
+    found = effect.find(Context(cast(Fit, SimpleNamespace(obs=samples, state=state))))
     if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
         return test, None
     return test, AcceptedEffect(

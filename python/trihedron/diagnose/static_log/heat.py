@@ -92,9 +92,10 @@ LEAST_SWING_K = 0.5
 """A logged temperature that changes by less is not used."""
 MIN_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence, as among poses."""
-FOLDS = 12
-TEMPERATURE_BINS, FEWEST_BINS = 12, 3
-"""Bins of temperature, and the least number passed both while heating and cooling for a difference of branches."""
+FOLDS = TEMPERATURE_BINS = 12
+"""Blocks of time held out in turn, and bins of temperature: the shortest log has two pieces in each."""
+FEWEST_BINS = 3
+"""Bins passed both while heating and cooling that give a difference of branches its scatter."""
 POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
 """Terms that are powers of the temperature."""
 

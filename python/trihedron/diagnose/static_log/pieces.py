@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.diagnose.context import TEMPERATURE_WINDOW_S
-from trihedron.diagnose.session.state import smoothed_slope
+from trihedron.diagnose.context import TEMPERATURE_WINDOW_S, smoothed_slope
 from trihedron.diagnose.static_log.process import BiasReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
@@ -15,6 +14,7 @@ from trihedron.records.channel_facts import ChannelFacts
 N_PIECES = 80
 """Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and fast."""
 FEWEST_PIECES = 24
+"""Two for each bin of temperature and each block that is held out (:mod:`heat`)."""
 FEWEST_SAMPLES = 8
 """Samples of half a piece from which the standard error of its mean is known."""
 QUIET_QUANTILE, LOUD = 0.2, 4.0

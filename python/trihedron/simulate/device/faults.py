@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import random
 from dataclasses import dataclass, field
+from typing import Any
 
 from trihedron.errors import InputError
 
 KINDS = ("missing", "cut", "flipped", "garbage", "byte_lost", "byte_doubled", "twice")
+SIZED = {**{kind: kind for kind in KINDS}, "drift": "drift_ppm", "away": "away_s"}
+"""Faults with one size, by their fields."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def parse_faults(text: str) -> Faults:
 
     Raises ``InputError`` when a fault is unknown or its size is not a number.
     """
-    chosen: dict[str, float | bool | tuple[float, ...]] = {}
+    chosen: dict[str, Any] = {}
     for part in (piece.strip() for piece in text.split(",") if piece.strip()):
         key, equals, value = part.partition("=")
         key = key.strip().replace("-", "_")
@@ -64,23 +67,17 @@ def parse_faults(text: str) -> Faults:
             chosen.update(dict.fromkeys(KINDS, _size(part, part)))
             continue
         if key == "disconnect":
-            chosen["disconnect_s"] = (*_tuple(chosen.get("disconnect_s")), _size(value, part))
-        elif key in ("drift", "away"):
-            chosen[f"{key}_ppm" if key == "drift" else "away_s"] = _size(value, part)
-        elif key in KINDS:
-            chosen[key] = _size(value, part)
+            chosen["disconnect_s"] = (*chosen.get("disconnect_s", ()), _size(value, part))
+        elif key in SIZED:
+            chosen[SIZED[key]] = _size(value, part)
         else:
             known = ", ".join((*KINDS, "drift", "disconnect", "away", "text"))
             raise InputError(f"--faults: there is no fault '{key}'; there are {known}.")
-    made = Faults(**chosen)  # type: ignore[arg-type]
+    made = Faults(**chosen)
     for kind in KINDS:
         if not 0.0 <= getattr(made, kind) < 1.0:
             raise InputError(f"--faults: {kind} is a chance per frame, between 0 and 100 %.")
     return made
-
-
-def _tuple(value: object) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else ()
 
 
 def _size(text: str, whole: str) -> float:

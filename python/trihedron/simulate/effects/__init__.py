@@ -4,18 +4,19 @@
 """
 
 import inspect
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, Literal
 
 from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.effects import experiment, found, sensor
-from trihedron.simulate.effects.found import Found
+from trihedron.simulate.effects.found import Found, Size
 from trihedron.simulate.effects.sizes import Change
 from trihedron.simulate.effects.truth import effects_of
 from trihedron.simulate.scenario import Scenario
 
-__all__ = ["EFFECT_IDS", "effects_of", "with_effect"]
+__all__ = ["EFFECT_IDS", "diagnosed_sizes", "effects_of", "with_effect"]
 
 A: Literal["accelerometer"]
 G: Literal["gyroscope"]
@@ -80,3 +81,28 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
         return change(scenario, **size)
     except TypeError as error:
         raise InputError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None
+
+
+def diagnosed_sizes(
+    effects: Sequence[Mapping[str, Any]], length_s: float | None = None
+) -> tuple[list[tuple[str, Size]], dict[str, str]]:
+    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others are excluded.
+
+    ``length_s`` is the duration of the recording in which the effects were found.
+    """
+    out: list[tuple[str, Size]] = []
+    left_out: dict[str, str] = {}
+    for effect in effects:
+        effect_id = str(effect["id"])
+        values = {str(p["name"]): float(p["value"]) for p in effect["parameters"] if p["value"] is not None}
+        if length_s is not None:
+            values[found.LENGTH] = length_s
+        variant = str(effect.get("model", {}).get("variant", ""))
+        _, of_diagnosis = EFFECTS.get(effect_id, (None, found.nothing))
+        try:
+            size = of_diagnosis(values, variant)
+        except found.NotSimulatedError as why:
+            left_out[effect_id] = str(why)
+        else:
+            out += [(effect_id, one) for one in (size if isinstance(size, list) else [size])]
+    return out, left_out

@@ -1,13 +1,16 @@
 """Effects of the clock, the environment and the motion."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from trihedron.errors import InputError
 from trihedron.simulate.effects.sizes import Sensor, checked
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.readout import Values, triple
 from trihedron.simulate.scenario import Loss, Scenario
+
+Kind = TypeVar("Kind", Pose, Turn)
 
 
 def time_offset(scenario: Scenario, offset_s: float) -> Scenario:
@@ -43,53 +46,48 @@ def rectification(
 ) -> Scenario:
     """Every ``every``-th pose, except the first, is on a vibrating support."""
     part = replace(getattr(scenario, checked(sensor)), rectification=triple(coefficient))
-    steps: list[Step] = []
-    count = 0
-    for step in scenario.motion.steps:
-        if isinstance(step, Pose):
-            count += 1
-            if count > 1 and count % every == 0:
-                shaken = Vibrate((1.0, 1.0, 1.0), rms_m_s2, low_hz, step.duration_s, high_hz=high_hz, name=step.name)
-                steps.append(shaken)
-                continue
-        steps.append(step)
-    return replace(scenario, **{sensor: part}, motion=replace(scenario.motion, steps=tuple(steps)))
+
+    def shaken(k: int, pose: Pose) -> list[Step]:
+        if k == 0 or (k + 1) % every:
+            return [pose]
+        return [Vibrate((1.0, 1.0, 1.0), rms_m_s2, low_hz, pose.duration_s, high_hz=high_hz, name=pose.name)]
+
+    return replace(scenario, **{sensor: part}, motion=_each(scenario.motion, Pose, shaken)[0])
 
 
 def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, shift_m: float = 0.001) -> Scenario:
     """The poses of these numbers (from 0) are disturbed in their middle."""
-    steps: list[Step] = []
-    count = 0
-    for step in scenario.motion.steps:
-        if isinstance(step, Pose):
-            if count in poses:
-                rest = max((step.duration_s - 0.6) / 2.0, 0.1)
-                steps += [
-                    replace(step, duration_s=rest),
-                    Disturb(0.6, tilt_deg, shift_m),
-                    replace(step, duration_s=rest),
-                ]
-            else:
-                steps.append(step)
-            count += 1
-        else:
-            steps.append(step)
+
+    def pushed(k: int, pose: Pose) -> list[Step]:
+        part = replace(pose, duration_s=max((pose.duration_s - 0.6) / 2.0, 0.1))
+        return [part, Disturb(0.6, tilt_deg, shift_m), part] if k in poses else [pose]
+
+    motion, count = _each(scenario.motion, Pose, pushed)
     if any(not 0 <= p < count for p in poses):
         raise InputError(f"the motion has poses 0 to {count - 1}, got {list(poses)}")
-    return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
+    return replace(scenario, motion=motion)
 
 
 def turn_errors(scenario: Scenario, errors_deg: Sequence[float]) -> Scenario:
-    steps: list[Step] = []
-    count = 0
-    for step in scenario.motion.steps:
-        if isinstance(step, Turn):
-            step = replace(step, error_deg=float(errors_deg[count % len(errors_deg)]))
-            count += 1
-        steps.append(step)
+    motion, count = _each(
+        scenario.motion, Turn, lambda k, turn: [replace(turn, error_deg=float(errors_deg[k % len(errors_deg)]))]
+    )
     if count == 0:
         raise InputError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
-    return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
+    return replace(scenario, motion=motion)
+
+
+def _each(motion: Motion, kind: type[Kind], change: Callable[[int, Kind], list[Step]]) -> tuple[Motion, int]:
+    """The motion with every step of a kind, numbered from 0, replaced by others; and their number."""
+    steps: list[Step] = []
+    count = 0
+    for step in motion.steps:
+        if isinstance(step, kind):
+            steps += change(count, step)
+            count += 1
+        else:
+            steps.append(step)
+    return replace(motion, steps=tuple(steps)), count
 
 
 def table_tilt(scenario: Scenario, tilt_deg: Sequence[float]) -> Scenario:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from trihedron.errors import InputError
+from trihedron.simulate.accelerometer import Hysteresis
 from trihedron.simulate.effects.sizes import (
     Sensor,
     checked,
@@ -43,13 +44,7 @@ def accel_hysteresis(
     creep_fraction: Values = 0.0,
     creep_tau_s: Values = 20.0,
 ) -> Scenario:
-    memory = replace(
-        scenario.accelerometer.hysteresis,
-        offset_m_s2=triple(offset_m_s2),
-        width_m_s2=triple(width_m_s2),
-        creep_fraction=triple(creep_fraction),
-        creep_tau_s=triple(creep_tau_s),
-    )
+    memory = Hysteresis(triple(offset_m_s2), triple(width_m_s2), triple(creep_fraction), triple(creep_tau_s))
     return replace(scenario, accelerometer=replace(scenario.accelerometer, hysteresis=memory))
 
 
