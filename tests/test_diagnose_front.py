@@ -228,7 +228,7 @@ def test_an_extended_calibration_shows_what_its_effects_change():
     before, after = (float(panel.title.split()[-3]) for panel in (linear, extended))
     # What S and b leave of the quadratic is several times the noise.
     assert after < 0.5 * before
-    assert document.headlines[0].beside.startswith("rms, cross-validated, with the effects; ")
+    assert document.headlines[0].beside.startswith("rms, cross-validated, with the effects")
     assert "accelerometer quadratic" in document.verdict
     drawn = [b.name for section in document.sections for b in section.blocks if isinstance(b, Picture)]
     assert {"effect-accel-quadratic", "orientation"} <= set(drawn)

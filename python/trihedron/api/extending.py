@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis, StageDomain
@@ -105,12 +105,10 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
     covariance = model.covariance
     return replace(
         base,
-        accelerometer=_sensor(
-            base.accelerometer, model.accelerometer, covariance[:12, :12], _warming(diagnosis, result, DRIFTS[0])
-        ),
+        accelerometer=_sensor(base.accelerometer, model.accelerometer, covariance[:12, :12]),
         gyroscope=None
         if base.gyroscope is None or model.gyroscope is None
-        else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:], _warming(diagnosis, result, DRIFTS[1])),
+        else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
         findings=(*not_explained(base.findings, diagnosis.remaining), finding, *_drifts(diagnosis)),
         extensions=MappingProxyType(
@@ -145,26 +143,12 @@ def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
         )
 
 
-def _warming(diagnosis: Diagnosis, result: CalibrationResult, effect_id: str) -> FloatArray:
-    """Mean over the poses (3,) of a bias that warms up, SI: S and b were fitted beside it as of the warm sensor."""
-    for effect in diagnosis.effects:
-        if effect.id == effect_id and effect.model.get("variant") == "warm-up":
-            values = {one.name: one.value for one in effect.parameters}
-            since_s = result.segments.time_mid_s - result.recording.time_s[0]
-            fades = np.exp(-since_s / values["time_constant"])
-            mean = float(np.average(fades, weights=result.segments.duration_s))
-            return mean * np.array([values[f"warm_up_{axis}"] for axis in AXES])
-    return np.zeros(3)
-
-
-def _sensor(
-    base: SensorCalibration, model: Mapping[str, Any], covariance: FloatArray, drift: FloatArray
-) -> SensorCalibration:
+def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: FloatArray) -> SensorCalibration:
     # Residuals and observability are dropped: they are those of the fit without the effects.
     return replace(
         base,
         S=np.array(model["S"]),
-        b=np.array(model["b"]) - drift,
+        b=np.array(model["b"]),
         covariance=covariance,
         method=f"{base.method}, extended by diagnosis",
         quality=None,

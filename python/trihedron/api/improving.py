@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
@@ -24,6 +24,7 @@ from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.pose_noise import PoseNoise
 from trihedron.records.results import DiagnosisResult
 from trihedron.simulate import (
+    Drift,
     NoiseTerms,
     Scenario,
     Smoother,
@@ -180,11 +181,21 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
         scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
         if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):
             continue
-        tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
+        b = np.array(fit["b"]) + _mean_drift(found, f"{prefix}-bias-drift")
+        tables[name] |= {"S": np.array(fit["S"]), "b": b, "unit": str(fit["raw_unit"])}
         readings = getattr(found.recording, name)
         if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
             # Raw readings are in another unit: the recording's LSB replaces the scenario's.
             tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
+
+
+def _mean_drift(found: DiagnosisResult, effect_id: str) -> FloatArray:
+    """Mean over the poses (3,) of a simulated drift, SI: b of a diagnosis is a mean, that of a scenario is without."""
+    effects = [effect.to_dict() for effect in found.own_effects if effect.id == effect_id]
+    sizes, _ = diagnosed_sizes(effects, float(np.ptp(found.recording.time_s)))
+    since_s = found.segments.time_mid_s - found.recording.time_s[0]
+    drifts = [np.average(Drift(**size).at(since_s), axis=0, weights=found.segments.duration_s) for _, size in sizes]
+    return np.asarray(sum(drifts, np.zeros(3)))
 
 
 def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:

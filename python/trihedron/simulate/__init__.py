@@ -7,7 +7,7 @@ from trihedron.simulate.motion.steps import Disturb, Motion, MoveTo, Oscillate, 
 from trihedron.simulate.named import list_scenarios, scenario_by_name
 from trihedron.simulate.noise import NoiseTerms, make_noise
 from trihedron.simulate.profiles import profile_by_name
-from trihedron.simulate.readout import Smoother
+from trihedron.simulate.readout import Drift, Smoother
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Clock, Environment, Scenario, Temperature
 from trihedron.simulate.scenario_file import read_scenario, scenario_from_table
@@ -20,6 +20,7 @@ __all__ = [
     "Accelerometer",
     "Clock",
     "Disturb",
+    "Drift",
     "Environment",
     "Gyroscope",
     "Motion",

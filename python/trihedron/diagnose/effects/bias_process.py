@@ -1,6 +1,8 @@
 """Bias that drifts in time, or differs from pose to pose, and that no logged channel explains."""
 
 from abc import abstractmethod
+from collections.abc import Callable
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -62,24 +64,30 @@ class BiasDrift(BiasProcess):
 
     def variants(self, context: Context) -> list[Variant]:
         """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
-        x = context.elapsed[:, None]
-        out = [self._along(context, [x - 0.5], per_axis("drift"), "line")]
+        out = [self._along(context, [lambda x: x], per_axis("drift"), "line")]
         out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
         names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
-        out.append(self._along(context, [np.cos(np.pi * x * k) for k in COSINES], names, "curve"))
+        out.append(self._along(context, [partial(_cosine, k) for k in COSINES], names, "curve"))
         return out
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
-        """An exponential with one time constant; its parameters are the bias per axis at the first sample."""
-        tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * _duration_s(context))
-        fades = np.exp(-(context.time_s - context.obs.time_s[0]) / tau_s)[:, None]
+        """An exponential with one time constant; its parameters are, per axis, the bias at the first sample above that
+        of a warm sensor."""
+        lasts_s = _duration_s(context)
+        tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * lasts_s)
+        fades = partial(_fading, tau_s / lasts_s)
         return self._along(context, [fades], per_axis("warm_up"), "warm-up", {"time_constant": (tau_s, "s")})
 
     def _along(
-        self, context: Context, curves: list[FloatArray], names: tuple[str, ...], label: str,
+        self, context: Context, curves: list[Callable[[FloatArray], FloatArray]], names: tuple[str, ...], label: str,
         shape: dict[str, tuple[float, str]] | None = None,
     ) -> Variant:  # fmt: skip
-        columns = on_axes(context, self.sensor, *curves)
+        """``curves`` of the elapsed share of the session, zero on average over the poses, as the session's bias is."""
+        poses = context.obs.segments
+        x = (poses.time_mid_s - context.obs.time_s[0]) / _duration_s(context)
+        means = [np.average(curve(x), weights=poses.duration_s) for curve in curves]
+        centred = [(curve(context.elapsed) - mean)[:, None] for curve, mean in zip(curves, means, strict=True)]
+        columns = on_axes(context, self.sensor, *centred)
         return Variant(columns, names, (self.unit,) * len(names), shape or {}, label)
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
@@ -116,6 +124,14 @@ class GyroBiasDrift(BiasDrift):
     id, sensor = "gyro-bias-drift", GYRO
     confounded_with = ("gyro-bias",)
     typical = TYPICAL[1]
+
+
+def _cosine(k: int, x: FloatArray) -> FloatArray:
+    return np.asarray(np.cos(np.pi * k * x))
+
+
+def _fading(fraction: float, x: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-x / fraction))
 
 
 def _duration_s(context: Context) -> float:
