@@ -9,8 +9,14 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
-from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
+from trihedron.estimate.kalman.per_axis import (
+    check_innovations,
+    consistency_findings,
+    is_settled,
+    noise_per_axis,
+    pose_arrays,
+    shaping_model,
+)
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, NormKalmanCalibration

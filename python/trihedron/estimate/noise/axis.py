@@ -13,8 +13,7 @@ from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
-from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
 from trihedron.probability import NORMAL_95
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode

@@ -12,8 +12,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 
 EVIDENCE = 8.0
 """Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half

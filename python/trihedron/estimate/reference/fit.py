@@ -30,8 +30,7 @@ from trihedron.estimate.reference.smoothed import (
     frame_covariance,
     without_slow_error,
 )
-from trihedron.estimate.reference.together import Grid, Reference, grid_of, plateaus
-from trihedron.estimate.reference.windows import Windows, windows_on
+from trihedron.estimate.reference.together import Grid, Reference, Windows, grid_of, plateaus, windows_on
 from trihedron.estimate.reference.worth import earth_of, error_of, remarks
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion

@@ -6,8 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
-from trihedron.estimate.reference.together import Grid, Reference
-from trihedron.estimate.reference.windows import Windows
+from trihedron.estimate.reference.together import Grid, Reference, Windows
 from trihedron.records import Segments
 from trihedron.records.reference import FitToReference
 

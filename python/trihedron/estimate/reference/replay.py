@@ -9,8 +9,7 @@ from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
-from trihedron.estimate.reference.together import Grid, Reference
-from trihedron.estimate.reference.windows import Windows
+from trihedron.estimate.reference.together import Grid, Reference, Windows
 from trihedron.records.reference import ReplayStage
 
 HORIZON_S = 10.0
