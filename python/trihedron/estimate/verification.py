@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -190,21 +191,16 @@ def _carried(
 
 def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, *, is_bias: bool) -> Iterator[Finding]:
     """Finding where gravity errors exceed what is expected; ``is_bias``: only biases differ from the log's own."""
-    z2 = (error / sigma) ** 2
-    if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
+    beyond = _beyond((error / sigma) ** 2, 1)
+    if beyond is None:
         return
-    rms = float(np.sqrt(np.mean(error**2)))
-    times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
+    worst = int(np.argmax(np.abs(error / sigma)))
     n_same, mean = int(max(np.sum(error > 0.0), np.sum(error < 0.0))), float(np.mean(error))
     yield Finding.of(
         FindingCode.RESIDUAL_ABOVE_NOISE,
         "verify-static",
-        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-        norm_rms_m_s2=rms,
-        times=times,
-        is_far=times > FAR_BEYOND,
+        norm_rms_m_s2=rms_of(error),
         is_bias=is_bias,
-        is_single=_is_single(z2, 1),
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
         n_same=n_same,
@@ -213,13 +209,23 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, *,
         share=abs(mean) / gravity_m_s2,
         worst_pose=worst + 1,
         worst_m_s2=error[worst],
-        chi2_per_dof=times**2,
+        **beyond,
     )
 
 
-def _is_single(z2: FloatArray, n_components: int) -> bool:
-    """Whether the squared errors (n,) in their expected size, of ``n_components`` each, are as expected without one."""
-    return probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM
+def _beyond(z2: FloatArray, n_components: int) -> dict[str, Any] | None:
+    """Figures where squared errors (n,) of ``n_components`` each, in their expected size, exceed what is expected, and
+    whether the others do not without the largest; else ``None``."""
+    if probability.chdtrc(n_components * len(z2), float(z2.sum())) > FALSE_ALARM:
+        return None
+    times = float(np.sqrt(np.mean(z2) / n_components))
+    return {
+        "severity": Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+        "times": times,
+        "is_far": times > FAR_BEYOND,
+        "is_single": probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM,
+        "chi2_per_dof": times**2,
+    }
 
 
 def _angle_findings(moves: Carriage, *, is_bias: bool) -> Iterator[Finding]:
@@ -227,21 +233,16 @@ def _angle_findings(moves: Carriage, *, is_bias: bool) -> Iterator[Finding]:
     if not len(angle_deg):
         return
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
-    z2 = 2.0 * (angle_deg / sigma_deg) ** 2
-    if probability.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
+    beyond = _beyond(2.0 * (angle_deg / sigma_deg) ** 2, 2)
+    if beyond is None:
         return
-    rms = float(np.sqrt(np.mean(angle_deg**2)))
-    times, worst = float(np.sqrt(np.mean(z2) / 2.0)), int(np.argmax(z2))
+    worst = int(np.argmax(angle_deg / sigma_deg))
     yield Finding.of(
         FindingCode.HELD_OUT_WORSE,
         "verify-moves",
-        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-        angle_rms_deg=rms,
-        times=times,
-        is_far=times > FAR_BEYOND,
+        angle_rms_deg=rms_of(angle_deg),
         is_bias=is_bias,
-        is_single=_is_single(z2, 2),
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
-        chi2_per_dof=times**2,
+        **beyond,
     )

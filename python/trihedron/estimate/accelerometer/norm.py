@@ -49,38 +49,25 @@ def calibrate_norm(
     g = checked_gravity(gravity_m_s2)
     signs = checked_signs(axis_signs)
     unit = AccelerationUnit(raw_unit)
-    settings = _settings(g, frame)
-    _enough(values)
-    # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
-    flip = np.outer(signs, signs)
-    positive, turned = values * signs, noise * flip
-    fit = _core.fit_norm(positive, turned, settings)
-    folds = _folds(len(values))
-    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
-    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
-
-
-def _settings(g: float, frame: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
         raise InputError(
             f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
             "they do not determine the case"
         )
-    return _core.NormSettings(g, symmetric=frame == "symmetric")
-
-
-def _enough(values: FloatArray) -> None:
+    settings = _core.NormSettings(g, symmetric=frame == "symmetric")
     if len(values) < 3:
         raise InputError(
             f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
-
-
-def _folds(n: int) -> list[int]:
-    if n <= LEAVE_ONE_OUT_LIMIT:
-        return list(range(n))
-    return [i * LEAVE_ONE_OUT_LIMIT // n for i in range(n)]
+    # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
+    flip = np.outer(signs, signs)
+    positive, turned = values * signs, noise * flip
+    fit = _core.fit_norm(positive, turned, settings)
+    n = len(values)
+    folds = [i * LEAVE_ONE_OUT_LIMIT // n if n > LEAVE_ONE_OUT_LIMIT else i for i in range(n)]
+    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
+    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 
 
 def _assemble(

@@ -1,6 +1,7 @@
 """Findings of a fitted triad: residual against noise, undetermined parameters, outliers, handedness, scale."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -77,32 +78,20 @@ def observability_findings(
         )
         return
     worst = design.worst_prediction()
+    weak: dict[str, Any] = {
+        "weakest": design.weakest(),
+        "advice": advice,
+        "rank": design.rank,
+        "n_parameters": 9,
+        "worst_prediction_g": worst,
+    }
     if is_anchored:
+        at_worst = min(worst, 1.0)
         yield Finding.of(
-            FindingCode.NOT_OBSERVABLE,
-            "poses-weak",
-            at_worst=min(worst, 1.0),
-            weakest=design.weakest(),
-            anchor=anchor,
-            are_faces=are_faces,
-            advice=advice,
-            rank=design.rank,
-            n_parameters=9,
-            worst_prediction_g=worst,
+            FindingCode.NOT_OBSERVABLE, "poses-weak", at_worst=at_worst, anchor=anchor, are_faces=are_faces, **weak
         )
-        return
-    if worst > WEAK_PREDICTION * relative_sigma:
-        yield Finding.of(
-            FindingCode.WEAKLY_OBSERVABLE,
-            "poses",
-            measured_g=relative_sigma,
-            weakest=design.weakest(),
-            advice=advice,
-            rank=design.rank,
-            n_parameters=9,
-            worst_prediction_g=worst,
-        )
-        return
+    elif worst > WEAK_PREDICTION * relative_sigma:
+        yield Finding.of(FindingCode.WEAKLY_OBSERVABLE, "poses", measured_g=relative_sigma, **weak)
 
 
 def _unseen(design: PoseDesign) -> list[str]:
@@ -143,17 +132,13 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known
         worst = int(np.argmax(np.abs(np.log(ratio))))
         # Uncalibrated consumer triads are within 10 % of their data sheet; a wrong unit or |g| is off by far more.
         if abs(np.log(ratio[worst])) > 0.15:
+            scale, unit = ratio[worst], raw_unit.value
             yield Finding.of(
-                FindingCode.SCALE_NOT_NOMINAL,
-                "accelerometer",
-                axis=worst + 1,
-                scale_ratio=ratio[worst],
-                unit=raw_unit.value,
+                FindingCode.SCALE_NOT_NOMINAL, "accelerometer", axis=worst + 1, scale_ratio=scale, unit=unit
             )
 
 
 def convergence_findings(is_converged: bool, stopped_because: str) -> Iterator[Finding]:
     """Finding where the solver stopped without convergence."""
-    if is_converged:
-        return
-    yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)
+    if not is_converged:
+        yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)

@@ -275,14 +275,7 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     advice = words("tilt-towards-vertical", axis=axis) if axis else words("bias-both-ways")
     rank = int(np.sum(values > 1e-9 * values[0]))
     observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
-    findings: list[Finding] = []
-    if condition > 30.0:
-        findings.append(
-            Finding.of(
-                FindingCode.WEAKLY_OBSERVABLE,
-                "kalman-sensitivity" if axis else "kalman-bias",
-                axis=axis,
-                condition=condition,
-            )
-        )
-    return observability, findings
+    if condition <= 30.0:
+        return observability, []
+    case = "kalman-sensitivity" if axis else "kalman-bias"
+    return observability, [Finding.of(FindingCode.WEAKLY_OBSERVABLE, case, axis=axis, condition=condition)]

@@ -188,9 +188,6 @@ def identify_axis(
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:
     """An axis without terms yet: length, mean, noise of a reading, resolution and findings on these."""
     unknown = {term: NoiseTerm(term, False, 0.0, 0.0, 0.0, math.inf, math.inf, 0.0) for term in TermName}
-    findings = [*remarks.written(written)]
-    if written.sigma == 0.0 or written.is_dead:
-        findings.append(remarks.dead(written, unit))
     return NoiseAxis(
         name=name,
         unit=unit,
@@ -201,7 +198,7 @@ def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float
         sample_sigma=written.sigma,
         resolution=written.resolution,
         terms=MappingProxyType(unknown),
-        findings=tuple(findings),
+        findings=tuple(remarks.of_readout(written, unit)),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -73,26 +73,25 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
         raise InputError(f"no spectral ordinate lies below {highest_hz} Hz")
     order = np.argsort(frequency, kind="stable")
 
-    def gather(parts: list[FloatArray]) -> FloatArray:
+    def gather(of_band: Callable[[Ordinates], FloatArray]) -> FloatArray:
+        parts = [of_band(band)[..., p] for band, p in zip(bands, pick, strict=True)]
         return np.asarray(np.concatenate(parts, axis=-1)[..., order])
 
-    frequency = frequency[order]
-    count = gather([band.count[p] for band, p in zip(bands, pick, strict=True)])
+    frequency, count = frequency[order], gather(lambda band: band.count)
     key = np.floor(np.log(frequency / frequency[0]) / np.log(BIN_WIDTH))
     edges = np.flatnonzero(np.concatenate([[True], np.diff(key) > 0]))
     total = np.add.reduceat(count, edges)
 
-    def averaged(parts: list[FloatArray]) -> FloatArray:
-        return np.asarray(np.add.reduceat(gather(parts) * count, edges, axis=-1) / total)
+    def averaged(of_band: Callable[[Ordinates], FloatArray]) -> FloatArray:
+        return np.asarray(np.add.reduceat(gather(of_band) * count, edges, axis=-1) / total)
 
-    chosen = list(zip(bands, pick, strict=True))
     return BinnedSpectrum(
-        frequency_hz=averaged([band.frequency_hz[p] for band, p in chosen]),
+        frequency_hz=averaged(lambda band: band.frequency_hz),
         count=total,
-        power=averaged([band.power[p] for band, p in chosen]),
-        cross=averaged([band.cross[p] for band, p in chosen]),
-        square=averaged([band.line[p] ** 2 for band, p in chosen]),
-        basis=averaged([band.basis[:, p] for band, p in chosen]),
+        power=averaged(lambda band: band.power),
+        cross=averaged(lambda band: band.cross),
+        square=averaged(lambda band: band.line**2),
+        basis=averaged(lambda band: band.basis),
     )
 
 

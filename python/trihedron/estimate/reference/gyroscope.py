@@ -41,11 +41,10 @@ def fit_gyroscope(
 ) -> GyroFit:
     """Fit ``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 fixes τ and ε, 1 frees τ, 2 both."""
     middle = float(np.mean(grid.time_s[windows.middle]))
-    n_clock = clock
     solution: Solution | None = None
     for _ in range(TURNS if clock else 1):
         target, design = _rows(grid, reference, windows, offset_s, rate)
-        if n_clock:
+        if clock:
             theta = _quick(target, design) if solution is None else solution.theta[: design.shape[2]]
             half = 0.25 * grid.step_s
             slope = [
@@ -54,15 +53,15 @@ def fit_gyroscope(
             ]
             by_offset = -(slope[0] - slope[1]) / (2.0 * half)
             columns = [by_offset]
-            if n_clock == 2:
+            if clock == 2:
                 columns.append(by_offset * (grid.time_s[windows.middle] - middle)[:, None])
             design = np.concatenate([design, np.stack(columns, axis=2)], axis=2)
         size = np.linalg.norm(target, axis=1)
         solution = solve(design, target, windows.start // windows.spacing, size, WHITE)
-        if not n_clock:
+        if not clock:
             break
-        moved = solution.theta[-n_clock:]
-        rate_change = float(moved[1]) if n_clock == 2 else 0.0
+        moved = solution.theta[-clock:]
+        rate_change = float(moved[1]) if clock == 2 else 0.0
         # Limited to the uncertainty of the alignment by correlation.
         change = float(np.clip(moved[0], -0.1, 0.1))
         offset_s += change - rate_change * middle

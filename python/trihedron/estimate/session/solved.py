@@ -8,7 +8,7 @@ from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.verdict import residual_findings
-from trihedron.estimate.gyroscope.findings import describe, findings_of
+from trihedron.estimate.gyroscope.findings import describe, findings_of, worst_sigma
 from trihedron.estimate.gyroscope.lost_samples import (
     PossibleLosses,
     is_asked_for_losses,
@@ -244,11 +244,8 @@ def scale_by_gravity(
     quality, seen = gyroscope.quality, gyroscope.observability
     if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:
         return None
-    size = float(np.linalg.norm(gyroscope.S, 2))
-    sigma = float(np.sqrt(max(np.linalg.eigvalsh(gyroscope.covariance[:9, :9])[-1], 0.0))) / size
-    if not sigma < LARGEST_DOUBT:
-        return None
-    return gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)
+    sigma = worst_sigma(gyroscope.covariance[:9, :9], gyroscope.S)
+    return (gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)) if sigma < LARGEST_DOUBT else None
 
 
 # Joint fit of both sensors: the reference solution, with the covariance of all 24 parameters.
