@@ -1,4 +1,4 @@
-"""Calibration in known attitudes, axis by axis: the Kalman filter, and least squares for comparison."""
+"""Calibration in known attitudes, axis by axis: noise model, Kalman filter with its tests, and least squares."""
 
 from collections.abc import Iterator, Sequence
 

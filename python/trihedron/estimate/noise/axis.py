@@ -70,12 +70,6 @@ def invert(selection: Selection) -> _core.SpectralInversion:
     return selection.spectrum.likelihood().invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
 
 
-def slow_pair_of(found: _core.SpectralInversion) -> SlowPair:
-    """Whether the spectrum needs B and K together."""
-    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
-    return SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
-
-
 def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, NoiseTerm]:
     """Values and intervals of Q, N, B, K and R from the inverted likelihood."""
     strength = found.strength if pair.is_present else found.strength_without_pair
@@ -167,10 +161,11 @@ def identify_axis(
         findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     found = invert(selection)
-    pair = slow_pair_of(found)
+    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
+    pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
     terms = terms_of(found, pair)
-    white = with_level(terms[TermName.WHITE], blank.sample_sigma, blank.resolution)
-    terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
+    white, level = terms[TermName.WHITE], level_share(blank.sample_sigma, blank.resolution)
+    terms[TermName.WHITE] = widened(white, math.hypot(level, bend, tails) * white.estimate)
     axis = replace(
         blank,
         terms=MappingProxyType(terms),
@@ -250,11 +245,6 @@ def level_share(sigma: float, resolution: float) -> float:
     s2 = max((sigma / resolution) ** 2 - 1.0 / 12.0, 0.0)
     swing = (1.0 / math.pi**2 + 4.0 * s2) * math.exp(-2.0 * math.pi**2 * s2)
     return 0.5 * swing / math.sqrt(2.0) / (s2 + 1.0 / 12.0)
-
-
-def with_level(term: NoiseTerm, sigma: float, resolution: float) -> NoiseTerm:
-    """N with an interval that is valid for any position of the mean inside an LSB."""
-    return widened(term, level_share(sigma, resolution) * term.estimate)
 
 
 def widened(term: NoiseTerm, own: float) -> NoiseTerm:

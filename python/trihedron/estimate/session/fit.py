@@ -1,4 +1,10 @@
-"""The session solved without effects: both sensors, one bias for the session, and their uncertainties."""
+"""The session solved without effects: both sensors, one bias for the session, and their uncertainties.
+
+Biases may drift along a curve of time, a line or a warm-up, beside the random walk that every session allows. A walk
+decouples the poses that a warm-up connects: S and b of a sensor that warms up would be several times less certain than
+the session determines them. Few poses may not show one: both hypotheses then share the covariance
+(docs/model-session.md, 11.12e).
+"""
 
 from dataclasses import dataclass, replace
 
