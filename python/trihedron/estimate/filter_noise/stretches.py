@@ -1,4 +1,4 @@
-"""Stretches of the gyro's attitude against the reference's, and of the accelerometer's velocity against its position."""
+"""Stretches of the gyro's attitude, and of the accelerometer's velocity, against the reference's."""
 
 from dataclasses import replace
 from itertools import pairwise
