@@ -22,7 +22,6 @@ import numpy as np
 from filter_noise_trial.generator import KINDS, G, drawn
 from trihedron import read
 from trihedron.api.referring import motion_of
-from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
     Request,
@@ -32,6 +31,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
     independent_or_not,
     informed,
 )
+from trihedron.estimate.filter_noise.stretches import angle_stretches
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
 from trihedron.records import Recording

@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.api.filter_noising import noticed
-from trihedron.estimate.filter_noise.angle import bias_steps
 from trihedron.estimate.filter_noise.beside_reference import (
     ANGLE,
     independent_or_not,
@@ -23,6 +22,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
 )
 from trihedron.estimate.filter_noise.strengths import Fitted, Prior, _of_axes, _without_noise, fit, unlike_axes_beside
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
+from trihedron.estimate.filter_noise.stretches import bias_steps
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording
 from trihedron.records.filter_noise import Bounded, StaticNoise

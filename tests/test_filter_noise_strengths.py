@@ -17,7 +17,7 @@ from trihedron.estimate.filter_noise.strengths import (
     whole,
     with_slow_error_of,
 )
-from trihedron.estimate.filter_noise.velocity import velocity_stretches
+from trihedron.estimate.filter_noise.stretches import velocity_stretches
 
 
 def test_an_accelerometers_reference_is_as_wrong_as_the_gyro_found_it():

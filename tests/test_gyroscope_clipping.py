@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.estimate.gyroscope.clipping import bridge_clipping
+from trihedron.estimate.gyroscope.measurements import bridge_clipping
 from trihedron.records import Recording
 
 RATE_HZ = 100.0

@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from trihedron import _core
-from trihedron.estimate.kalman.model import shaping_model
-from trihedron.estimate.kalman.per_axis import calibrate_with_references
+from trihedron.estimate.kalman.per_axis import calibrate_with_references, shaping_model
 from trihedron.records import AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
     ARTICLE_CONSTANTS,

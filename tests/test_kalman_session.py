@@ -11,8 +11,8 @@ import trihedron
 from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.kalman.identified import noise_from_identified
-from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.norm_invariant import NormFilter, calibrate_without_references, start_from_range
+from trihedron.estimate.kalman.per_axis import shaping_model
 from trihedron.estimate.kalman.session import (
     calibrate_session,
     noise_from_poses,

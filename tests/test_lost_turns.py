@@ -8,7 +8,7 @@ from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
-from trihedron.estimate.gyroscope.lost_turns import could_be_remade
+from trihedron.estimate.gyroscope.lost_samples import could_be_remade
 from trihedron.records import FindingCode
 
 STEP_S = 0.01

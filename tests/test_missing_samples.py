@@ -8,7 +8,7 @@ import pytest
 
 import trihedron
 from trihedron import _core
-from trihedron.estimate.gyroscope.missing_samples import missing_samples
+from trihedron.estimate.gyroscope.lost_samples import missing_samples
 from trihedron.records import Severity
 from trihedron.records.recording import spread_timestamps
 from trihedron.segment import segment_recording

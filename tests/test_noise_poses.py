@@ -8,8 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.estimate.noise.correlation_time import correlation_time
 from trihedron.estimate.noise.poses import noise_of_poses
+from trihedron.estimate.noise.slow import correlation_time
 
 RATE = 100.0
 

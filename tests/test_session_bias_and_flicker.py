@@ -7,7 +7,7 @@ from confidence.sensor import recorded
 from confidence.sessions import hand
 from trihedron import _core, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
+from trihedron.estimate.session.solved import calibrate_joint
 from trihedron.records import Recording
 from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate

@@ -5,7 +5,7 @@ import pytest
 
 from trihedron import Recording
 from trihedron.api.reading import segments_of
-from trihedron.estimate.accelerometer.whole_turns import opposite_headings
+from trihedron.estimate.gravity_circle import opposite_headings
 
 G, RATE = 9.81, 100.0
 LEAN = np.array([0.05, -0.08])  # m/s² in the level axes of the first heading

@@ -16,15 +16,14 @@ from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
-from trihedron.estimate.accelerometer.whole_turns import opposite_headings
+from trihedron.estimate.gravity_circle import opposite_headings
 from trihedron.estimate.gyroscope import turn_axes
 from trihedron.estimate.gyroscope.findings import scale_findings
-from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
+from trihedron.estimate.gyroscope.lost_samples import missing_samples, unless_seen
 from trihedron.estimate.gyroscope.turn_angles import SCALE_TOLERANCE, TurnAngleUnknownError
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
-from trihedron.estimate.joint import calibrate_joint
-from trihedron.estimate.session.solved import calibrate_moves, scale_by_gravity
+from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain

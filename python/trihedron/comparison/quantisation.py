@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import AXES
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.rows import NAMES, SENSORS, Sensor, difference, measured_row
-from trihedron.estimate.noise.correlation_time import Octaves
+from trihedron.estimate.noise.slow import Octaves
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise

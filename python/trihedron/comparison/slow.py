@@ -11,8 +11,7 @@ from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row
 from trihedron.diagnose.against.mechanisms import FREE_CURVE
-from trihedron.estimate.noise.correlation_time import correlation_time
-from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow
+from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow, correlation_time
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
 from trihedron.records.domains import Domain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,14 +31,7 @@ class KnownVectors:
 
     def of(self, used: BoolArray) -> KnownVectors:
         """The rows ``used`` (n,)."""
-        return replace(
-            self,
-            raw=self.raw[used],
-            vectors=self.vectors[used],
-            times=self.times[used],
-            noise=self.noise[used],
-            shared=self.shared[used],
-        )
+        return KnownVectors(*(of_rows[used] for of_rows in vars(self).values()))
 
     def residual(self, S_a: FloatArray, b_a: FloatArray) -> FloatArray:
         """(n, 3) measured minus predicted rows."""

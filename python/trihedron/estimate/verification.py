@@ -192,7 +192,7 @@ def _carried(
 
 
 class _Changed(NamedTuple):
-    """What differs from the calibration of the log itself: biases alone, or a few parameters by name."""
+    """What differs from the calibration of the log itself: whether biases alone, or a few parameters, by name."""
 
     is_bias: bool
     is_few: bool
@@ -206,24 +206,19 @@ def _changed(shifted: list[JudgedParameter]) -> _Changed:
 
 
 def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, changed: _Changed) -> Iterator[Finding]:
-    """Finding where gravity errors exceed what is expected, with the parameters that differ from the log's own."""
-    z2 = (error / sigma) ** 2
-    if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
+    """Finding where gravity errors exceed what is expected, with what differs from the log's own calibration."""
+    beyond = _beyond((error / sigma) ** 2, 1)
+    if beyond is None:
         return
-    rms = float(np.sqrt(np.mean(error**2)))
-    times, worst = float(np.sqrt(np.mean(z2))), int(np.argmax(z2))
+    worst = int(np.argmax(np.abs(error / sigma)))
     n_same, mean = int(max(np.sum(error > 0.0), np.sum(error < 0.0))), float(np.mean(error))
     yield Finding.of(
         FindingCode.RESIDUAL_ABOVE_NOISE,
         "verify-static",
-        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-        norm_rms_m_s2=rms,
-        times=times,
-        is_far=times > FAR_BEYOND,
+        norm_rms_m_s2=rms_of(error),
         is_bias=changed.is_bias,
         is_few=changed.is_few,
         shifted=changed.shifted,
-        is_single=_is_single(z2, 1),
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
         n_same=n_same,
@@ -232,13 +227,29 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
         share=abs(mean) / gravity_m_s2,
         worst_pose=worst + 1,
         worst_m_s2=error[worst],
-        chi2_per_dof=times**2,
+        severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
+        times=beyond.times,
+        is_far=beyond.is_far,
+        is_single=beyond.is_single,
+        chi2_per_dof=beyond.times**2,
     )
 
 
-def _is_single(z2: FloatArray, n_components: int) -> bool:
-    """Whether the squared errors (n,) in their expected size, of ``n_components`` each, are as expected without one."""
-    return probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) > FALSE_ALARM
+class _Beyond(NamedTuple):
+    """How many times their expected size errors are, whether far, and whether the others are not without the largest."""
+
+    times: float
+    is_far: bool
+    is_single: bool
+
+
+def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
+    """Squared errors (n,) of ``n_components`` each, in their expected size; ``None`` where they are as expected."""
+    if probability.chdtrc(n_components * len(z2), float(z2.sum())) > FALSE_ALARM:
+        return None
+    times = float(np.sqrt(np.mean(z2) / n_components))
+    others = probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max()))
+    return _Beyond(times, times > FAR_BEYOND, others > FALSE_ALARM)
 
 
 def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
@@ -246,23 +257,22 @@ def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
     if not len(angle_deg):
         return
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
-    z2 = 2.0 * (angle_deg / sigma_deg) ** 2
-    if probability.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
+    beyond = _beyond(2.0 * (angle_deg / sigma_deg) ** 2, 2)
+    if beyond is None:
         return
-    rms = float(np.sqrt(np.mean(angle_deg**2)))
-    times, worst = float(np.sqrt(np.mean(z2) / 2.0)), int(np.argmax(z2))
+    worst = int(np.argmax(angle_deg / sigma_deg))
     yield Finding.of(
         FindingCode.HELD_OUT_WORSE,
         "verify-moves",
-        severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-        angle_rms_deg=rms,
-        times=times,
-        is_far=times > FAR_BEYOND,
+        angle_rms_deg=rms_of(angle_deg),
         is_bias=changed.is_bias,
         is_few=changed.is_few,
         shifted=changed.shifted,
-        is_single=_is_single(z2, 2),
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
-        chi2_per_dof=times**2,
+        severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
+        times=beyond.times,
+        is_far=beyond.is_far,
+        is_single=beyond.is_single,
+        chi2_per_dof=beyond.times**2,
     )

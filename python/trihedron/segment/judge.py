@@ -9,9 +9,9 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.segment.channels import Channels
+from trihedron.segment.floor import RangeEnd, is_cut
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
-from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_POSE_S, Run, means_of
 
 CREEP_CHANCE = 1e-3

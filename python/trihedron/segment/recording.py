@@ -15,11 +15,10 @@ from trihedron.records import Finding, Move, Pose, Recording, Segments
 from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
-from trihedron.segment.floor import Activity, measure_activity
+from trihedron.segment.floor import Activity, measure_activity, range_ends
 from trihedron.segment.judge import judge_bias, judge_log, judge_runs, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
-from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
     MIN_POSE_S,
     SWAY_RAD,

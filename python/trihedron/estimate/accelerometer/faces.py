@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.estimate.accelerometer import face_poses, inputs, verdict
+from trihedron.estimate.accelerometer import face_poses, verdict
 from trihedron.estimate.accelerometer.face_poses import placements
-from trihedron.estimate.accelerometer.norm import norm_residual
-from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
+from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
+from trihedron.estimate.gravity_circle import OppositeHeadings, with_opposite
 from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
@@ -85,8 +85,8 @@ def calibrate_faces(
     the axis with the largest reading is taken, and a positive reading is taken as up: handedness is then not tested.
     Raises ``InputError`` when shapes do not fit, or naming the faces that are missing.
     """
-    values, noise = inputs.pose_means(means, sigma_means)
-    g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
+    values, noise = pose_means(means, sigma_means)
+    g, unit = checked_gravity(gravity_m_s2), AccelerationUnit(raw_unit)
     faces = face_poses.faces_up(values, unit, up)
     used = np.flatnonzero(faces)
     face_poses.check_sufficient(faces[used])

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.accelerometer import inputs, verdict
+from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
@@ -45,42 +45,29 @@ def calibrate_norm(
     ``InputError`` when shapes do not fit, values are NaN, there are fewer than three poses, or all poses read the
     same.
     """
-    values, noise = inputs.pose_means(means, sigma_means)
-    g = inputs.gravity(gravity_m_s2)
-    signs = inputs.axis_signs(axis_signs)
+    values, noise = pose_means(means, sigma_means)
+    g = checked_gravity(gravity_m_s2)
+    signs = checked_signs(axis_signs)
     unit = AccelerationUnit(raw_unit)
-    settings = _settings(g, frame)
-    _enough(values)
-    # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
-    flip = np.outer(signs, signs)
-    positive, turned = values * signs, noise * flip
-    fit = _core.fit_norm(positive, turned, settings)
-    folds = _folds(len(values))
-    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
-    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
-
-
-def _settings(g: float, frame: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
         raise InputError(
             f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
             "they do not determine the case"
         )
-    return _core.NormSettings(g, symmetric=frame == "symmetric")
-
-
-def _enough(values: FloatArray) -> None:
+    settings = _core.NormSettings(g, symmetric=frame == "symmetric")
     if len(values) < 3:
         raise InputError(
             f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
-
-
-def _folds(n: int) -> list[int]:
-    if n <= LEAVE_ONE_OUT_LIMIT:
-        return list(range(n))
-    return [i * LEAVE_ONE_OUT_LIMIT // n for i in range(n)]
+    # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
+    flip = np.outer(signs, signs)
+    positive, turned = values * signs, noise * flip
+    fit = _core.fit_norm(positive, turned, settings)
+    n = len(values)
+    folds = [i * LEAVE_ONE_OUT_LIMIT // n if n > LEAVE_ONE_OUT_LIMIT else i for i in range(n)]
+    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
+    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 
 
 def _assemble(
@@ -211,3 +198,58 @@ def calibrate_few_faces(
         turned.append(np.concatenate([(generator @ sensor.S).ravel(), generator @ sensor.b]))
     by_case = TO_CASE_RAD * np.array(turned).T
     return replace(sensor, covariance=sensor.covariance + by_case @ by_case.T), findings
+
+
+# Checks of the arguments; errors name them in the user's words.
+
+
+def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Means (n, 3) and their covariances (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances (n, 3, 3).
+
+    Raises ``InputError`` when shapes do not fit, or something is not finite or not positive.
+    """
+    values = np.ascontiguousarray(means, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise InputError(f"mean readings must have shape (n, 3), got {values.shape}")
+    n = len(values)
+    if not np.all(np.isfinite(values)):
+        pose = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise InputError(f"the mean reading of pose {pose} is not finite: leave that pose out")
+    sigma = np.asarray(sigma_means, dtype=np.float64)
+    if sigma.shape in ((), (3,)):
+        sigma = np.broadcast_to(sigma, (n, 3))
+    if sigma.shape == (n, 3):
+        if not np.all(np.isfinite(sigma)) or np.any(sigma < 0) or np.any(sigma.max(axis=1, initial=0.0) <= 0):
+            raise InputError("standard errors of the means must be finite and positive (at least one axis per pose)")
+        noise = np.zeros((n, 3, 3))
+        noise[:, range(3), range(3)] = sigma**2
+        return values, noise
+    if sigma.shape != (n, 3, 3):
+        raise InputError(f"noise of {n} means must have shape (3,), ({n}, 3) or ({n}, 3, 3), got {sigma.shape}")
+    if not np.allclose(sigma, np.swapaxes(sigma, 1, 2)) or np.any(np.linalg.eigvalsh(sigma)[:, -1] <= 0):
+        raise InputError("covariances of the means must be symmetric and positive")
+    return values, np.ascontiguousarray(sigma)
+
+
+def checked_gravity(gravity_m_s2: float) -> float:
+    """|g| in m/s².
+
+    Raises ``InputError`` when it is not between 1 and 100 m/s²: its relative error would be that of every scale.
+    """
+    value = float(gravity_m_s2)
+    if not 1.0 < value < 100.0:
+        raise InputError(f"gravity must be given in m/s² (about 9.8 on Earth), got {value:g}")
+    return value
+
+
+def checked_signs(signs: npt.ArrayLike | None) -> FloatArray:
+    """(3,) of ±1: sign of each raw axis against the body frame's axis; +1 where ``signs`` is ``None``.
+
+    Raises ``InputError`` when ``signs`` is not three numbers ±1.
+    """
+    if signs is None:
+        return np.ones(3)
+    array = np.asarray(signs, dtype=np.float64)
+    if array.shape != (3,) or not np.all(np.abs(array) == 1.0):
+        raise InputError(f"axis signs must be three numbers +1 or -1, got {signs!r}")
+    return array

@@ -90,19 +90,17 @@ def observability_findings(
             n_parameters=9,
             worst_prediction_g=worst,
         )
-        return
-    if worst > WEAK_PREDICTION * relative_sigma:
+    elif worst > WEAK_PREDICTION * relative_sigma:
         yield Finding.of(
             FindingCode.WEAKLY_OBSERVABLE,
             "poses",
+            worst_prediction_g=worst,
             measured_g=relative_sigma,
             weakest=design.weakest(),
             advice=advice,
             rank=design.rank,
             n_parameters=9,
-            worst_prediction_g=worst,
         )
-        return
 
 
 def _unseen(design: PoseDesign) -> list[str]:
@@ -143,17 +141,13 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known
         worst = int(np.argmax(np.abs(np.log(ratio))))
         # Uncalibrated consumer triads are within 10 % of their data sheet; a wrong unit or |g| is off by far more.
         if abs(np.log(ratio[worst])) > 0.15:
+            scale, unit = ratio[worst], raw_unit.value
             yield Finding.of(
-                FindingCode.SCALE_NOT_NOMINAL,
-                "accelerometer",
-                axis=worst + 1,
-                scale_ratio=ratio[worst],
-                unit=raw_unit.value,
+                FindingCode.SCALE_NOT_NOMINAL, "accelerometer", axis=worst + 1, scale_ratio=scale, unit=unit
             )
 
 
 def convergence_findings(is_converged: bool, stopped_because: str) -> Iterator[Finding]:
     """Finding where the solver stopped without convergence."""
-    if is_converged:
-        return
-    yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)
+    if not is_converged:
+        yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)

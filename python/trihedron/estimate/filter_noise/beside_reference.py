@@ -7,7 +7,6 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.filter_noise.angle import angle_stretches
 from trihedron.estimate.filter_noise.left_over import PER_KELVIN, Left, beside_temperature, left_over, of_temperature
 from trihedron.estimate.filter_noise.strengths import (
     PREFERRED,
@@ -20,7 +19,7 @@ from trihedron.estimate.filter_noise.strengths import (
     with_slow_error_of,
 )
 from trihedron.estimate.filter_noise.stretch import NAMES, Errors, Stretch, errors_over, matern
-from trihedron.estimate.filter_noise.velocity import velocity_stretches
+from trihedron.estimate.filter_noise.stretches import angle_stretches, velocity_stretches
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion

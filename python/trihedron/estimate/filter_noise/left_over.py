@@ -46,26 +46,20 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
     by: dict[Cause, tuple[FloatArray, FloatArray]] = {"calibration": (carried(grid.gyroscope), elements)}
     if side.force is not None and G_SENSITIVITY in found.places[0]:
         by["g-sensitivity"] = (carried(side.force), _g_sensitivities(found))
+    ahead = {h: max(1, round(h / grid.step_s)) for h in horizons_s}
     return {
-        h: {
-            cause: mean_square(_steps(angle, max(1, round(h / grid.step_s))), errors)
-            for cause, (angle, errors) in by.items()
-        }
-        for h in horizons_s
+        h: {cause: mean_square(angle[n:] - angle[:-n], errors) for cause, (angle, errors) in by.items()}
+        for h, n in ahead.items()
     }
 
 
 def _g_sensitivities(found: MotionFit) -> FloatArray:
     """(k, 9) draws of the g-sensitivity: its likelihood without the fit's prior, with one size for all elements."""
     name = G_SENSITIVITY
-    size = float(np.mean(found.wider.get(name, 1.0) * found.sides[0].sigma(name)))
+    size = float(np.mean(found.sides[0].sigma(name, found.wider)))
     inverse = np.linalg.inv(found.covariance(0, (name,)))
     cov = np.asarray(np.linalg.inv(inverse - (1.0 - FLAT) * np.eye(len(inverse)) / size**2), float)
     return drawn_errors(cov @ inverse @ found.value(0, name), cov, size * PARTS)
-
-
-def _steps(angle: FloatArray, ahead: int) -> FloatArray:
-    return angle[ahead:] - angle[:-ahead]
 
 
 def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import NORMAL_95
 from trihedron.records import NoiseAxis, Segments, TermName
@@ -32,17 +32,13 @@ def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
 def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
     terms = [axis.terms[term] for axis in axes]
     if not all(one.is_present for one in terms):
-        limit = _rms([max(one.limit, one.value) for one in terms])
+        limit = rms_of(np.array([max(one.limit, one.value) for one in terms]))
         return Bounded(0.0, 0.0, limit, True)
-    value = _rms([one.value for one in terms])
+    value = rms_of(np.array([one.value for one in terms]))
     # Errors of the axes are independent: variances add.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
     factor = math.exp(NORMAL_95 * spread / max(value, 1e-300))
     return Bounded(value, value / factor, value * factor)
-
-
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(sum(v * v for v in values) / len(values))
 
 
 def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
@@ -72,7 +68,7 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
         longest = max(longest, length)
     if not errors:
         return None
-    return TiltCheck(len(errors), longest, _rms(errors), math.sqrt(float(np.mean(predicted))))
+    return TiltCheck(len(errors), longest, rms_of(np.array(errors)), math.sqrt(float(np.mean(predicted))))
 
 
 def between_intervals(

@@ -199,12 +199,12 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     # The fit has a prior as wide as the scale: below √2 the moves add less information than the prior.
     rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
-    is_weak = rank < 9 or _worst(covariance, S) > WEAK
+    is_weak = rank < 9 or worst_sigma(covariance, S) > WEAK
     advice = (_advice(covariance, size),) if is_weak else ()
     return Observability(rank, 9, condition, singular, weakest, advice, pairs)
 
 
-def _worst(covariance: FloatArray, S: FloatArray) -> float:
+def worst_sigma(covariance: FloatArray, S: FloatArray) -> float:
     """Standard uncertainty of the least determined direction in ``S_ω``, relative to its norm."""
     size = float(np.linalg.norm(S, 2))
     return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
@@ -242,7 +242,7 @@ def observability_findings(observability: Observability, covariance: FloatArray,
             advice=advice,
         )
         return
-    worst = _worst(covariance, S)
+    worst = worst_sigma(covariance, S)
     if worst > HARDLY_SEEN:
         yield Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)
     elif worst > WEAK:

@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
-from trihedron.estimate.noise.terms import continuous_densities
+from trihedron.estimate.noise.spectrum import continuous_densities
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.kalman import AxisNoise
 from trihedron.records.noise import NoiseAxis

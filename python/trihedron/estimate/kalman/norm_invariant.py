@@ -9,8 +9,14 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.kalman.model import check_innovations, consistency_findings, is_settled, shaping_model
-from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
+from trihedron.estimate.kalman.per_axis import (
+    check_innovations,
+    consistency_findings,
+    is_settled,
+    noise_per_axis,
+    pose_arrays,
+    shaping_model,
+)
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
@@ -89,9 +95,9 @@ class NormFilter:
 
     def calibration(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """``S`` (3, 3), ``b`` (3,) and covariance (12, 12) of ``f = S raw + b``."""
-        S, b = self._centred()
+        theta, jacobian = self._filter.parameters, self._expand()
+        S, b = (jacobian[:9] @ theta).reshape(3, 3), theta[6:]
         # b = b_centred − S bias
-        jacobian = self._expand()
         for k in range(3):
             jacobian[9 + k] -= self._bias @ jacobian[3 * k : 3 * k + 3]
         return S, b - S @ self._bias, jacobian @ self._filter.covariance @ jacobian.T
@@ -105,11 +111,6 @@ class NormFilter:
                 jacobian[3 * j + i, k] = 1.0
         jacobian[9:, 6:] = np.eye(3)
         return jacobian
-
-    def _centred(self) -> tuple[FloatArray, FloatArray]:
-        theta = self._filter.parameters
-        S: FloatArray = (self._expand()[:9] @ theta).reshape(3, 3)
-        return S, theta[6:]
 
     def innovations(self) -> tuple[FloatArray, FloatArray]:
         """Innovations (n,) of the latest run and their predicted standard deviations (n,), m/s²."""

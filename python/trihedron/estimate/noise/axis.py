@@ -13,8 +13,7 @@ from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
-from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
 from trihedron.probability import NORMAL_95
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
@@ -69,12 +68,6 @@ _QUANTISATION, _WHITE, _FLICKER, _WALK = range(len(SYMBOLS))
 def invert(selection: Selection) -> _core.SpectralInversion:
     """The inverted likelihood of the selection's spectrum with all terms in it, the ramp integrated out."""
     return selection.spectrum.likelihood().invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
-
-
-def slow_pair_of(found: _core.SpectralInversion) -> SlowPair:
-    """Whether the spectrum needs B and K together."""
-    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
-    return SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
 
 
 def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, NoiseTerm]:
@@ -168,10 +161,11 @@ def identify_axis(
         findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     found = invert(selection)
-    pair = slow_pair_of(found)
+    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
+    pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
     terms = terms_of(found, pair)
-    white = with_level(terms[TermName.WHITE], blank.sample_sigma, blank.resolution)
-    terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
+    white, level = terms[TermName.WHITE], level_share(blank.sample_sigma, blank.resolution)
+    terms[TermName.WHITE] = widened(white, math.hypot(level, bend, tails) * white.estimate)
     axis = replace(
         blank,
         terms=MappingProxyType(terms),
@@ -189,9 +183,6 @@ def identify_axis(
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:
     """An axis without terms yet: length, mean, noise of a reading, resolution and findings on these."""
     unknown = {term: NoiseTerm(term, False, 0.0, 0.0, 0.0, math.inf, math.inf, 0.0) for term in TermName}
-    findings = [*remarks.written(written)]
-    if written.sigma == 0.0 or written.is_dead:
-        findings.append(remarks.dead(written, unit))
     return NoiseAxis(
         name=name,
         unit=unit,
@@ -202,7 +193,7 @@ def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float
         sample_sigma=written.sigma,
         resolution=written.resolution,
         terms=MappingProxyType(unknown),
-        findings=tuple(findings),
+        findings=tuple(remarks.of_readout(written, unit)),
     )
 
 
@@ -254,11 +245,6 @@ def level_share(sigma: float, resolution: float) -> float:
     s2 = max((sigma / resolution) ** 2 - 1.0 / 12.0, 0.0)
     swing = (1.0 / math.pi**2 + 4.0 * s2) * math.exp(-2.0 * math.pi**2 * s2)
     return 0.5 * swing / math.sqrt(2.0) / (s2 + 1.0 / 12.0)
-
-
-def with_level(term: NoiseTerm, sigma: float, resolution: float) -> NoiseTerm:
-    """N with an interval that is valid for any position of the mean inside an LSB."""
-    return widened(term, level_share(sigma, resolution) * term.estimate)
 
 
 def widened(term: NoiseTerm, own: float) -> NoiseTerm:

@@ -31,26 +31,16 @@ def readings_of(
     columns: list[FloatArray] = []
     names: list[str] = []
     units: list[str] = []
-    stated = {"gyro": rad_s_per_count, "accel": m_s2_per_count}
-    for sensor, readings, unit, factor, si_unit in (
-        (
-            "gyro",
-            recording.gyroscope,
-            recording.gyroscope_unit.value,
-            rad_s_per_count or rate_to_si(recording.gyroscope_unit),
-            "rad/s",
-        ),
-        (
-            "accel",
-            recording.accelerometer,
-            recording.accelerometer_unit.value,
-            m_s2_per_count or acceleration_to_si(recording.accelerometer_unit),
-            "m/s^2",
-        ),
-    ):
+    gyro, accel = recording.gyroscope_unit, recording.accelerometer_unit
+    sensors = (
+        ("gyro", recording.gyroscope, gyro.value, rad_s_per_count, rate_to_si(gyro), "rad/s"),
+        ("accel", recording.accelerometer, accel.value, m_s2_per_count, acceleration_to_si(accel), "m/s^2"),
+    )
+    for sensor, readings, unit, stated, known, si_unit in sensors:
         if readings is None:
             continue
-        reject_size_of_a_unit(sensor, unit, stated[sensor])
+        reject_size_of_a_unit(sensor, unit, stated)
+        factor = stated or known
         columns.append(readings if factor in (None, 1.0) else readings * factor)
         names += [f"{sensor} {axis}" for axis in AXES]
         units += [unit if factor is None else si_unit] * 3

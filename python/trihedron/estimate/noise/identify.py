@@ -175,7 +175,9 @@ def identify_noise(
         seen = list(pool.map(screened, range(channels)))
         cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
         if cuts:
-            findings.append(remarks.stretches_excluded(cuts, n, rate_hz))
+            total = sum(b - a for a, b in cuts)
+            span = {"n_stretches": len(cuts), "excluded_s": total / rate_hz, "share": total / n}
+            findings.append(Finding.of(FindingCode.STRETCHES_EXCLUDED, **span))
         findings += _motion(seen, rate_hz)
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))

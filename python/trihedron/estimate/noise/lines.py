@@ -9,8 +9,7 @@ from scipy.special import chdtri
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
-from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 from trihedron.records.noise import SpectralLine
 
 FALSE_ALARM = 1e-4

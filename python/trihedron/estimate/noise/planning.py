@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from trihedron.errors import InputError
-from trihedron.estimate.noise.spectrum import line_coefficients
-from trihedron.estimate.noise.terms import SYMBOLS, continuous_densities
+from trihedron.estimate.noise.spectrum import SYMBOLS, continuous_densities, line_coefficients
 from trihedron.records.noise import NoiseAxis, TermName
 
 LONGEST_S = 30 * 86400.0

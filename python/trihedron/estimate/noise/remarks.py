@@ -37,30 +37,15 @@ def events(
         )
 
 
-def stretches_excluded(stretches: Sequence[tuple[int, int]], n: int, rate_hz: float) -> Finding:
-    """Finding with the number, duration and share of the excluded intervals."""
-    total = sum(b - a for a, b in stretches)
-    return Finding.of(
-        FindingCode.STRETCHES_EXCLUDED, n_stretches=len(stretches), excluded_s=total / rate_hz, share=total / n
-    )
-
-
-def written(readings: Readout) -> Iterator[Finding]:
-    """Finding for readings at the range limit of one axis."""
-    if readings.clipped == 0.0:
-        return
-    yield Finding.of(FindingCode.CLIPPING, "static", share=readings.clipped)
-
-
-def dead(readings: Readout, unit: str) -> Finding:
-    """Finding for noise that is too small for the resolution of the ADC."""
-    return Finding.of(
-        FindingCode.QUANTISATION_DEAD,
-        sigma=readings.sigma,
-        resolution=readings.resolution,
-        unit=unit,
-        repeated=readings.repeated,
-    )
+def of_readout(readings: Readout, unit: str) -> Iterator[Finding]:
+    """Findings for readings at the range limit, and for noise that is too small for the resolution of the ADC."""
+    if readings.clipped > 0.0:
+        yield Finding.of(FindingCode.CLIPPING, "static", share=readings.clipped)
+    if readings.sigma == 0.0 or readings.is_dead:
+        sigma, resolution, repeated = readings.sigma, readings.resolution, readings.repeated
+        yield Finding.of(
+            FindingCode.QUANTISATION_DEAD, sigma=sigma, resolution=resolution, unit=unit, repeated=repeated
+        )
 
 
 def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
@@ -90,24 +75,10 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
     )
 
 
-def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
-    """Finding where slow noise is significant, but B and K are not separable."""
-    flicker, walk = axis.terms[TermName.BIAS_INSTABILITY], axis.terms[TermName.RATE_RANDOM_WALK]
-    evidence = axis.slow_pair.evidence if axis.slow_pair is not None else 0.0
-    return Finding.of(
-        FindingCode.SLOW_NOISE_UNRESOLVED,
-        evidence=evidence,
-        unit=axis.unit,
-        flicker_lower=flicker.lower,
-        flicker_upper=flicker.upper,
-        walk_lower=walk.lower,
-        walk_upper=walk.upper,
-    )
-
-
 def about_terms(axis: NoiseAxis) -> Iterator[Finding]:
     """Findings for drift, inseparable slow noise, and a log too short for a minimum of the Allan deviation."""
-    ramp = axis.terms[TermName.RATE_RAMP]
+    terms = axis.terms
+    ramp, flicker, walk = terms[TermName.RATE_RAMP], terms[TermName.BIAS_INSTABILITY], terms[TermName.RATE_RANDOM_WALK]
     if ramp.is_present:
         yield Finding.of(
             FindingCode.LOG_DRIFT,
@@ -117,7 +88,14 @@ def about_terms(axis: NoiseAxis) -> Iterator[Finding]:
             unit=axis.unit,
         )
     if axis.is_slow_noise_unresolved:
-        yield _slow_noise_unresolved(axis)
-    if not axis.terms[TermName.RATE_RANDOM_WALK].is_present and axis.optimal_averaging() is None:
-        limit = axis.terms[TermName.RATE_RANDOM_WALK].limit
-        yield Finding.of(FindingCode.LOG_TOO_SHORT, limit=limit, unit=axis.unit)
+        yield Finding.of(
+            FindingCode.SLOW_NOISE_UNRESOLVED,
+            evidence=axis.slow_pair.evidence if axis.slow_pair is not None else 0.0,
+            unit=axis.unit,
+            flicker_lower=flicker.lower,
+            flicker_upper=flicker.upper,
+            walk_lower=walk.lower,
+            walk_upper=walk.upper,
+        )
+    if not walk.is_present and axis.optimal_averaging() is None:
+        yield Finding.of(FindingCode.LOG_TOO_SHORT, limit=walk.limit, unit=axis.unit)

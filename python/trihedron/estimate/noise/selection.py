@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -12,8 +12,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 
 EVIDENCE = 8.0
 """Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
@@ -74,26 +73,25 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
         raise InputError(f"no spectral ordinate lies below {highest_hz} Hz")
     order = np.argsort(frequency, kind="stable")
 
-    def gather(parts: list[FloatArray]) -> FloatArray:
+    def gather(of_band: Callable[[Ordinates], FloatArray]) -> FloatArray:
+        parts = [of_band(band)[..., p] for band, p in zip(bands, pick, strict=True)]
         return np.asarray(np.concatenate(parts, axis=-1)[..., order])
 
-    frequency = frequency[order]
-    count = gather([band.count[p] for band, p in zip(bands, pick, strict=True)])
+    frequency, count = frequency[order], gather(lambda band: band.count)
     key = np.floor(np.log(frequency / frequency[0]) / np.log(BIN_WIDTH))
     edges = np.flatnonzero(np.concatenate([[True], np.diff(key) > 0]))
     total = np.add.reduceat(count, edges)
 
-    def averaged(parts: list[FloatArray]) -> FloatArray:
-        return np.asarray(np.add.reduceat(gather(parts) * count, edges, axis=-1) / total)
+    def averaged(of_band: Callable[[Ordinates], FloatArray]) -> FloatArray:
+        return np.asarray(np.add.reduceat(gather(of_band) * count, edges, axis=-1) / total)
 
-    chosen = list(zip(bands, pick, strict=True))
     return BinnedSpectrum(
-        frequency_hz=averaged([band.frequency_hz[p] for band, p in chosen]),
+        frequency_hz=averaged(lambda band: band.frequency_hz),
         count=total,
-        power=averaged([band.power[p] for band, p in chosen]),
-        cross=averaged([band.cross[p] for band, p in chosen]),
-        square=averaged([band.line[p] ** 2 for band, p in chosen]),
-        basis=averaged([band.basis[:, p] for band, p in chosen]),
+        power=averaged(lambda band: band.power),
+        cross=averaged(lambda band: band.cross),
+        square=averaged(lambda band: band.line**2),
+        basis=averaged(lambda band: band.basis),
     )
 
 
@@ -113,12 +111,11 @@ def select(
     bands: Sequence[Ordinates],
     highest_hz: float,
     masked: Sequence[BoolArray] | None = None,
-    evidence: float = EVIDENCE,
     *,
     tolerance: float = 0.0,
     is_cornered: bool = False,
 ) -> Selection:
-    """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if needed.
+    """The subset of {Q, N, B, K, R} of least deviance plus ``EVIDENCE`` per term, and a Gauss-Markov process if needed.
 
     Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
@@ -133,18 +130,18 @@ def select(
                 table[active, has_ramp] = likelihood.fit(active, has_ramp)
 
     def price(key: tuple[tuple[int, ...], bool]) -> float:
-        return table[key].deviance + evidence * (len(key[0]) + key[1])
+        return table[key].deviance + EVIDENCE * (len(key[0]) + key[1])
 
     best = min(table, key=price)
     if not is_cornered:
         cornered = _cornered(bands, table[best].strength)
         if any(c.any() for c in cornered):
             both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
-            return select(bands, highest_hz, both, evidence, tolerance=tolerance, is_cornered=True)
+            return select(bands, highest_hz, both, tolerance=tolerance, is_cornered=True)
     active, has_ramp = best
     plain = Selection(active, has_ramp, table[best], spectrum)
     step_s = min(band.step_s / band.block for band in bands)
-    return _with_gauss_markov(step_s, plain, evidence) or plain
+    return _with_gauss_markov(step_s, plain) or plain
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
@@ -160,12 +157,12 @@ def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[Boo
     return out
 
 
-def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Selection | None:
+def _with_gauss_markov(step_s: float, plain: Selection) -> Selection | None:
     # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
     spectrum = plain.spectrum.capped(TOLERANCE_GAUSS_MARKOV)
     frequency = spectrum.frequency_hz
     price_plain = spectrum.likelihood().fit(plain.active, plain.has_ramp).deviance
-    price_plain += evidence * (len(plain.active) + plain.has_ramp)
+    price_plain += EVIDENCE * (len(plain.active) + plain.has_ramp)
     # With a shorter time constant the process is white in this log, with a longer one a random walk.
     shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
     extra = len(SYMBOLS)
@@ -179,7 +176,7 @@ def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Sele
         found = []
         for model in models:
             deviance = likelihood.fit(model, plain.has_ramp).deviance
-            price = deviance + evidence * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
+            price = deviance + EVIDENCE * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
             found.append((price, model, plain.has_ramp))
         return min(found)
 

@@ -86,51 +86,29 @@ def stream_noise(
             keep(seen, now)
     if stream is None:
         raise InputError("the log holds no chunk of readings")
-    *_, n, means = stream.finish()
-    channels = len(means)
-    names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
-    curve = _curve(stream, rate_hz, names, tuple(units) or ("",) * channels)
-    first = np.concatenate(head)
-    block = -(-n // LONGEST_TRANSFORM)
-    axes = [
-        _axis(stream, c, block, rate_hz, np.ascontiguousarray(first[:, c]), curve, n, means[c]) for c in range(channels)
-    ]
-    return Noise(axes=tuple(axes), curve=curve, source=source)
-
-
-def _curve(stream: _core.AllanStream, rate_hz: float, names: tuple[str, ...], units: tuple[str, ...]) -> AllanCurve:
-    """The curve of all readings of a stream.
-
-    Longer clusters start at every ``stride``-th reading only, at least 64 times per cluster: they contain the
-    information of every start and have its degrees of freedom.
-    """
-    found, variance, terms, stride, n, _ = stream.finish()
-    clusters = np.array(found)
-    starts = np.repeat((n - 2.0 * clusters + 1.0)[:, np.newaxis], len(variance), axis=1)
-    return curve_with_intervals(
-        "overlapping", rate_hz, n, clusters, variance.T, terms.T, starts, 0.95, names, units, stride
+    found, variance, terms, stride, n, means = stream.finish()
+    lengths = np.array(found)
+    # Longer clusters start at every ``stride``-th reading only, at least 64 times per cluster: they contain the
+    # information of every start and have its degrees of freedom.
+    weight = np.repeat((n - 2.0 * lengths + 1.0)[:, np.newaxis], len(means), axis=1)
+    curve = curve_with_intervals(
+        "overlapping", rate_hz, n, lengths, variance.T, terms.T, weight, 0.95, tuple(names), tuple(units), stride
     )
+    heads = np.ascontiguousarray(np.concatenate(head).T)
+    axes = tuple(_axis(stream, c, mean, heads[c], curve) for c, mean in enumerate(means))
+    return Noise(axes=axes, curve=curve, source=source)
 
 
 def _stream_of(channels: int, sizes: Sequence[int], budget_bytes: int) -> _core.AllanStream:
     return _core.AllanStream(channels, sizes, max(budget_bytes // (8 * channels), _core.AllanStream.LEAST_BUDGET))
 
 
-def _axis(
-    stream: _core.AllanStream,
-    channel: int,
-    block: int,
-    rate_hz: float,
-    head: FloatArray,
-    curve: AllanCurve,
-    n: int,
-    mean: float,
-) -> NoiseAxis:
-    name, unit = curve.names[channel], curve.units[channel]
+def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray, curve: AllanCurve) -> NoiseAxis:
+    name, unit, rate_hz, n = curve.names[channel], curve.units[channel], curve.rate_hz, curve.n_samples
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(head))
     if blank.sample_sigma == 0.0:
         return blank
-    means, size = stream.means(channel, block)
+    means, size = stream.means(channel, -(-n // LONGEST_TRANSFORM))
     steps, _ = steps_and_impacts(means)
     blank = replace(blank, findings=(*remarks.events(steps, [], [], rate_hz / size, unit), *blank.findings))
     bands = ordinates_of_means(means, size, rate_hz, stretches_between(len(means), steps), head)

@@ -10,8 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference.coloured import Solution, solve
-from trihedron.estimate.reference.together import Grid, Reference
-from trihedron.estimate.reference.windows import Windows
+from trihedron.estimate.reference.together import Grid, Reference, Windows
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 KNOWN = 0.05

@@ -104,11 +104,12 @@ class Beside:
         }
         return not is_without.get(name, False)
 
-    def sigma(self, name: str) -> FloatArray:
-        """(k,) prior σ of a parameter, SI."""
+    def sigma(self, name: str, wider: Mapping[str, float]) -> FloatArray:
+        """(k,) prior σ of a parameter, SI, times its factor in ``wider``."""
+        by = wider.get(name, 1.0)
         if name == "S":
-            return OF_SCALE * np.tile(np.linalg.norm(self.start.S, axis=0), 3)
-        return np.array(CLOCK) if name == "clock" else np.full(NUMBERS[name], SIZES[name])
+            return by * (OF_SCALE * np.tile(np.linalg.norm(self.start.S, axis=0), 3))
+        return by * (np.array(CLOCK) if name == "clock" else np.full(NUMBERS[name], SIZES[name]))
 
     def values(self, point: Point, name: str) -> FloatArray:
         """Value (k,) of a parameter at a point, SI."""
@@ -187,7 +188,7 @@ class Beside:
             world, body = point.slow.at(blocks.time_s())
             observed = observed + world + np.einsum("mij,mj->mi", blocks.attitude(), body)
         names = list(places)
-        sigma = np.concatenate([wider.get(name, 1.0) * self.sigma(name) for name in names])
+        sigma = np.concatenate([self.sigma(name, wider) for name in names])
         about = np.concatenate([self._prior(name) - self.values(point, name) for name in names])
         first = sum(NUMBERS[name] for name in names[: names.index("b")])
         return Problem(

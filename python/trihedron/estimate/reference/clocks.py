@@ -49,9 +49,10 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     ``InputError`` when the motions differ at every lag, or the reference's clock jumps.
     """
     ours = _size_of_rate(grid)
-    theirs = _reference_size(reference, grid.step_s)
+    first_s, last_s = reference.motion.time_s[[0, -1]].tolist()
+    theirs = _reference_size(reference, np.arange(first_s, last_s, grid.step_s), grid.step_s)
     offset, correlation = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
-    offset += reference.motion.time_s[0] - grid.time_s[0]
+    offset += first_s - grid.time_s[0]
     # A clock jump reduces the correlation of the whole log: stretches are tested first.
     refined = _refined(ours, grid, reference, offset)
     if correlation < LEAST_CORRELATION:
@@ -71,8 +72,8 @@ def _size_of_rate(grid: Grid) -> FloatArray:
     return np.asarray(size, dtype=np.float64)
 
 
-def _reference_size(reference: Reference, step: float) -> FloatArray:
-    t = np.arange(reference.motion.time_s[0], reference.motion.time_s[-1], step)
+def _reference_size(reference: Reference, t: FloatArray, step: float) -> FloatArray:
+    """(n,) magnitude of the reference's rate at times (n,) ``step`` apart; NaN where it has no rows."""
     # The differentiated noise of a tracker exceeds the motion unless it is averaged.
     rate = running_mean(reference.rate(t), max(1, round(0.1 / step)))
     size = np.linalg.norm(rate, axis=1)
@@ -154,10 +155,8 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         if np.isfinite(a).sum() < 0.7 * length or np.nanstd(a) < 0.3 * spread:
             continue
         t = grid.time_s[start] + offset + grid.step_s * np.arange(-search, length + search)
-        covered = reference.covers(t)
-        size = np.linalg.norm(running_mean(reference.rate(t), max(1, round(0.1 / grid.step_s))), axis=1)
-        size[~covered] = np.nan
-        if covered.sum() < length:
+        size = _reference_size(reference, t, grid.step_s)
+        if np.isfinite(size).sum() < length:
             continue
         correlation, lag, n = _correlations(a, size)
         is_near = (lag >= 0) & (lag <= 2 * search) & (n >= 0.7 * length)

@@ -4,7 +4,7 @@ A tracker's noise is blue, a table's wobble has lines, a bias drifts, and all of
 model can make an estimate worse than ordinary least squares; a jackknife over blocks of time selects the model.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,10 +74,8 @@ def solve(
             best = spread, solution
     assert best is not None
     found = best[1]
-    return Solution(
-        found.theta / scale, found.covariance / np.outer(scale, scale), found.influence / scale[:, None, None],
-        found.residual, found.is_used, found.widened, found.rms_held_out, found.model,
-    )  # fmt: skip
+    theta, covariance = found.theta / scale, found.covariance / np.outer(scale, scale)
+    return replace(found, theta=theta, covariance=covariance, influence=found.influence / scale[:, None, None])
 
 
 def _solve(

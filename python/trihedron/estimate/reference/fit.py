@@ -12,7 +12,7 @@ from trihedron.estimate.reference.accelerometer import ForceFit, fit_acceleromet
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
-from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
+from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope, held_out
 from trihedron.estimate.reference.mismatch import (
     reject_parts_elsewhere,
     reject_still,
@@ -22,7 +22,6 @@ from trihedron.estimate.reference.mismatch import (
     share_left,
 )
 from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
-from trihedron.estimate.reference.replay import held_out
 from trihedron.estimate.reference.smoothed import (
     bias_over_time,
     error_carried,
@@ -30,8 +29,7 @@ from trihedron.estimate.reference.smoothed import (
     frame_covariance,
     without_slow_error,
 )
-from trihedron.estimate.reference.together import Grid, Reference, grid_of, plateaus
-from trihedron.estimate.reference.windows import Windows, windows_on
+from trihedron.estimate.reference.together import Grid, Reference, Windows, grid_of, plateaus, windows_on
 from trihedron.estimate.reference.worth import earth_of, error_of, remarks
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion

@@ -53,13 +53,13 @@ class MotionFit:
     def value(self, k: int, name: str) -> FloatArray:
         """Value (n,) of a parameter of recording k, SI."""
         at = self.places[k][name]
-        sigma = self.wider.get(name, 1.0) * self.sides[k].sigma(name)
+        sigma = self.sides[k].sigma(name, self.wider)
         return np.asarray(self.sides[k].values(self.points[k], name) + sigma * self.fitted.mean[at])
 
     def covariance(self, k: int, names: tuple[str, ...]) -> FloatArray:
         """(n, n) covariance of parameters of recording k, SI."""
         at = np.concatenate([self.places[k][name] for name in names])
-        sigma = np.concatenate([self.wider.get(name, 1.0) * self.sides[k].sigma(name) for name in names])
+        sigma = np.concatenate([self.sides[k].sigma(name, self.wider) for name in names])
         return np.asarray(self.fitted.covariance[np.ix_(at, at)] * np.outer(sigma, sigma))
 
 
@@ -90,14 +90,14 @@ def fit_motion(
         turn, rounds = (1, rounds + 1) if turn and is_new else (turn + 1, rounds)
         # Log densities are compared about the same slow error: another one is another linear model.
         points = [
-            replace(point, lost_s=np.append(point.lost_s, one), slow=_slow(side, problem, s, mean))
+            replace(point, lost_s=np.append(point.lost_s, one), slow=slow_error(side, problem, s, mean))
             for side, point, problem, s, one in zip(sides, points, problems, strengths, lost, strict=True)
         ]
         problems = _problems(sides, points, where, wider, block_s)
         height = at_the_point(problems, strengths)
         for shorter in SHORTER:
             ahead = [
-                side.moved(point, {name: shorter * _si(side, name, wider) * mean[at] for name, at in own.items()})
+                side.moved(point, {name: shorter * side.sigma(name, wider) * mean[at] for name, at in own.items()})
                 for side, point, own in zip(sides, points, where, strict=True)
             ]
             there = _problems(sides, ahead, where, wider, block_s)
@@ -118,19 +118,14 @@ def _deviating(problem: Problem, strengths: FloatArray, mean: FloatArray) -> Flo
     return np.asarray(problem.blocks.time_s()[p < SURPRISE / max(normal.rows, 1)])
 
 
-def _slow(side: Beside, problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError | None:
-    return None if side.reference.motion.attitude is None else slow_error(problem, strengths, mean)
-
-
-def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
-    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start."""
+def slow_error(side: Beside, problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError | None:
+    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start;
+    ``None`` of a reference without attitudes."""
+    if side.reference.motion.attitude is None:
+        return None
     *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))
-
-
-def _si(side: Beside, name: str, wider: Mapping[str, float]) -> FloatArray:
-    return wider.get(name, 1.0) * side.sigma(name)
 
 
 def _problems(

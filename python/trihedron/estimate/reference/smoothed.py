@@ -24,7 +24,6 @@ from trihedron.estimate.reference.likelihood import (
     STRENGTHS,
     TYPICAL,
     Problem,
-    Together,
     together,
 )
 from trihedron.estimate.reference.motion import MotionFit, slow_error
@@ -46,7 +45,7 @@ def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
 def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Value and variance (m, 3) at given strengths (a recording, 8)."""
     side, own, problem = found.sides[k], found.places[k], found.problems[k]
-    all_of = posterior(found, strengths)
+    all_of = together(found.problems, strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
     columns, beside, _, _ = problem.blocks.smoothed(problem.table, np.exp(strengths[k]).tolist())
     m = len(beside)
@@ -72,7 +71,7 @@ def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
     of the bias since the start.
     """
     problem = found.problems[k]
-    mean = posterior(found, found.fitted.strengths).mean[problem.index]
+    mean = together(found.problems, found.fitted.strengths).mean[problem.index]
     strengths = np.exp(found.fitted.strengths[k])
     columns, beside, _, _ = problem.blocks.smoothed(problem.table, strengths.tolist())
     m = len(beside)
@@ -105,9 +104,9 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
     determine them better than either, and the remaining tilt error is small."""
     side, point, problem = found.sides[k], found.points[k], found.problems[k]
     motion = side.reference.motion
-    if motion.attitude is None:
+    slow = slow_error(side, problem, found.fitted.strengths[k], together(found.problems, found.fitted.strengths).mean)
+    if slow is None or motion.attitude is None:
         return side.reference
-    slow = slow_error(problem, found.fitted.strengths[k], posterior(found, found.fitted.strengths).mean)
     time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
     own = slow.compensated(time, motion.attitude @ point.mounting) @ point.mounting.T
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
@@ -123,22 +122,17 @@ def frame_covariance(found: MotionFit, k: int) -> FloatArray:
     if side.reference.motion.attitude is None:
         return np.zeros((3, 3))
     at = found.places[k]["S"]
-    sigma = found.wider.get("S", 1.0) * side.sigma("S")
+    sigma = side.sigma("S", found.wider)
     # Pseudoinverse of the change of S by rotations of the body about each axis.
     turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3))) * sigma
     out = np.zeros((3, 3))
     for strengths in found.fitted.draws:
         without = strengths.copy()
         without[:, BODY] = (TYPICAL - FARTHEST * SPREAD)[BODY]
-        both, alone = (posterior(found, one).covariance[np.ix_(at, at)] for one in (strengths, without))
+        both, alone = (together(found.problems, one).covariance[np.ix_(at, at)] for one in (strengths, without))
         values, vectors = np.linalg.eigh(turn @ (both - alone) @ turn.T)
         out += (vectors * np.maximum(values, 0.0)) @ vectors.T / len(found.fitted.draws)
     return out
-
-
-def posterior(found: MotionFit, strengths: FloatArray) -> Together:
-    """Posterior of all parameters at given strengths; biases are those at the start."""
-    return together(found.problems, strengths)
 
 
 def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray, frame: FloatArray) -> FloatArray:
@@ -170,7 +164,7 @@ def _under(
     """Mean (n,), up to a constant common to all ``strengths`` (a recording, 8), and covariance (n, n) of the errors of
     (1); L is ``direct`` (n, p), ``nodes`` holds H of the world and of the body error, (m, 3, n) each."""
     problem = found.problems[k]
-    all_of = posterior(found, strengths)
+    all_of = together(found.problems, strengths)
     mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
     if nodes is None:
         return direct @ mean, direct @ cov @ direct.T

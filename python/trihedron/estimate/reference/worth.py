@@ -169,7 +169,5 @@ def _up(result: AgainstReference) -> Iterator[Finding]:
     lean = float(np.degrees(np.arccos(np.clip(abs(up[2]), 0.0, 1.0))))
     if up[2] < -np.cos(np.radians(45.0)):
         yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "down", up_x=up[0], up_y=up[1], up_z=up[2])
-        return
-    if lean > TILT_DEG:
+    elif lean > TILT_DEG:
         yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "leans", lean_deg=lean, up_x=up[0], up_y=up[1], up_z=up[2])
-        return

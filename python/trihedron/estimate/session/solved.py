@@ -6,16 +6,23 @@ import numpy as np
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import INPUT_ERRORS
-from trihedron.estimate.gyroscope.findings import describe, findings_of
-from trihedron.estimate.gyroscope.lost_turns import PossibleLosses, is_asked_for_losses, losses_that_fit, relative_sigma
+from trihedron.estimate.accelerometer.bending import with_bending
+from trihedron.estimate.accelerometer.verdict import residual_findings
+from trihedron.estimate.gyroscope.findings import describe, findings_of, worst_sigma
+from trihedron.estimate.gyroscope.lost_samples import (
+    PossibleLosses,
+    is_asked_for_losses,
+    losses_that_fit,
+    relative_sigma,
+    seen_in_motion,
+)
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.gyroscope.missing_samples import seen_in_motion
-from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality
+from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import chdtri
-from trihedron.records.calibration import SensorCalibration
+from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -237,8 +244,55 @@ def scale_by_gravity(
     quality, seen = gyroscope.quality, gyroscope.observability
     if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:
         return None
-    size = float(np.linalg.norm(gyroscope.S, 2))
-    sigma = float(np.sqrt(max(np.linalg.eigvalsh(gyroscope.covariance[:9, :9])[-1], 0.0))) / size
-    if not sigma < LARGEST_DOUBT:
-        return None
-    return gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)
+    sigma = worst_sigma(gyroscope.covariance[:9, :9], gyroscope.S)
+    return (gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)) if sigma < LARGEST_DOUBT else None
+
+
+# Joint fit of both sensors: the reference solution, with the covariance of all 24 parameters.
+
+
+def calibrate_joint(
+    recording: Recording,
+    segments: Segments,
+    accelerometer: SensorCalibration,
+    gravity_m_s2: float,
+    gravity_source: str,
+    nominal_scale: FloatArray | float | None = None,
+) -> Calibration:
+    """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
+
+    The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
+    lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
+    ``accelerometer``, calibrated alone; ``nominal_scale`` and errors are those of ``calibrate_moves``.
+    """
+    log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
+    found = solved(log, nominal_scale)
+    solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
+    held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
+    quality = norm_quality(solution, held)
+    if left_out is None and alone is not None:
+        quality = replace(
+            quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
+        )
+    calibration = Calibration(
+        accelerometer=SensorCalibration(
+            S=solution.S_a,
+            b=solution.b_a,
+            covariance=found.covariance[:12, :12],
+            raw_unit=accelerometer.raw_unit,
+            si_unit=accelerometer.si_unit,
+            method="joint",
+            quality=quality,
+            observability=accelerometer.observability,
+        ),
+        gyroscope=found.gyroscope,
+        covariance=found.covariance,
+        frame="lower",
+        gravity_m_s2=gravity_m_s2,
+        gravity_source=gravity_source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=(*residual_findings(quality.chi2, quality, *solution.accel_bias_change), *found.findings),
+        averaging=solution.averaging,
+    )
+    return with_bending(calibration, segments, solution.accel_drift)

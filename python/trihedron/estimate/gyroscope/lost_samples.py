@@ -11,8 +11,9 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.probability import fdtrc
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.session.joints import STRONG
+from trihedron.ranges import rows_beside
+from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
+from trihedron.session.joints import STRONG, Joints, joints
 from trihedron.session.noise import NOISE_DOF
 
 ACROSS_VERTICAL = 2.0 / 3.0
@@ -186,3 +187,63 @@ def is_asked_for_losses(
     chance = DOUBTFUL if outliers else CERTAIN
     is_beyond_noise = dof >= 1.0 and fdtrc(dof, NOISE_DOF, solution.moves_chi2 / dof) < chance
     return is_beyond_noise or left_out_as_by_losses(time_s, measured, outliers, solution, seen)
+
+
+# Lost samples that the timestamps do not show, detected by the motion on either side of each step.
+
+
+FEWEST = 4
+"""Losses from which a finding is given: of 25 real logs, one has one that may be a jolt."""
+NONE = Joints(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, dtype=bool), 0)
+
+
+def seen_in_motion(recording: Recording, segments: Segments) -> tuple[Joints, FloatArray]:
+    """The joints of the moves, and the times (k,) of the certain losses."""
+    pairs = (
+        (recording.gyroscope, segments.gyroscope_sigma),
+        (recording.accelerometer, segments.accelerometer_sigma),
+    )
+    triads = [(triad, _positive(sigma)) for triad, sigma in pairs if triad is not None and sigma is not None]
+    if not triads or not segments.moves:
+        return NONE, np.empty(0)
+    moves = np.array([(move.start, move.stop) for move in segments.moves], dtype=np.int64)
+    rows, moves = rows_beside(moves, 0, recording.n_samples)
+    time_s = recording.time_s[rows]
+    found = joints([triad[rows] / sigma for triad, sigma in triads], time_s, recording.rate_hz, moves)
+    return found, time_s[found.sample[found.is_certain]]
+
+
+def missing_samples(recording: Recording, segments: Segments, sigma_scale: float) -> list[Finding]:
+    """Finding where samples are missing in the moves: each removes the angle of one step from its rotation.
+
+    A share above ``sigma_scale``, the relative standard uncertainty of the gyro's scale, is serious.
+    """
+    if recording.gyroscope is None:
+        return []
+    found, time_s = seen_in_motion(recording, segments)
+    n, share = int(np.count_nonzero(found.is_certain)), found.share
+    if n < FEWEST:
+        return []
+    return [
+        Finding.of(
+            FindingCode.SAMPLES_LOST,
+            "seen-in-motion",
+            severity=Severity.SERIOUS if share > sigma_scale else Severity.WARNING,
+            losses=n,
+            joints=found.telling,
+            first_s=float(time_s.min()),
+            lost_share=share,
+            sigma_lost_share=share / np.sqrt(n),
+        )
+    ]
+
+
+def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Findings of a fit, without its possible losses where losses were detected in the motion."""
+    return tuple(one for one in of_fit if not (seen and one.code is FindingCode.LOSSES_POSSIBLE))
+
+
+def _positive(sigma: FloatArray) -> FloatArray:
+    """Noise (3,) without zeros: a channel without visible noise (coarse LSB) gets that of the noisiest channel."""
+    sigma = np.asarray(sigma, dtype=np.float64)
+    return np.where(sigma > 0.0, sigma, max(float(sigma.max()), 1e-300))
