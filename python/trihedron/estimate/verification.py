@@ -236,7 +236,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
 
 
 class _Beyond(NamedTuple):
-    """How many times their expected size errors are, whether far, and whether the others are not without the largest."""
+    """Errors in times their expected size, whether that is far, and whether the largest alone exceeds it."""
 
     times: float
     is_far: bool

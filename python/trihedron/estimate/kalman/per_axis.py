@@ -277,5 +277,10 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
     if condition <= 30.0:
         return observability, []
-    case = "kalman-sensitivity" if axis else "kalman-bias"
-    return observability, [Finding.of(FindingCode.WEAKLY_OBSERVABLE, case, axis=axis, condition=condition)]
+    weak = Finding.of(
+        FindingCode.WEAKLY_OBSERVABLE,
+        "kalman-sensitivity" if axis else "kalman-bias",
+        axis=axis,
+        condition=condition,
+    )
+    return observability, [weak]

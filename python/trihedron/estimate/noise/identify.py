@@ -176,8 +176,14 @@ def identify_noise(
         cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
         if cuts:
             total = sum(b - a for a, b in cuts)
-            span = {"n_stretches": len(cuts), "excluded_s": total / rate_hz, "share": total / n}
-            findings.append(Finding.of(FindingCode.STRETCHES_EXCLUDED, **span))
+            findings.append(
+                Finding.of(
+                    FindingCode.STRETCHES_EXCLUDED,
+                    n_stretches=len(cuts),
+                    excluded_s=total / rate_hz,
+                    share=total / n,
+                )
+            )
         findings += _motion(seen, rate_hz)
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))
