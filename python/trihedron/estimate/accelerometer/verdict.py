@@ -27,10 +27,15 @@ def covariance_scale(chi2: float, dof: int) -> float:
 
 
 def residual_findings(
-    chi2: float, quality: FitQuality, bias_repeatability_m_s2: float | None = None, drift_m_s2: float = 0.0
+    chi2: float,
+    quality: FitQuality,
+    bias_repeatability_m_s2: float | None = None,
+    drift_m_s2: float = 0.0,
+    *,
+    has_temperature: bool = False,
 ) -> Iterator[Finding]:
     """Finding where the stated noise does not explain the residuals; a fit of the session has a bias repeatability, and
-    perhaps a drift, its range over the session."""
+    perhaps a drift, its range over the session, which a temperature in the log may explain."""
     scale = covariance_scale(chi2, quality.dof)
     if scale == 1.0:
         return
@@ -50,6 +55,7 @@ def residual_findings(
         bias_repeatability_m_s2=bias_repeatability_m_s2 or 0.0,
         is_drift=drift_m_s2 > 0.0,
         drift_m_s2=drift_m_s2,
+        has_temperature=has_temperature,
         widening=np.sqrt(scale),
     )
 

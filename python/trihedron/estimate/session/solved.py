@@ -292,7 +292,15 @@ def calibrate_joint(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=(*residual_findings(quality.chi2, quality, *solution.accel_bias_change), *found.findings),
+        findings=(
+            *residual_findings(
+                quality.chi2,
+                quality,
+                *solution.accel_bias_change,
+                has_temperature=recording.temperature_degc is not None,
+            ),
+            *found.findings,
+        ),
         averaging=solution.averaging,
     )
     return with_bending(calibration, segments, solution.accel_drift)
