@@ -64,6 +64,20 @@ def test_mpu9150_is_at_its_noise_floor_and_predicts_moves_it_has_not_seen(real_d
     assert np.sqrt(np.nanmean(angles**2)) < 0.21
 
 
+def test_two_runs_of_kim_determine_one_gyro_scale_though_some_moves_do_not_fit(real_data):
+    runs = [trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt") for run in (2, 3)]
+    S, sigma = zip(
+        *(
+            (np.diag(gyro.S), np.diag(gyro.sigma_S))
+            for gyro in (trihedron.calibrate(one, gravity_m_s2=9.79871).gyroscope for one in runs)
+        ),
+        strict=True,
+    )
+    # Moves that begin as outliers and are taken in again: without that the uncertainties are ten times as large.
+    assert np.max(sigma) < 0.004
+    assert np.all(np.abs(S[0] - S[1]) < 3.5 * np.hypot(*sigma))
+
+
 @pytest.mark.parametrize(("run", "published_mm_s2"), [(1, 0.57), (2, 1.17), (3, 1.39)])
 def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run, published_mm_s2):
     recording = trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt")

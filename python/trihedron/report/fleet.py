@@ -22,7 +22,7 @@ MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
 BY_FILE = "`... --serial '([^/]+)$'`: one unit a file"
 VERDICTS = {
-    "consistent": "the linear model explains everything",
+    "consistent": "no missing effect is detectable",
     "missing-physics": "physics beyond the linear model",
     "unexplained": "a misfit that no mechanism explains",
     "not-testable": "cannot be tested",
