@@ -144,11 +144,10 @@ class TurnAngleError(TableEffect):
         bad = np.flatnonzero(np.abs(z) > OFF_SIGMA)
         if p > P_LIMIT or len(bad) == 0:
             return None
+        names = context.obs.move_names([turns[k].move for k in bad])
         parameters = tuple(
-            EffectParameter(
-                f"error_move{turns[k].move}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg"
-            )
-            for k in bad
+            EffectParameter(f"error of {name}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg")
+            for k, name in zip(bad, names, strict=True)
         )
         t = context.obs.time_s
         spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
@@ -157,7 +156,7 @@ class TurnAngleError(TableEffect):
             self.reported(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),
-            "moves", Where(("gx", "gy", "gz"), context.obs.move_names([turns[k].move for k in bad]), spans),
+            "moves", Where(("gx", "gy", "gz"), names, spans),
         )  # fmt: skip
 
 
