@@ -63,10 +63,8 @@ class Recorder:
     first_bytes : bytes
         Bytes that were read to detect the protocol.
 
-    Raises
-    ------
-    CaptureError
-        From iterating: a silent device, a full disk, no frames at all; the message says what was saved.
+    Raises ``CaptureError`` from iterating: a silent device, a full disk, no frames at all; the message says what was
+    saved.
     """
 
     def __init__(

@@ -82,10 +82,7 @@ def as_measured(value: float, sigma_log: float, dof: float) -> Measured:
 def ratio_of(one: Measured, other: Measured) -> Ratio:
     """Ratio of two figures; degrees of freedom after Welch and Satterthwaite.
 
-    Raises
-    ------
-    ValueError
-        When a figure is not positive.
+    Raises ``ValueError`` when a figure is not positive.
     """
     if not (one.value > 0.0 and other.value > 0.0):
         raise InputError("only positive figures have a ratio")

@@ -65,10 +65,7 @@ def improved_scenario(
     removed : ids
         Effects to remove.
 
-    Raises
-    ------
-    ValueError
-        When the file is not TOML.
+    Raises ``ValueError`` when the file is not TOML.
     """
     text = read_text(path, "scenario file")
     try:

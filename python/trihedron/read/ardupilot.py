@@ -33,10 +33,8 @@ _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each with its own timestamps.
 
-    Raises
-    ------
-    ReadError
-        When pymavlink is not installed, the log is damaged, or contains several IMUs and none is chosen.
+    Raises ``ReadError`` when pymavlink is not installed, the log is damaged, or contains several IMUs and none is
+    chosen.
     """
     try:
         from pymavlink import DFReader

@@ -29,13 +29,7 @@ Rows = Callable[[int, int, tuple[int, ...]], npt.NDArray[Any]]
 
 
 def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
-    """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type.
-
-    Raises
-    ------
-    ReadError
-        When the file is damaged, or its array is not a table of numbers; from the function, when it was truncated.
-    """
+    """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type."""
     try:
         with path.open("rb") as stream:
             shape, by_columns, dtype = header(stream, path.stat().st_size)
@@ -114,13 +108,7 @@ class TextOnDisk:
 
 
 def _layout_of(log: Path) -> Layout:
-    """The layout of a text log.
-
-    Raises
-    ------
-    ReadError
-        When it is not a text of numbers that can be read in chunks.
-    """
+    """The layout of a text log."""
     ways = "only .npy, Parquet and plain text tables are read in pieces; write the log as one of these."
     try:
         with log.open("rb") as stream:
@@ -201,10 +189,7 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     """A NumPy, Parquet or text log with given columns: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not
     read. A text is first converted to a Parquet table in the temporary folder.
 
-    Raises
-    ------
-    ReadError
-        When the file has another format, or the columns do not fit it.
+    Raises ``ReadError`` when the file has another format, or the columns do not fit it.
     """
     check_readable(path)
     try:

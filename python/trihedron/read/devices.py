@@ -30,10 +30,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
 
     The table is unchanged where names do not identify devices, or none is chosen and sensors are recognised without.
 
-    Raises
-    ------
-    ReadError
-        When no sensor is recognised without a device, and none is chosen.
+    Raises ``ReadError`` when no sensor is recognised without a device, and none is chosen.
     """
     devices = _devices(table.names or ())
     if instance in devices:
@@ -127,10 +124,7 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
     alternate as the readings do (in order of time if there is one). Alternating devices without such a column are a
     serious finding; ``--instance 1`` then takes the first row of each turn.
 
-    Raises
-    ------
-    ReadError
-        When there are several devices and none is chosen, or the chosen one does not exist.
+    Raises ``ReadError`` when there are several devices and none is chosen, or the chosen one does not exist.
     """
     used, time = chosen_columns.used(), chosen_columns.time
     column, words, codes = _device_column(table, used, chosen_columns.device)

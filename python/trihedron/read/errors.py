@@ -77,10 +77,7 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
 def reject_after_fork(path: Path) -> None:
     """Error in a child process made by fork, where polars would wait forever.
 
-    Raises
-    ------
-    ReadError
-        Where the library that parses tables cannot be used.
+    Raises ``ReadError``: Where the library that parses tables cannot be used.
     """
     try:
         check_tables()
@@ -91,10 +88,7 @@ def reject_after_fork(path: Path) -> None:
 def check_readable(path: Path) -> int:
     """Size in bytes of a readable regular file.
 
-    Raises
-    ------
-    ReadError
-        When it is missing, a directory, not a regular file, empty, or may not be read.
+    Raises ``ReadError`` when it is missing, a directory, not a regular file, empty, or may not be read.
     """
     try:
         status = path.stat()

@@ -23,10 +23,7 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
     """The accelerometer's rows and the gyro's, where they alternate, or where one fills only every second, third ...
     row; else the table itself.
 
-    Raises
-    ------
-    ReadError
-        When rows alternate and no column contains their time, or as ``find_columns``.
+    Raises ``ReadError`` when rows alternate and no column contains their time, or as ``find_columns``.
     """
     chosen = find_columns(table, mapping, sensor or table.sensor)
     if chosen.accelerometer is None or chosen.gyroscope is None:

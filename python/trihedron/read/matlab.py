@@ -23,10 +23,7 @@ _AXES = {"x", "y", "z"}
 def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log in a MATLAB file of tables: one table, or one for each sensor.
 
-    Raises
-    ------
-    ReadError
-        When mat-io is not installed, the file is damaged, or several tables could be the log.
+    Raises ``ReadError`` when mat-io is not installed, the file is damaged, or several tables could be the log.
     """
     try:
         from matio import load_from_mat

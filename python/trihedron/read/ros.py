@@ -43,10 +43,7 @@ def listed(streams: list[Stream]) -> Words:
 def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream:
     """The chosen stream, or the only one.
 
-    Raises
-    ------
-    ReadError
-        When there is no stream, none or several match the choice, or the matching one is empty.
+    Raises ``ReadError`` when there is no stream, none or several match the choice, or the matching one is empty.
     """
     if not streams:
         raise ReadError(f"{path}: {what} without readings of an accelerometer or a gyro that are known here.")
@@ -94,10 +91,7 @@ _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "recei
 def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """The messages of one topic, or of an accelerometer's and a gyro's topic, with the timestamps of their headers.
 
-    Raises
-    ------
-    ReadError
-        When rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
+    Raises ``ReadError`` when rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
     """
     try:
         from rosbags.highlevel import AnyReader

@@ -111,10 +111,7 @@ def _triad(
 def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors:
     """One table's sensors (only ``sensor``, if given) on the table's clock.
 
-    Raises
-    ------
-    ReadError
-        When the table cannot become readings on a time base.
+    Raises ``ReadError`` when the table cannot become readings on a time base.
     """
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
@@ -284,13 +281,7 @@ TOO_FEW_TO_JUDGE = 20
 
 
 def _reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
-    """Reject readings (n, 3), from columns ``where``, of which an axis is constant.
-
-    Raises
-    ------
-    ReadError
-        When an axis is constant or has no finite reading; the message names the first such column.
-    """
+    """Reject readings (n, 3), from columns ``where``, of which an axis is constant."""
     for k, column in enumerate(where):
         head = triad[:1000, k]
         if np.isfinite(head[0]) and np.any(np.isfinite(head) & (head != head[0])):

@@ -32,10 +32,7 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
 def reject_foreign(path: Path, magic: bytes) -> None:
     """Reject a file of a known format that is not supported.
 
-    Raises
-    ------
-    ReadError
-        When the format is known; the message names it and says how to get its numbers.
+    Raises ``ReadError`` when the format is known; the message names it and says how to get its numbers.
     """
     for start, kind, remedy in _FOREIGN:
         if magic.startswith(start):
@@ -60,10 +57,7 @@ def reject_foreign(path: Path, magic: bytes) -> None:
 def read_table(path: Path) -> Table:
     """The table of a file that contains one table.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read, is not a log, or contains one table per sensor.
+    Raises ``ReadError`` when the file cannot be read, is not a log, or contains one table per sensor.
     """
     tables = read_tables(path, Choice())
     if len(tables) > 1:
@@ -74,10 +68,7 @@ def read_table(path: Path) -> Table:
 def read_tables(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """One table, or the accelerometer's and the gyro's (in this order) where each has its own clock.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read or is not a log, or contains several devices and none is chosen.
+    Raises ``ReadError`` when the file cannot be read or is not a log, or contains several devices and none is chosen.
     """
     if path.is_dir() and (path / "metadata.yaml").is_file():
         from trihedron.read.ros import read_bag

@@ -26,10 +26,7 @@ MIN_ROWS = 8
 def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of an HDF5 or MATLAB 7.3 file; two tables where MATLAB saved one for each sensor.
 
-    Raises
-    ------
-    ReadError
-        When h5py is not installed, the file is damaged, or it is ambiguous which group to read.
+    Raises ``ReadError`` when h5py is not installed, the file is damaged, or it is ambiguous which group to read.
     """
     try:
         import h5py
@@ -68,10 +65,8 @@ pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protoc
 def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
-    Raises
-    ------
-    ReadError
-        When the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to read.
+    Raises ``ReadError`` when the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to
+    read.
     """
     child = subprocess.run([sys.executable, "-c", _LOAD, str(path)], capture_output=True, check=False)
     try:

@@ -63,10 +63,7 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     Raw topics are read if they were logged at full rate (at least half as many rows as ``sensor_combined``), else
     batches of raw samples (``sensor_accel_fifo``) if there are any.
 
-    Raises
-    ------
-    ReadError
-        When pyulog is not installed, the log is damaged, or contains several IMUs and none is chosen.
+    Raises ``ReadError`` when pyulog is not installed, the log is damaged, or contains several IMUs and none is chosen.
     """
     try:
         from pyulog import ULog

@@ -25,10 +25,8 @@ _WITHOUT_GRAVITY = re.compile(r"linear|withoutg|user|gravity|meta")
 def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """Tables of a zip: a NumPy archive, one text file, or the accelerometer's and the gyro's.
 
-    Raises
-    ------
-    ReadError
-        When the archive is damaged, is another program's container, or it is ambiguous which members to read.
+    Raises ``ReadError`` when the archive is damaged, is another program's container, or it is ambiguous which members
+    to read.
     """
     try:
         with zipfile.ZipFile(path) as archive:

@@ -23,10 +23,7 @@ def decoder_factory(
 ) -> Callable[[], Decoder]:
     """A function that makes decoders of one protocol.
 
-    Raises
-    ------
-    CaptureError
-        When no protocol has that name.
+    Raises ``CaptureError`` when no protocol has that name.
     """
     if isinstance(protocol, FrameDeclaration):
         return lambda: DeclaredDecoder(protocol)

@@ -44,10 +44,8 @@ def build_clock(
     ``witness`` contains readings that limit the time between rows, for use where the unit is not stated. With
     ``in_place`` the clock may overwrite the column, which must not be used afterwards.
 
-    Raises
-    ------
-    ReadError
-        When the column is constant, runs backward as a whole, or jumps back further than rows can be late.
+    Raises ``ReadError`` when the column is constant, runs backward as a whole, or jumps back further than rows can be
+    late.
     """
     raw = table.columns[column]
     base = 0.0

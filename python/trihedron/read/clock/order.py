@@ -69,10 +69,7 @@ def order_of_rows(
 ) -> npt.NDArray[np.signedinteger] | None:
     """Row numbers in order of the timestamps; ``None`` where rows are in order already.
 
-    Raises
-    ------
-    ReadError
-        When time runs backward as a whole or jumps back further than a packet may be late.
+    Raises ``ReadError`` when time runs backward as a whole or jumps back further than a packet may be late.
     """
     back = np.concatenate([start + np.flatnonzero(np.diff(part) < 0) for start, part in _overlapping(raw)])
     if not len(back):

@@ -59,10 +59,8 @@ class Role:
 def roles_of(table: Table, said: str | None) -> list[Role]:
     """Roles of the columns that have one, in file order.
 
-    Raises
-    ------
-    ReadError
-        When the columns have neither names nor a statement of the user, or the statement does not fit the file.
+    Raises ``ReadError`` when the columns have neither names nor a statement of the user, or the statement does not fit
+    the file.
     """
     if said is None:
         if table.names is None:
@@ -158,10 +156,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
 def of_recording(recording: Recording) -> ReferenceMotion:
     """A reference from the log of another unit that moved with this one: its rate and specific force.
 
-    Raises
-    ------
-    ReadError
-        When its gyro reads counts, or it has no gyro.
+    Raises ``ReadError`` when its gyro reads counts, or it has no gyro.
     """
     recording = recording.with_distinct_timestamps()
     to_rate = rate_to_si(recording.gyroscope_unit)
@@ -238,10 +233,7 @@ ROUNDING = 0.02
 def attitude_of(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray | None:
     """(n, 3, 3) body → world; ``None`` where there are no columns of attitude.
 
-    Raises
-    ------
-    ReadError
-        When a column is missing, a unit is ambiguous, or the numbers are not a rotation.
+    Raises ``ReadError`` when a column is missing, a unit is ambiguous, or the numbers are not a rotation.
     """
     by = {what: [role for role in roles if role.what == what] for what in ("q", "r", "rot", "rpy")}
     if by["q"]:

@@ -65,10 +65,7 @@ def blocks(
     """Blocks (k,) that end with a complete line, each read while the previous one is parsed, and valid until the next
     one is requested; ``content`` are the file's bytes if they are unpacked already.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read, is damaged, or has no line ends.
+    Raises ``ReadError`` when the file cannot be read, is damaged, or has no line ends.
     """
     most, digest, lines, unpacked = BLOCK_BYTES, hashlib.sha256(), 0, 0
     try:
@@ -139,10 +136,7 @@ def _behind_last_line(block: Bytes) -> int:
 def beginning(path: Path, compression: str | None, n: int, content: bytes | None = None) -> bytes:
     """The first ``n`` bytes of the text.
 
-    Raises
-    ------
-    ReadError
-        As :func:`blocks`.
+    Raises ``ReadError`` as :func:`blocks`.
     """
     if content is not None:
         return content[:n]

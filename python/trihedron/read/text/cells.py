@@ -77,10 +77,7 @@ def parse(
 ) -> pl.DataFrame:
     """A block as a frame; cells that do not fit their column's type are null.
 
-    Raises
-    ------
-    ReadError
-        When the block is not a table.
+    Raises ``ReadError`` when the block is not a table.
     """
     import polars as pl
 
@@ -103,10 +100,7 @@ def reject_words(
 ) -> None:
     """Reject cells that are neither numbers nor words for "missing", which are NaN.
 
-    Raises
-    ------
-    ReadError
-        When there is such a cell; the message names line, column and content of the first.
+    Raises ``ReadError`` when there is such a cell; the message names line, column and content of the first.
     """
     first: tuple[int, int, str] | None = None
     for name in as_text.columns:

@@ -31,10 +31,7 @@ def read_text(
 
     ``content`` are the file's bytes if they are unpacked already (a member of a zip).
 
-    Raises
-    ------
-    ReadError
-        As :class:`TextReader`.
+    Raises ``ReadError`` as :class:`TextReader`.
     """
     reject_after_fork(path)
     # Twice the length, for UTF-16.
