@@ -12,7 +12,7 @@ import numpy as np
 
 from trihedron.errors import InputError
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
@@ -47,17 +47,15 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     said = io.StringIO()
     # Created before it is initialised, so that its file can be closed when initialising fails.
     log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
+    damage = errors_of_library(path, "pymavlink cannot read this log ({}); copy it again")
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
+        with damage, contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
             log.__init__(str(path))
             while (message := log.recv_match(type=_TYPES)) is not None:
                 if message.get_type() == "PARM":
                     held.note(message.Name, message.Value, has_readings=bool(rows))
                 else:
                     _keep(message, rows, names)
-    # For damaged logs pymavlink raises errors of any kind.
-    except Exception as error:
-        raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
     finally:
         for name in ("data_map", "filehandle"):
             # A memory map that pymavlink still uses cannot be closed; it is freed with the reader.

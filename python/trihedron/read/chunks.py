@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.files.output import Temporary, clear_leftovers
-from trihedron.read.archive import DAMAGE, header
+from trihedron.read.archive import header
 from trihedron.read.errors import (
     ReadError,
     check_readable,
+    errors_of_library,
     errors_of_polars,
-    first_line,
-    from_os_error,
+    errors_of_system,
+    first_bytes,
     reject_after_fork,
 )
 from trihedron.read.text.layout import MISSING, Layout, detect
@@ -30,14 +31,10 @@ Rows = Callable[[int, int, tuple[int, ...]], npt.NDArray[Any]]
 
 def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
     """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type."""
-    try:
-        with path.open("rb") as stream:
-            shape, by_columns, dtype = header(stream, path.stat().st_size)
-            offset = stream.tell()
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except DAMAGE as error:
-        raise ReadError(f"{path}: this .npy file is damaged ({first_line(error)}); write it again.") from None
+    damage = "this .npy file is damaged ({}); write it again"
+    with errors_of_library(path, damage), errors_of_system(path), path.open("rb") as stream:
+        shape, by_columns, dtype = header(stream, path.stat().st_size)
+        offset = stream.tell()
     if dtype.kind not in "iuf" or len(shape) != len(("rows", "columns")):
         raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {dtype} {shape}.")
     n, width = shape
@@ -50,13 +47,10 @@ def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
         return part
 
     def read(start: int, stop: int, columns: tuple[int, ...]) -> npt.NDArray[Any]:
-        try:
-            with path.open("rb") as stream:
-                if by_columns:
-                    return np.column_stack([taken(stream, k * n + start, stop - start) for k in columns])
-                part = taken(stream, start * width, (stop - start) * width).reshape(-1, width)
-        except OSError as error:
-            raise from_os_error(path, error) from None
+        with errors_of_system(path), path.open("rb") as stream:
+            if by_columns:
+                return np.column_stack([taken(stream, k * n + start, stop - start) for k in columns])
+            part = taken(stream, start * width, (stop - start) * width).reshape(-1, width)
         return part if columns == tuple(range(width)) else np.ascontiguousarray(part[:, columns])
 
     return n, width, read
@@ -110,11 +104,7 @@ class TextOnDisk:
 def _layout_of(log: Path) -> Layout:
     """The layout of a text log."""
     ways = "only .npy, Parquet and plain text tables are read in pieces; write the log as one of these."
-    try:
-        with log.open("rb") as stream:
-            head = stream.read(HEAD_BYTES)
-    except OSError as error:
-        raise from_os_error(log, error) from None
+    head = first_bytes(log, HEAD_BYTES)
     if b"\0" in head:
         raise ReadError(f"{log}: {ways}")
     text = head.decode("utf-8-sig", errors="replace")
@@ -192,11 +182,7 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     Raises ``ReadError`` when the file has another format, or the columns do not fit it.
     """
     check_readable(path)
-    try:
-        with path.open("rb") as stream:
-            magic = stream.read(6)
-    except OSError as error:
-        raise from_os_error(path, error) from None
+    magic = first_bytes(path, 6)
     if magic == b"\x93NUMPY":
         n_rows, n_columns, read = _rows_of_array(path)
     else:

@@ -12,7 +12,7 @@ from typing import Any
 
 from trihedron.read.columns import columns_or_none, sensor_of_file_name
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
@@ -29,14 +29,11 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
         from matio import load_from_mat
     except ImportError:
         raise missing_package(path, "a MATLAB file of tables or timetables", "mat-io") from None
-    try:
-        with warnings.catch_warnings():
-            # SciPy, which mat-io uses, warns about internal data of the objects.
-            warnings.simplefilter("ignore")
-            content = load_from_mat(str(path))
-    # For damaged files mat-io raises errors of any kind.
-    except Exception as error:
-        raise ReadError(f"{path}: mat-io cannot read this MATLAB file ({first_line(error)}); save it again.") from None
+    damage = "mat-io cannot read this MATLAB file ({}); save it again"
+    with errors_of_library(path, damage), warnings.catch_warnings():
+        # SciPy, which mat-io uses, warns about internal data of the objects.
+        warnings.simplefilter("ignore")
+        content = load_from_mat(str(path))
     tables = {name: table for name, value in content.items() if (table := _table(path, name, value)) is not None}
     found = {name: columns for name, table in tables.items() if (columns := columns_or_none(table)) is not None}
     if not found:

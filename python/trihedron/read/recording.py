@@ -22,7 +22,7 @@ from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.column_roles import mapping_of
 from trihedron.read.columns import Sensor, Triad
 from trihedron.read.devices import Choice, by_sensor, one_beside
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import ReadError, errors_of_system
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.merge import merge_sensors
@@ -93,11 +93,9 @@ def read_recording(
 
 
 def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    try:
+    # Errors before a format's reader is called: a name that is too long, a folder without permission.
+    with errors_of_system(path):
         tables = read_tables(path, options.choice, options.progress)
-    except OSError as error:
-        # Errors before a format's reader is called: a name that is too long, a folder without permission.
-        raise from_os_error(path, error) from None
     return of_tables(tables, sensor, options)
 
 

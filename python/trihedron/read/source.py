@@ -6,7 +6,7 @@ from pathlib import Path
 
 from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.read.errors import ReadError, check_readable, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
 from trihedron.read.table import Table
 from trihedron.read.zipped import read_zip
@@ -77,11 +77,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if path.is_dir() and (oxts := oxts_folder(path)) is not None:
         return (read_kitti(oxts),)
     size = check_readable(path)
-    try:
-        with path.open("rb") as stream:
-            magic = stream.read(512)
-    except OSError as error:
-        raise from_os_error(path, error) from None
+    magic = first_bytes(path, 512)
     if magic.startswith(b"\x93NUMPY"):
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):

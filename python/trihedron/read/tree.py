@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from trihedron.read.columns import columns_or_none
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_line
 from trihedron.read.matlab import read_objects
 from trihedron.read.memory import columns_table
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
@@ -41,13 +41,9 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
             parent, _, leaf = name.rpartition("/")
             groups.setdefault(parent, {})[leaf] = node[()]
 
-    try:
-        with h5py.File(path, "r") as file:
-            has_objects = "#subsystem#" in file
-            file.visititems(visit)
-    # For damaged files h5py raises errors of several kinds.
-    except Exception as error:
-        raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
+    with errors_of_library(path, "h5py cannot read this file ({}); copy it again"), h5py.File(path, "r") as file:
+        has_objects = "#subsystem#" in file
+        file.visititems(visit)
     if has_objects and not _tables(path, groups):
         return read_objects(path, choice)
     return (_of_groups(path, groups, choice, "this HDF5 file"),)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import AXES
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
@@ -70,14 +70,11 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     except ImportError:
         raise missing_package(path, "a PX4 ULog", "pyulog") from None
     _check_definitions(path)
-    try:
-        # pyulog prints messages on stdout, which is reserved for results.
-        # The stream is opened here, because pyulog leaves its own open when it fails.
-        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as stream:
-            log = ULog(stream, _TOPICS)
-    # For damaged logs pyulog raises errors of any kind.
-    except Exception as error:
-        raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
+    # pyulog prints messages on stdout, which is reserved for results.
+    quiet = contextlib.redirect_stdout(io.StringIO())
+    # The stream is opened here, because pyulog leaves its own open when it fails.
+    with errors_of_library(path, "pyulog cannot read this log ({}); copy it again"), quiet, path.open("rb") as stream:
+        log = ULog(stream, _TOPICS)
     data = _unrolled(log)
     counts = {key: len(columns[_timestamp(columns)]) for key, columns in data.items()}
     combined = counts.get((_COMBINED, 0), 0)

@@ -8,12 +8,13 @@ from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
+from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
 from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
+_OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError)
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 _KINDS = {
     "accelerometer": re.compile(r"acc(el(erometer|eration)?)?(uncalibrated)?|totalacceleration|imu"),
@@ -28,30 +29,21 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
     Raises ``ReadError`` when the archive is damaged, is another program's container, or it is ambiguous which members
     to read.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [info.filename for info in archive.infolist() if not info.is_dir()]
-            if not names or any(name.endswith(".npy") for name in names):
-                return (read_npz(path, choice.instance),)
-            _reject_containers(path, names)
-            members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
-            picked = _chosen(path, members, choice.topic) or _by_name(members)
-            if not picked:
-                raise ReadError(
-                    f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
-                    "with --topic NAME, or unpack it and give --accel and --gyro."
-                )
-            sha256 = file_sha256(path)
-            tables = [
-                table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)
-            ]
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError) as error:
-        if isinstance(error, ReadError):
-            raise
-        why = first_line(error)
-        raise ReadError(f"{path}: this zip archive is damaged or locked ({why}); export it again.") from None
+    damage = errors_of_library(path, "this zip archive is damaged or locked ({}); export it again", _OF_DAMAGE)
+    with damage, errors_of_system(path), zipfile.ZipFile(path) as archive:
+        names = [info.filename for info in archive.infolist() if not info.is_dir()]
+        if not names or any(name.endswith(".npy") for name in names):
+            return (read_npz(path, choice.instance),)
+        _reject_containers(path, names)
+        members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
+        picked = _chosen(path, members, choice.topic) or _by_name(members)
+        if not picked:
+            raise ReadError(
+                f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
+                "with --topic NAME, or unpack it and give --accel and --gyro."
+            )
+        sha256 = file_sha256(path)
+        tables = [table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)]
     others = [name for name in names if name not in picked]
     if others:
         note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)
