@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.arrivals import ClockLine
 from trihedron.capture.account import Count, Tally, clock_sentence
 from trihedron.capture.detection import silent
@@ -41,7 +40,7 @@ class Block:
 
     time_s: FloatArray
     host_s: FloatArray
-    index: npt.NDArray[np.int64]
+    index: IntArray
     values: FloatArray
     columns: tuple[str, ...]
     remarks: tuple[str, ...] = ()

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -59,7 +58,7 @@ class End:
     @cached_property
     def runs(self) -> IntArray:
         """(k, 2) first sample of every run of readings on the extreme, and one past its last."""
-        at: npt.NDArray[np.int64] = _core.readings_near(self.readings, self.axis, self.value, 0.0)[2]
+        at: IntArray = _core.readings_near(self.readings, self.axis, self.value, 0.0)[2]
         breaks = np.flatnonzero(np.diff(at) > 1)
         return np.stack([np.concatenate([at[:1], at[breaks + 1]]), np.concatenate([at[breaks], at[-1:]]) + 1], axis=1)
 

@@ -10,7 +10,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -178,7 +177,7 @@ def new_readings(readings: FloatArray, noise: FloatArray, step: FloatArray) -> I
     """
     change = np.abs(np.diff(readings, axis=0))
     same = ~np.any(change, axis=1)
-    jumps: npt.NDArray[np.intp] = np.flatnonzero(np.any(change > JUMP_STEPS * step + JUMP_NOISE * noise, axis=1))
+    jumps: IntArray = np.flatnonzero(np.any(change > JUMP_STEPS * step + JUMP_NOISE * noise, axis=1))
     jumps = jumps[jumps > 0]
     if len(jumps) < FEWEST_JUMPS or np.mean(same[jumps - 1]) < OFTEN:
         return None

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.output import Temporary, clear_leftovers
 from trihedron.read.archive import header
 from trihedron.read.errors import (
@@ -158,19 +159,19 @@ class ChunkedLog:
     columns: tuple[int, ...]
     read: Rows
 
-    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
+    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[FloatArray]:
         """Yield arrays (k, columns) in order from row ``first`` on, in the file's data type."""
         for start in range(first, self.n_rows, rows):
             yield self.read(start, min(start + rows, self.n_rows), self.columns)
 
-    def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+    def rows(self, start: int, stop: int) -> FloatArray:
         """Rows ``[start, stop)`` as float64 (stop - start, columns)."""
         start, stop = min(max(start, 0), self.n_rows), min(stop, self.n_rows)
         if stop <= start:
             return np.empty((0, len(self.columns)))
         return np.asarray(self.read(start, stop, self.columns), dtype=np.float64)
 
-    def whole(self) -> npt.NDArray[np.float64]:
+    def whole(self) -> FloatArray:
         """All rows (n, columns)."""
         return self.read(0, self.n_rows, self.columns)
 

@@ -5,9 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.order import unwrap
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
@@ -175,7 +174,7 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
     )
 
 
-def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], bool]:
+def _changes_with(table: Table, time: int) -> Callable[[IntArray], bool]:
     """A test whether codes (n,) change where the clock goes back and almost nowhere else; False if the clock wraps."""
     raw = table.columns[time]
     back = np.flatnonzero(np.diff(raw) < 0.0)
@@ -184,7 +183,7 @@ def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], 
     return lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1)
 
 
-def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:
+def _in_time(table: Table, time: int | None, most: int) -> IntArray:
     """Indices of the first rows in order of time; in file order without a time, or where the clock wraps."""
     as_they_stand = np.arange(min(table.n_rows, most))
     if time is None or len(table.columns[time]) != table.n_rows:
@@ -213,8 +212,8 @@ def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
 
 
 def _device_column(
-    table: Table, used: set[int], only: int | None = None, fits: Callable[[npt.NDArray[np.int64]], bool] | None = None
-) -> tuple[int, list[str], npt.NDArray[np.int64]]:
+    table: Table, used: set[int], only: int | None = None, fits: Callable[[IntArray], bool] | None = None
+) -> tuple[int, list[str], IntArray]:
     """Column, words and codes (n,) of the device column: ``only``, or the first whose codes pass ``fits``, or the
     first whose name means device."""
     for i in range(len(table.columns)) if only is None else (only,):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
@@ -62,7 +62,7 @@ class Sensors:
     has_clock: bool
     gyroscope_unit: str = ""
     sampling: Sampling = UNJUDGED
-    lost_behind: npt.NDArray[np.int64] | None = None
+    lost_behind: IntArray | None = None
     timestamps_s: FloatArray | None = None
     findings: tuple[Finding, ...] = field(default=())
     rows_in_file: int = 0

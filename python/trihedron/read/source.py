@@ -91,10 +91,10 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if known is not None:
         return tuple(replace(table, is_chosen=True) for table in known)
     reject_foreign(path, magic)
-    from trihedron.read.text.blocks import compression_of
+    from trihedron.read.text.blocks import TextFile, compression_of
     from trihedron.read.text.open import read_text
 
-    tables = read_text(path, compression_of(magic), size, progress)
+    tables = read_text(TextFile(path, size, compression_of(magic), progress))
     return by_sensor(tables[0]) if len(tables) == 1 else tables
 
 

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
@@ -28,7 +27,7 @@ from trihedron.records.onboard import Stage
 SUFFIX = "_fifo"
 
 
-def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
+def expanded(data: dict[str, Any]) -> dict[str, FloatArray] | None:
     """All samples in order: ``timestamp_sample`` [µs] and X, Y, Z in SI, each (n,); None where fields are missing."""
     present = {"timestamp_sample", "dt", "scale", "samples"} <= set(data)
     width = sum(f"x[{k}]" in data for k in range(256))

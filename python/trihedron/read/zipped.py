@@ -98,6 +98,7 @@ def _member(
 ) -> tuple[Table, ...]:
     # Parsing needs a large library, which a NumPy archive does not.
     from trihedron.read.columns import sensor_of_file_name
+    from trihedron.read.text.blocks import TextFile
     from trihedron.read.text.open import read_text
 
     info = archive.getinfo(name)
@@ -109,7 +110,7 @@ def _member(
         raise ReadError(f"{path}: its member {name} is not as long as the archive says; export it again.")
     if not content.strip():
         raise ReadError(f"{path}: its member {name} is empty; record or export again.")
-    tables = read_text(path / name, None, len(content), progress, content, sha256)
+    tables = read_text(TextFile(path / name, len(content), None, progress, content, sha256))
     if len(tables) == 1:
         tables = by_sensor(tables[0])
     if is_of_several and len(tables) == 1:

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.errors import ReadError, errors_of_polars
 from trihedron.read.names import parse_name
 from trihedron.read.text.dates import form_of, seconds
@@ -36,7 +35,7 @@ class TextColumn:
     example: str
     form: str = ""
     words: dict[str, int] = field(default_factory=dict)
-    codes: list[npt.NDArray[np.int64]] = field(default_factory=list)
+    codes: list[IntArray] = field(default_factory=list)
 
     def encode(self, cells: pl.Series) -> None:
         """Store the index of each row's word, unless there are too many words for labels."""
@@ -95,9 +94,7 @@ def parse(
         )
 
 
-def reject_words(
-    path: Path, frame: pl.DataFrame, as_text: pl.DataFrame, lines: npt.NDArray[np.int64], layout: Layout
-) -> None:
+def reject_words(path: Path, frame: pl.DataFrame, as_text: pl.DataFrame, lines: IntArray, layout: Layout) -> None:
     """Reject cells that are neither numbers nor words for "missing", which are NaN.
 
     Raises ``ReadError`` when there is such a cell; the message names line, column and content of the first.

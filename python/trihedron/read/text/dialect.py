@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import IntArray
 from trihedron.read.text.layout import COMMENT_STARTS
 
 NEARLY_ALL = 0.9
@@ -49,7 +49,7 @@ class Rewritten:
     """``text`` to be read as a table, and the line in the file (from 1) of each of its lines (n,)."""
 
     text: bytes
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
 
     @classmethod
     def of(cls, rows: Sequence[str], numbers: Sequence[int]) -> Rewritten:
