@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.clock.order import unwrap
+from trihedron.read.clock.base import unwrap
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name

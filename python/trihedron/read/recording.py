@@ -14,8 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
-from trihedron.read.audit.readings import audit_readings, audit_steps
-from trihedron.read.audit.seam import audit_seam
+from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.clock.base import Clock, build_clock
-from trihedron.read.clock.order import in_order
+from trihedron.read.clock.base import Clock, build_clock, in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows

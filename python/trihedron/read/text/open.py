@@ -7,11 +7,10 @@ from trihedron.read.errors import ReadError, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, TextFile, as_utf8, beginning, blocks
-from trihedron.read.text.dialect import Rewritten, rewrite
+from trihedron.read.text.dialect import Rewritten, rewrite, split_records
 from trihedron.read.text.json_log import is_json, of_json
 from trihedron.read.text.makers import makers
 from trihedron.read.text.reader import TextReader
-from trihedron.read.text.records import split_records
 from trihedron.records import Finding, FindingCode
 
 _SAMPLE_BYTES = 1 << 17

@@ -28,10 +28,10 @@ from trihedron.read.text.cells import (
     find_text_columns,
     numbers,
     parse,
+    past_midnight,
     reject_words,
     sparse_words,
 )
-from trihedron.read.text.dates import past_midnight
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
 from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
 from trihedron.read.text.store import Store
