@@ -21,34 +21,25 @@ FIRST_POSE_S = 6.0
 SAME_POSE_DEG = 15.0
 N_CHECKS = 3
 MOST_POSES = 60
+"""Poses after which to stop although the accuracy is not reached."""
 RETRY_POSE_S = 2.0
 
 
 class Guide:
     """Guides a session: pose, move to the most useful pose, until the accuracy is reached; then poses to verify it.
 
-    Parameters
-    ----------
-    accuracy : Accuracy
-        The accuracy at which to stop.
-    examine : callable
-        Returns the state of the session from everything recorded so far.
-    n_checks : int
-        Number of verification poses, which are excluded from the calibration.
-    most_poses : int
-        Number of poses after which to stop although the accuracy is not reached.
+    ``examine`` returns the state of the session from everything recorded so far; ``n_checks`` verification poses are
+    excluded from the calibration.
     """
 
-    def __init__(
-        self, accuracy: Accuracy, examine: Examine, *, n_checks: int = N_CHECKS, most_poses: int = MOST_POSES
-    ) -> None:
+    def __init__(self, accuracy: Accuracy, examine: Examine, *, n_checks: int = N_CHECKS) -> None:
         self.accuracy = accuracy
         self.phase = Phase.BEGIN
         self.examination: Examination | None = None
         self.cut_s: float | None = None
         """Time [s] at which the data of the calibration end and the verification poses begin; None until then."""
         self._examine = examine
-        self._n_checks, self._most = n_checks, most_poses
+        self._n_checks = n_checks
         self._stillness = Stillness()
         self._time_s = 0.0
         self._is_taken = False
@@ -163,12 +154,12 @@ class Guide:
 
     def _go_on(self, examination: Examination) -> None:
         """The next pose, or the poses to verify with."""
-        is_last = len(examination.poses_up) >= self._most
+        is_last = len(examination.poses_up) >= MOST_POSES
         if not (examination.is_good_enough or is_last):
             self._target, self.phase = examination.next_up, Phase.MOVE
             return
         if not examination.is_good_enough:
-            self._remark = f"{self._most} poses and the accuracy is not reached: see the warnings for the cause."
+            self._remark = f"{MOST_POSES} poses and the accuracy is not reached: see the warnings for the cause."
         self.cut_s = self._time_s
         self.phase = Phase.CHECK if self._n_checks else Phase.DONE
         self._target = self._far_from_all()

@@ -6,11 +6,12 @@ from trihedron.arrivals import ClockFit
 class Timeline:
     """Time of every frame [s]: by the device's clock if it has one, else by frame index and the rate of arrivals.
 
-    The time of a connection continues that of the previous one, after the gap measured by the host's clock.
+    The time of a connection continues that of the previous one, after the gap measured by the host's clock. ``tick_s``
+    is one tick of the device's clock [s], 0 without one.
     """
 
     def __init__(self, *, tick_s: float, modulus: int, nominal_rate_hz: float | None = None) -> None:
-        self._tick_s, self._modulus = tick_s, modulus
+        self.tick_s, self._modulus = tick_s, modulus
         self.fit = ClockFit()
         self._ticks: int | None = None
         self._elapsed = 0
@@ -26,12 +27,7 @@ class Timeline:
     @property
     def has_device_clock(self) -> bool:
         """Whether times are from the device's clock."""
-        return self._tick_s > 0.0
-
-    @property
-    def tick_s(self) -> float:
-        """One tick of the device's clock [s]; 0 without one."""
-        return self._tick_s
+        return self.tick_s > 0.0
 
     def expect(self, period_s: float) -> None:
         """Set the first estimate of the seconds per frame, from the first arrivals; a given rate is kept."""
@@ -49,7 +45,7 @@ class Timeline:
                 step = step - self._modulus if step > self._modulus // 2 else step
             self._elapsed += step
             self._ticks = ticks
-            self._time_s = max(self._start_s + self._elapsed * self._tick_s, self._time_s)
+            self._time_s = max(self._start_s + self._elapsed * self.tick_s, self._time_s)
         else:
             self._time_s += (index - self._index) * self._step(index)
         self._index, self._host_s = index, host_s
@@ -60,7 +56,7 @@ class Timeline:
         if self._index is None:
             return
         if self.has_device_clock:
-            self.fit.add(self._elapsed * self._tick_s, host_s)
+            self.fit.add(self._elapsed * self.tick_s, host_s)
         else:
             self.fit.add(self._index - self._index0, host_s)
 

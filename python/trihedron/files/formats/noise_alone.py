@@ -1,4 +1,4 @@
-"""VINS-Fusion, LIO-SAM, ORB-SLAM3, FAST-LIO, ROS messages, GTSAM: noise, topic and gravity; they have no fields for S, b.
+"""VINS-Fusion, LIO-SAM, ORB-SLAM3, FAST-LIO, GTSAM, ROS messages: noise, topic and gravity, without fields for S and b.
 
 LIO-SAM squares its continuous densities for GTSAM's preintegration. FAST-LIO's values are covariances of one sample,
 ``N² rate`` and ``K² rate``, because its filter squares the time step: its prediction adds ``(dt F) Q (dt F)ᵀ``, where

@@ -264,12 +264,7 @@ def audit_seam(
 ) -> list[Finding]:
     """A finding where gravity jumps between two consecutive samples, with the sensor static before and after.
 
-    Parameters
-    ----------
-    time_s : array (n,) [s]
-    accelerometer, gyroscope : array (n, 3), in any unit
-    turning : Turning
-        The gyro's scale from the rotation of gravity in the whole log.
+    ``time_s`` (n,) [s]; readings (n, 3) in any unit; ``turning``: the gyro's scale in the whole log.
     """
     step = usual_step(time_s[:_BLOCK])
     side = max(round(_SIDE_S / step), _FEWEST)

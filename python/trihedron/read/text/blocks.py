@@ -62,7 +62,7 @@ def compression_of(magic: bytes) -> str | None:
     return next((name for start, name in _COMPRESSED.items() if magic.startswith(start)), None)
 
 
-def _open(file: TextFile) -> io.BufferedIOBase:
+def open_binary(file: TextFile) -> io.BufferedIOBase:
     """A stream of the decompressed bytes of a file."""
     if file.content is not None:
         return io.BytesIO(file.content)
@@ -84,7 +84,7 @@ def blocks(file: TextFile, cursor: Cursor) -> Generator[Bytes, None, None]:
     path, compression, is_plain = file.path, file.compression, file.compression is None and file.content is None
     most, digest, lines, unpacked = BLOCK_BYTES, hashlib.sha256(), 0, 0
     try:
-        with _open(file) as stream, ThreadPoolExecutor(1) as reader:
+        with open_binary(file) as stream, ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
                 nonlocal lines, unpacked
@@ -151,7 +151,7 @@ def beginning(file: TextFile, n: int) -> bytes:
     Raises ``ReadError`` as :func:`blocks`.
     """
     try:
-        with _open(file) as stream:
+        with open_binary(file) as stream:
             return stream.read(n)
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
         # Raises the error with the line after which the damage is.
