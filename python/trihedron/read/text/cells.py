@@ -154,22 +154,16 @@ _ZONE = r"(?:Z|[+-]\d\d:?\d\d)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d(?:[.,:]\d{1,9})?"
 
 
-@dataclass(frozen=True)
-class _Form:
-    """``pattern`` of the whole cell, and its strptime format, both after :func:`_plain`."""
-
-    pattern: str
-    format: str
-
-
 _MONTH_FIRST, _DAY_FIRST = "%m-%d-%Y %H:%M:%S%.f", "%d-%m-%Y %H:%M:%S%.f"
+_NUMBERS_ALONE = rf"^\d\d?-\d\d?-\d{{4}} {_CLOCK}$"
 # Polars' %.f takes a point and any number of digits, or nothing.
-_FORMS = (
-    _Form(rf"^\d{{4}}-\d\d-\d\d {_CLOCK}{_ZONE}$", "%Y-%m-%d %H:%M:%S%.f"),
-    _Form(rf"^\d\d?-[A-Za-z]{{3}}-\d{{4}} {_CLOCK}$", "%d-%b-%Y %H:%M:%S%.f"),
-    _Form(rf"^\d\d?-\d\d?-\d{{4}} {_CLOCK} ?[AaPp][Mm]$", "%m-%d-%Y %I:%M:%S%.f %p"),
-    _Form(rf"^\d\d?-\d\d?-\d{{4}} {_CLOCK}$", _MONTH_FIRST),
-)
+_FORMS = {
+    rf"^\d{{4}}-\d\d-\d\d {_CLOCK}{_ZONE}$": "%Y-%m-%d %H:%M:%S%.f",
+    rf"^\d\d?-[A-Za-z]{{3}}-\d{{4}} {_CLOCK}$": "%d-%b-%Y %H:%M:%S%.f",
+    rf"^\d\d?-\d\d?-\d{{4}} {_CLOCK} ?[AaPp][Mm]$": "%m-%d-%Y %I:%M:%S%.f %p",
+    _NUMBERS_ALONE: _MONTH_FIRST,
+}
+"""Patterns of whole cells, and their strptime formats, both after :func:`_plain`."""
 _TIME_OF_DAY = re.compile(rf"^{_CLOCK}$")
 _POINTS = re.compile(r"^[ \"]*\d\d?\.\d\d?\.\d{4}[ T]")
 _DATE_ALONE = re.compile(r"^(\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4})$")
@@ -192,11 +186,11 @@ def form_of(cells: pl.Series) -> str | None:
     if not len(text):
         return None
     if all(_POINTS.match(cell) for cell in cells.drop_nulls()):
-        return _DAY_FIRST if text.str.contains(_FORMS[-1].pattern).all() else None
-    for form in _FORMS:
-        if text.str.contains(form.pattern).all():
-            is_day_first = form.format == _MONTH_FIRST and bool(np.isnan(seconds(cells, form.format)).any())
-            return _DAY_FIRST if is_day_first else form.format
+        return _DAY_FIRST if text.str.contains(_NUMBERS_ALONE).all() else None
+    for pattern, form in _FORMS.items():
+        if text.str.contains(pattern).all():
+            is_day_first = form == _MONTH_FIRST and bool(np.isnan(seconds(cells, form)).any())
+            return _DAY_FIRST if is_day_first else form
     if all(_TIME_OF_DAY.match(cell) for cell in text):
         return "time-of-day"
     if all(_DATE_ALONE.match(cell.strip(' "')) for cell in cells.drop_nulls()):
