@@ -86,7 +86,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet
 
-        return by_sensor(read_parquet(path))
+        return (read_parquet(path),)
     known = _ecosystem(path, magic, choice, progress)
     if known is not None:
         return tuple(replace(table, is_chosen=True) for table in known)

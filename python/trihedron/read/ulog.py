@@ -10,6 +10,7 @@ import contextlib
 import io
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,14 +89,13 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, offered, choice, "this log")
     onboard = _onboard(log, taken.topic, int(taken.instance or 0))
     findings = (*choice_note("log", taken, streams), *_losses(log), *said_of(onboard))
-    sha256 = file_sha256(path)
+    common = Table(path, None, (), file_sha256(path), clock=StatedClock(time=0, unit="us"), onboard=onboard)
     if taken.topic == _COMBINED:
-        return (_table(path, data[(_COMBINED, 0)], "", sha256, onboard, findings),)
+        return (replace(_filled(common, data[(_COMBINED, 0)], ""), findings=findings),)
     i = int(taken.instance)
-    return (
-        _table(path, data[(taken.topic, i)], _RAW, sha256, onboard, findings),
-        _table(path, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO, sha256, onboard, ()),
-    )
+    first = _filled(common, data[(taken.topic, i)], _RAW)
+    second = _filled(common, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO)
+    return replace(first, findings=findings), second
 
 
 def _unrolled(log: Any) -> dict[tuple[str, int], dict[str, Any]]:
@@ -136,9 +136,7 @@ def _check_definitions(path: Path) -> None:
     raise ReadError(f"{path}: this ULog ends before its first message; 0 messages were logged.")
 
 
-def _table(
-    path: Path, data: dict[str, Any], topic: str, sha256: str, onboard: Onboard | None, findings: tuple[Finding, ...]
-) -> Table:
+def _filled(table: Table, data: dict[str, Any], topic: str) -> Table:
     # The timestamp of the sample if the log has it; `timestamp` is that of publishing the message.
     timestamp = _timestamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[timestamp], dtype=np.float64)]
@@ -147,10 +145,7 @@ def _table(
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
             names.append(f"{word}_{name} [{unit}]" if sensor and name in AXES else name)
             columns.append(np.asarray(values, dtype=np.float64))
-    clock = StatedClock(time=0, unit="us")
-    return Table(
-        path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard
-    )
+    return replace(table, names=tuple(names), columns=tuple(columns), sensor=sensor)
 
 
 def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:
