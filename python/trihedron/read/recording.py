@@ -142,11 +142,7 @@ def audited(
     _accounted(sensors, findings)
     time_s = sensors.time_s
     rate = _rate_hz(sensors)
-    present = {
-        name: triad
-        for name, triad in (("accelerometer", sensors.accelerometer), ("gyroscope", sensors.gyroscope))
-        if triad is not None
-    }
+    present = sensors.triads
     extremes = {name: _finite_extremes(triad) for name, triad in present.items()}
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S

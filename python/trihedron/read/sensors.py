@@ -67,6 +67,12 @@ class Sensors:
     rows_in_file: int = 0
     rows_read: int = 0
 
+    @property
+    def triads(self) -> dict[str, FloatArray]:
+        """Readings (n, 3) of the sensors present."""
+        both = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
+        return {name: triad for name, triad in both.items() if triad is not None}
+
     def row(self, sample: int) -> int:
         """Row of the base table that contains a sample."""
         at = sample + self.offset
@@ -202,10 +208,9 @@ def settled(sensors: Sensors) -> Sensors:
     """The sensors on the clock that timestamps, counter and motion determine; unchanged if that is done already."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
-    triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
     counter = sensors.columns.counter
     numbers = None if counter is None else sensors.column(counter)
-    found = settle_clock(sensors.time_s, sensors.start_s, triads, numbers)
+    found = settle_clock(sensors.time_s, sensors.start_s, list(sensors.triads.values()), numbers)
     return replace(
         sensors,
         time_s=found.time_s,

@@ -1,6 +1,5 @@
 """Seconds from a time column: unit, start, wraps, order."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -160,12 +159,6 @@ def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: Float
     return out
 
 
-def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """Yield parts of the timestamps, each with the first one of the next part, and the index at which each starts."""
-    for start in range(0, max(len(raw) - 1, 1), PART):
-        yield start, raw[start : start + PART + 1]
-
-
 def order_of_rows(
     raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> npt.NDArray[np.signedinteger] | None:
@@ -173,7 +166,8 @@ def order_of_rows(
 
     Raises ``ReadError`` when time runs backward as a whole or jumps back further than a packet may be late.
     """
-    back = np.concatenate([start + np.flatnonzero(np.diff(part) < 0) for start, part in _overlapping(raw)])
+    starts = range(0, max(len(raw) - 1, 1), PART)
+    back = np.concatenate([start + np.flatnonzero(np.diff(raw[start : start + PART + 1]) < 0) for start in starts])
     if not len(back):
         return None
     first = int(back[0]) + 1
