@@ -8,13 +8,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from trihedron.arrivals import ClockLine
-from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
 from trihedron.capture.sequence import Placed
 from trihedron.capture.sources import Source
-from trihedron.capture.timeline import Timeline
+from trihedron.capture.timeline import Count, Timeline, clock_sentence
 
 
 class Rows(GrowingLog):

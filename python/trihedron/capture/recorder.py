@@ -10,14 +10,13 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.arrivals import ClockLine
-from trihedron.capture.account import Count, Tally, clock_sentence
 from trihedron.capture.detection import silent
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.protocols import Decoder
 from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
-from trihedron.capture.timeline import Timeline
+from trihedron.capture.timeline import Count, Tally, Timeline, clock_sentence
 
 SETTLE_S = 0.6
 """Without a device clock, rows wait this long [s] at the start of a connection, until arrivals give their rate."""
