@@ -27,10 +27,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
 from board import Board, counts_recording
 from trihedron.api.capturing import column_namer
-from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
+from trihedron.capture.timeline import Count
 from trihedron.files.frame_declaration import FrameDeclaration, read_frame_declaration
 from trihedron.records import Recording
 from trihedron.simulate.device.encoders import Scales

@@ -18,8 +18,7 @@ from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.planning_poses import move_rows, shortest_path
 from trihedron.api.replaying import readings_of, replay, steps
 from trihedron.api.simulating import simulate
-from trihedron.capture.guide import Guide
-from trihedron.capture.stillness import Stillness
+from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text

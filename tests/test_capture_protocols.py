@@ -8,10 +8,10 @@ import pytest
 
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
-from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.protocols.framing import CHECKSUM_OF, Frame
 from trihedron.capture.sequence import Sequence
+from trihedron.capture.timeline import Count
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.simulate.device.faults import Faults, Sent, parse_faults
 from trihedron.simulate.device.serving import Device

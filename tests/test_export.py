@@ -18,8 +18,8 @@ from trihedron.files.formats import (
     SensorNoise,
     export_files,
     targets,
-    upper_frame,
 )
+from trihedron.files.formats.imu_tk import upper_frame
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
 

@@ -8,8 +8,8 @@ import pytest
 from small_session import made_once
 from trihedron.api.reading import read
 from trihedron.cli import main
+from trihedron.files.log import truth_document, write_truth
 from trihedron.files.scenario import TEMPLATE, improved_scenario
-from trihedron.files.truth import truth_document, write_truth
 from trihedron.simulate import (
     Pose,
     Turn,

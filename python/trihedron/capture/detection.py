@@ -108,10 +108,7 @@ def find_protocol(
 ) -> Found:
     """Read bytes, at every usual baud rate where none is given, until one protocol (or the given one) decodes them.
 
-    Raises
-    ------
-    CaptureError
-        When the device sends nothing, or no protocol decodes what it sends.
+    Raises ``CaptureError`` when the device sends nothing, or no protocol decodes what it sends.
     """
     names: Sequence[str | FrameDeclaration] = list(PROTOCOLS) if protocol is None else [protocol]
     makers = [(one if isinstance(one, str) else one.name, decoder_factory(one, name_columns)) for one in names]

@@ -23,10 +23,7 @@ FORMAT = "trihedron capture 1"
 class GrowingLog:
     """Appends rows; only two header lines of fixed length are rewritten.
 
-    Raises
-    ------
-    CaptureError
-        When the file exists and ``overwrite`` is not set, or its folder cannot be written to.
+    Raises ``CaptureError`` when the file exists and ``overwrite`` is not set, or its folder cannot be written to.
     """
 
     def __init__(self, path: Path, *, overwrite: bool = False) -> None:
@@ -80,10 +77,7 @@ class GrowingLog:
     def flush(self, *, force: bool = False) -> None:
         """Write pending rows if ``FLUSH_S`` has passed or ``force`` is set.
 
-        Raises
-        ------
-        DiskError
-            When the disk is full or cannot be written; rows written before are intact.
+        Raises ``DiskError`` when the disk is full or cannot be written; rows written before are intact.
         """
         now = time.monotonic()
         if not (force or now - self._flushed_s >= FLUSH_S):

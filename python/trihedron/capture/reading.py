@@ -5,23 +5,24 @@ import threading
 import time
 from collections.abc import Callable
 from datetime import datetime, timezone
+from pathlib import Path
 
 from trihedron.arrivals import ClockLine
-from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
 from trihedron.capture.sequence import Placed
 from trihedron.capture.sources import Source
-from trihedron.capture.timeline import Timeline
+from trihedron.capture.timeline import Count, Timeline, clock_sentence
 
 
-class Rows:
-    """Times, indices, remarks and rows of a recording; ``rate_hz`` is that of a device without a clock, if known."""
+class Rows(GrowingLog):
+    """The log with times, indices and remarks; ``rate_hz`` is that of a device without a clock, if known."""
 
-    def __init__(self, log: GrowingLog, source: Source, rate_hz: float | None) -> None:
+    def __init__(self, path: Path, source: Source, rate_hz: float | None, *, overwrite: bool) -> None:
+        super().__init__(path, overwrite=overwrite)
         self.is_begun = False
-        self._log, self._source, self._rate_hz = log, source, rate_hz
+        self._source, self._rate_hz = source, rate_hz
         self._started = datetime.now(timezone.utc)
         self._has_time = self._has_device_clock = False
         self._offset = self._next_index = 0
@@ -31,8 +32,8 @@ class Rows:
         """The frame's index in the log; it continues that of the previous connection."""
         return one.place + self._offset
 
-    def begin(self, decoder: Decoder, timeline: Timeline) -> None:
-        """Write the header; the first frame has shown which columns and clocks there are."""
+    def begin_with(self, decoder: Decoder, timeline: Timeline) -> None:
+        """Write the header, once; the first frame has shown which columns and clocks there are."""
         if self.is_begun:
             return
         self.is_begun = True
@@ -47,7 +48,7 @@ class Rows:
             "started": self._started.isoformat(timespec="milliseconds"),
             "device clock": f"{timeline.tick_s:g} s per tick" if self._has_device_clock else "none",
         }
-        self._log.begin(facts, [*names, *decoder.columns])
+        self.begin(facts, [*names, *decoder.columns])
 
     def add(self, one: Placed, timeline: Timeline, *, is_first: bool, lost_while_away: int = 0) -> float:
         """Write one row, and remarks on losses or a restart before it; return its time [s]."""
@@ -68,14 +69,14 @@ class Rows:
         parts.append(str(index))
         if self._has_device_clock:
             parts.append(str(one.frame.ticks))
-        self._log.row(",".join(parts) + "," + one.frame.text, time_s)
+        self.row(",".join(parts) + "," + one.frame.text, time_s)
         return time_s
 
     def say(self, text: str) -> None:
         """Add a remark to the next block, and to the log if it has begun."""
         self._remarks.append(text)
         if self.is_begun:
-            self._log.remark(text)
+            self.remark(text)
 
     def take_remarks(self) -> tuple[str, ...]:
         """The remarks since the last call."""
@@ -85,22 +86,14 @@ class Rows:
     def say_facts(self, count: Count, clock: ClockLine | None, timeline: Timeline | None) -> None:
         """Rewrite the header lines on frames and clocks."""
         if self.is_begun:
-            self._log.fill("frames", count.sentence())
-            self._log.fill("clock", clock_sentence(clock, timeline))
-
-    def flush(self, *, force: bool = False) -> None:
-        """Write pending rows if it is time to, or at once with ``force``."""
-        self._log.flush(force=force)
-
-    def abandon(self) -> None:
-        """Close the log after a failure, without writing pending rows."""
-        self._log.abandon()
+            self.fill("frames", count.sentence())
+            self.fill("clock", clock_sentence(clock, timeline))
 
     def close(self) -> None:
         """Write pending rows and close the log; delete a log without any row."""
-        self._log.close()
+        super().close()
         if not self.is_begun:
-            self._log.path.unlink(missing_ok=True)
+            self.path.unlink(missing_ok=True)
 
 
 RETRY_S = 0.25
@@ -121,20 +114,9 @@ class Stopped(Exception):
 class ReadingThread:
     """Reads a source into a queue, waits for a disconnected device, and queues these events in order.
 
-    Parameters
-    ----------
-    source : Source
-    first_bytes : bytes
-        Bytes that were read before; they are the first item.
-    wait_for_return_s : float
-        How long to wait for a disconnected device [s].
-    now_s : callable
-        Returns the time of the host's clock [s].
-
-    Notes
-    -----
     Items are ``(host_s, bytes)`` or ``(host_s, exception)``: `SourceLostError`, `SourceReturned`, `SourceEndedError`,
-    `Stopped`, or another exception of the source; one of the last three is the last item.
+    `Stopped`, or another exception of the source; one of the last three is the last item. ``first_bytes``, which were
+    read before, are the first item; ``now_s`` returns the time of the host's clock [s].
     """
 
     def __init__(

@@ -7,19 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.arrivals import ClockLine
-from trihedron.capture.account import Count, Tally, clock_sentence
 from trihedron.capture.detection import silent
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
-from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
 from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
-from trihedron.capture.timeline import Timeline
+from trihedron.capture.timeline import Count, Tally, Timeline, clock_sentence
 
 SETTLE_S = 0.6
 """Without a device clock, rows wait this long [s] at the start of a connection, until arrivals give their rate."""
@@ -41,7 +38,7 @@ class Block:
 
     time_s: FloatArray
     host_s: FloatArray
-    index: npt.NDArray[np.int64]
+    index: IntArray
     values: FloatArray
     columns: tuple[str, ...]
     remarks: tuple[str, ...] = ()
@@ -50,23 +47,11 @@ class Block:
 class Recorder:
     """Reads a source until it ends or :meth:`stop`; iterating yields :class:`Block` after block and writes the log.
 
-    Parameters
-    ----------
-    source, make_decoder
-        The source of bytes, and the function that makes a decoder for every connection.
-    path : Path
-        The log to write.
-    rate_hz : float, optional
-        Rate of a device without a clock, if known.
-    wait_for_return_s : float
-        How long to wait for a disconnected device [s].
-    first_bytes : bytes
-        Bytes that were read to detect the protocol.
+    ``make_decoder`` makes a decoder for every connection; ``rate_hz`` is that of a device without a clock, if known;
+    ``first_bytes`` were read to detect the protocol.
 
-    Raises
-    ------
-    CaptureError
-        From iterating: a silent device, a full disk, no frames at all; the message says what was saved.
+    Raises ``CaptureError`` from iterating: a silent device, a full disk, no frames at all; the message says what was
+    saved.
     """
 
     def __init__(
@@ -87,7 +72,7 @@ class Recorder:
         self.ended_because = ""
         self._make = make_decoder
         self._decoder = make_decoder()
-        self._rows = Rows(GrowingLog(path, overwrite=overwrite), source, rate_hz)
+        self._rows = Rows(path, source, rate_hz, overwrite=overwrite)
         self._rate_hz = rate_hz
         self._wait_s, self._silence_s = wait_for_return_s, silence_s
         self._sequence: Sequence | None = None
@@ -195,7 +180,7 @@ class Recorder:
             placed, self._held = [*self._held, *placed], []
         if not placed:
             return
-        self._rows.begin(self._decoder, timeline)
+        self._rows.begin_with(self._decoder, timeline)
         times = np.empty(len(placed))
         for i, one in enumerate(placed):
             away = self._lost_while_away(one) if self._new_connection else 0

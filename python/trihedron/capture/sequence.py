@@ -9,8 +9,8 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
-from trihedron.capture.account import Tally
 from trihedron.capture.protocols.framing import Frame
+from trihedron.capture.timeline import Tally
 
 LEARN = 8
 """Frames from which the clock's step is first estimated (mean of the steps up to 1.6 times their median)."""
@@ -55,16 +55,9 @@ class Placed(NamedTuple):
 
 
 class Sequence:
-    """Assigns an index to every frame.
+    """Assigns an index to every frame, by counter or clock; without both, frames are consecutive.
 
-    Parameters
-    ----------
-    by_counter, by_clock : bool
-        Whether counter or clock determines indices; without both, frames are consecutive.
-    modulus : int
-        Value at which counter or clock wraps; 0 if it does not.
-    tick_s : float
-        One tick of the clock [s].
+    ``modulus`` is the value at which counter or clock wraps (0: it does not), ``tick_s`` one tick of the clock [s].
     """
 
     def __init__(self, *, by_counter: bool = False, by_clock: bool = False, modulus: int = 0, tick_s: float = 0.0):
@@ -129,11 +122,6 @@ class Sequence:
         steps = self._ahead(self._key(frame))
         return steps - 1 if 0 < steps <= most else None
 
-    @property
-    def period_s(self) -> float:
-        """Step of the device's clock [s], 0 while unknown."""
-        return self._period * self._tick_s
-
     def _key(self, frame: Frame) -> int:
         key = frame.counter if self._by_counter else frame.ticks
         return 0 if key is None else key
@@ -186,7 +174,7 @@ class Sequence:
     def _most(self) -> int:
         if self._by_counter:
             return min(MOST_LOST, self._modulus // 2 or MOST_LOST)
-        return int(MOST_SILENT_S / max(self.period_s, 1e-9))
+        return int(MOST_SILENT_S / max(self._period * self._tick_s, 1e-9))
 
     def _begin(self, out: list[Placed]) -> None:
         keys = [self._key(frame) for _, frame in self._waiting]

@@ -34,10 +34,7 @@ class Port:
 def list_ports() -> list[Port]:
     """Serial ports sorted by name, those of USB devices first.
 
-    Raises
-    ------
-    CaptureError
-        When pyserial is not installed.
+    Raises ``CaptureError`` when pyserial is not installed.
     """
     import_serial()
     from serial.tools.list_ports import comports
@@ -79,10 +76,7 @@ class Source(Protocol):
 def import_serial() -> type[serial.Serial]:
     """The class of pyserial's ports.
 
-    Raises
-    ------
-    CaptureError
-        When pyserial is not installed.
+    Raises ``CaptureError`` when pyserial is not installed.
     """
     try:
         import serial
@@ -280,10 +274,7 @@ class FileSource:
 def open_source(where: str, baud: int | None = None) -> Source:
     """Open a port (``/dev/ttyUSB0``, ``COM3``), ``tcp://host:port``, a file, or ``-`` for standard input.
 
-    Raises
-    ------
-    CaptureError
-        When it cannot be opened; the message says which, why, and what to do.
+    Raises ``CaptureError`` when it cannot be opened; the message says which, why, and what to do.
     """
     if where == "-":
         return FileSource(None)

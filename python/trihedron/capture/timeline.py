@@ -1,16 +1,19 @@
-"""Time of every frame while it is recorded."""
+"""Time of every frame while it is recorded, and the summary of a capture."""
 
-from trihedron.arrivals import ClockFit
+from dataclasses import dataclass, field
+
+from trihedron.arrivals import ClockFit, ClockLine
 
 
 class Timeline:
     """Time of every frame [s]: by the device's clock if it has one, else by frame index and the rate of arrivals.
 
-    The time of a connection continues that of the previous one, after the gap measured by the host's clock.
+    The time of a connection continues that of the previous one, after the gap measured by the host's clock. ``tick_s``
+    is one tick of the device's clock [s], 0 without one.
     """
 
     def __init__(self, *, tick_s: float, modulus: int, nominal_rate_hz: float | None = None) -> None:
-        self._tick_s, self._modulus = tick_s, modulus
+        self.tick_s, self._modulus = tick_s, modulus
         self.fit = ClockFit()
         self._ticks: int | None = None
         self._elapsed = 0
@@ -26,12 +29,7 @@ class Timeline:
     @property
     def has_device_clock(self) -> bool:
         """Whether times are from the device's clock."""
-        return self._tick_s > 0.0
-
-    @property
-    def tick_s(self) -> float:
-        """One tick of the device's clock [s]; 0 without one."""
-        return self._tick_s
+        return self.tick_s > 0.0
 
     def expect(self, period_s: float) -> None:
         """Set the first estimate of the seconds per frame, from the first arrivals; a given rate is kept."""
@@ -49,7 +47,7 @@ class Timeline:
                 step = step - self._modulus if step > self._modulus // 2 else step
             self._elapsed += step
             self._ticks = ticks
-            self._time_s = max(self._start_s + self._elapsed * self._tick_s, self._time_s)
+            self._time_s = max(self._start_s + self._elapsed * self.tick_s, self._time_s)
         else:
             self._time_s += (index - self._index) * self._step(index)
         self._index, self._host_s = index, host_s
@@ -60,7 +58,7 @@ class Timeline:
         if self._index is None:
             return
         if self.has_device_clock:
-            self.fit.add(self._elapsed * self._tick_s, host_s)
+            self.fit.add(self._elapsed * self.tick_s, host_s)
         else:
             self.fit.add(self._index - self._index0, host_s)
 
@@ -85,3 +83,80 @@ class Timeline:
 
 STARTING_STEP_S = 0.01
 """Seconds per frame assumed until the arrivals determine the rate."""
+
+
+# Summary of a capture: frames saved, lost and corrupt, and the device's clock against the host's.
+
+MOST_PPM = 20_000.0
+"""A larger rate difference is no clock error, but a replay at another speed or a misread unit of time."""
+
+
+@dataclass
+class Tally:
+    """Counts of frames: ``lost`` are missing by the device's counter or clock; ``garbled`` were complete, but their
+    counter or timestamp contradicted their neighbours' (also counted as lost); ``repeated`` arrived twice. In
+    ``uncounted`` pauses more may be lost than counted."""
+
+    saved: int = 0
+    lost: int = 0
+    garbled: int = 0
+    repeated: int = 0
+    restarts: int = 0
+    uncounted: int = 0
+
+
+@dataclass
+class Count:
+    """Counts of frames, corrupt pieces, skipped bytes and disconnections of a capture."""
+
+    tally: Tally = field(default_factory=Tally)
+    corrupt: int = 0
+    skipped_bytes: int = 0
+    n_bytes: int = 0
+    disconnections: int = 0
+    counted_by: str = "nothing"
+
+    @property
+    def lost(self) -> int:
+        """Frames sent but not in the log: by counter or clock; without either, the number of corrupt pieces."""
+        return self.corrupt if self.counted_by == "nothing" else self.tally.lost
+
+    @property
+    def is_least(self) -> bool:
+        """Whether ``lost`` is a lower bound: the counter restarted, or may have wrapped unnoticed in a pause."""
+        return self.counted_by != "nothing" and bool(self.tally.restarts or self.tally.uncounted)
+
+    def sentence(self) -> str:
+        """The counts as one sentence, for the screen and the log's header."""
+        how = {
+            "counter": "by the device's counter",
+            "clock": "by the device's clock",
+            "nothing": "as far as remains were seen: there is no counter and no clock",
+        }[self.counted_by]
+        parts = [f"{self.tally.saved} saved", f"{'at least ' if self.is_least else ''}{self.lost} lost {how}"]
+        for n, words in (
+            (self.corrupt if self.counted_by != "nothing" else 0, "corrupt pieces seen"),
+            (self.tally.garbled, "with a garbled count"),
+            (self.tally.repeated, "repeated"),
+            (self.disconnections, "disconnections"),
+            (self.tally.restarts, "restarts of the device"),
+        ):
+            if n:
+                parts.append(f"{n} {words}")
+        return " / ".join(parts)
+
+
+def clock_sentence(line: ClockLine | None, timeline: Timeline | None) -> str:
+    """Offset, rate and arrival jitter as one sentence, for the screen and the log's header."""
+    if line is None or timeline is None:
+        return "not fitted: too short or not live"
+    late = f"bytes arrive {1e3 * line.jitter_rms_s:.3g} ms rms and {1e3 * line.jitter_95_s:.3g} ms (95 %) late"
+    if timeline.has_device_clock:
+        if abs(line.rate_ppm) > MOST_PPM:
+            return f"the device's clock runs {1.0 / line.slope:.4g} times as fast as the host's / {late}"
+        return (
+            f"device second = host second {line.rate_ppm:+.2f} ppm +- {line.sigma_ppm:.2f} / device zero at host "
+            f"{line.offset_s:.6f} s / {late}"
+        )
+    sigma = 100.0 * line.sigma_slope / line.slope
+    return f"{1.0 / line.slope:.6f} frames per second of the host +- {sigma:.2g} % / {late}"

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.probability import fdtrc, stdtrit
 from trihedron.records.pose_noise import Measured, Ratio
@@ -29,7 +28,7 @@ class Pooled:
     scatter: float
 
 
-def robust_poses(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
+def robust_poses(variance: FloatArray, dof: FloatArray) -> BoolArray:
     """(k,) poses whose noise is not far above that of the others; at most a quarter is excluded, the worst first."""
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:
@@ -82,10 +81,7 @@ def as_measured(value: float, sigma_log: float, dof: float) -> Measured:
 def ratio_of(one: Measured, other: Measured) -> Ratio:
     """Ratio of two figures; degrees of freedom after Welch and Satterthwaite.
 
-    Raises
-    ------
-    ValueError
-        When a figure is not positive.
+    Raises ``ValueError`` when a figure is not positive.
     """
     if not (one.value > 0.0 and other.value > 0.0):
         raise InputError("only positive figures have a ratio")

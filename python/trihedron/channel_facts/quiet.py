@@ -6,10 +6,9 @@ This is not the segmentation: no pose is accepted or excluded here.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.quantiles import median, medians, quantile
 
 WINDOW_S = 0.5
@@ -26,11 +25,11 @@ class Windows:
     ``quiet`` (m,) marks those near the log's own noise floor in every sensor.
     """
 
-    start: npt.NDArray[np.int64]
+    start: IntArray
     length: int
     mean: dict[str, FloatArray]
     noise: dict[str, FloatArray]
-    quiet: npt.NDArray[np.bool_]
+    quiet: BoolArray
 
     def quiet_mean(self, sensor: str) -> FloatArray:
         """(k, 3) mean readings of the quiet windows."""

@@ -110,8 +110,7 @@ def simulate(
         raise typer.BadParameter("name the log to write with -o LOG, or send it with --serve PTY")
     from trihedron.api.simulating import simulate as run
     from trihedron.api.simulating import twin
-    from trihedron.files.log import write_recording
-    from trihedron.files.truth import write_truth
+    from trihedron.files.log import write_recording, write_truth
 
     _check_endings(output, truth)
     read_from = (None if scenario is None else Path(scenario), like, calibration)
@@ -130,7 +129,7 @@ def simulate(
         say(f"truth: {truth}")
     if report is not None:
         name_log(LogSource(log=output))
-        from trihedron.files.truth import truth_document
+        from trihedron.files.log import truth_document
         from trihedron.report.simulation import simulation_report
 
         write_report(simulation_report(recording, known), lambda: truth_document(known), report, force=force)
@@ -146,8 +145,7 @@ def simulate(
 
 
 def _check_endings(output: Path | None, truth: Path | None) -> None:
-    from trihedron.files.log import check_suffix
-    from trihedron.files.truth import check_truth_suffix
+    from trihedron.files.log import check_suffix, check_truth_suffix
 
     if output is not None:
         check_suffix(output)

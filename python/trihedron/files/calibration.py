@@ -16,8 +16,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.documents import read_json
 from trihedron.errors import InputError
 from trihedron.files.output import write_whole
@@ -224,7 +224,7 @@ def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:
     }
 
 
-def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> SensorCalibration:
+def _sensor(document: dict[str, Any], covariance: FloatArray) -> SensorCalibration:
     quality, observability = document["residuals"], document["observability"]
     if observability is not None and observability["condition"] is None:
         observability = {**observability, "condition": math.inf}

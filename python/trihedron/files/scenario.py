@@ -52,23 +52,13 @@ def improved_scenario(
     effects: Sequence[tuple[str, Mapping[str, Any]]],
     removed: Collection[str] = (),
 ) -> str:
-    """The text of a scenario file with new values.
+    """The text of a user's scenario file with new values.
 
-    Parameters
-    ----------
-    path : path
-        The user's file.
-    tables : mapping
-        ``{"accelerometer": {"b": [...], "noise": {"N": [...]}}, ...}``: values that replace those of the file.
-    effects : sequence of (id, size)
-        Effects to include, each with the keys of ``[[effect]]``; entries of the same id are replaced.
-    removed : ids
-        Effects to remove.
+    ``tables`` has values that replace those of the file: ``{"accelerometer": {"noise": {"N": [...]}}, ...}``.
+    ``effects`` are (id, size), with the keys of ``[[effect]]``, and replace entries of the same id; those of the ids
+    ``removed`` are removed.
 
-    Raises
-    ------
-    ValueError
-        When the file is not TOML.
+    Raises ``ValueError`` when the file is not TOML.
     """
     text = read_text(path, "scenario file")
     try:

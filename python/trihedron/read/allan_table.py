@@ -37,10 +37,7 @@ class AllanTable:
 def read_allan_table(path: Path) -> AllanTable:
     """A table with names: a column of averaging times and one per channel, or rows that name their channel.
 
-    Raises
-    ------
-    ReadError
-        When no averaging times or no deviations are recognised, or a cell is not a number.
+    Raises ``ReadError`` when no averaging times or no deviations are recognised, or a cell is not a number.
     """
     table = read_table(path)
     names = table.names or ()

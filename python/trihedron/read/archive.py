@@ -1,10 +1,7 @@
 """NumPy files: ``.npz`` archives and ``.npy`` arrays."""
 
 import math
-import struct
-import tokenize
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +10,7 @@ import numpy.typing as npt
 from numpy.lib import format as npy_format
 
 from trihedron.errors import InputError
-from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
+from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
 from trihedron.read.memory import check_memory, check_unpacked
 from trihedron.read.table import Table
 
@@ -37,31 +34,18 @@ def _devices(archive: zipfile.ZipFile, name: str) -> int:
 
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
-# NumPy evaluates a header as Python text, so a damaged one raises the errors of a parser.
-DAMAGE = (
-    *(ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OverflowError, MemoryError),
-    *(SyntaxError, tokenize.TokenError, RecursionError, NotImplementedError),
-    *(zipfile.BadZipFile, zlib.error, struct.error),
-)
+# NumPy evaluates a header as Python text, so a damaged one raises errors of a parser, too.
+_DAMAGED = "this .{} file is damaged or contains Python objects ({{}})"
 
 
 def read_npy(path: Path) -> Table:
     """An array (n, k) or a structured array (n,)."""
-    try:
-        with path.open("rb") as stream:
-            shape, _, _ = header(stream, path.stat().st_size)
-            check_memory(path, math.prod(shape), 1)
-            stream.seek(0)
-            # Read, not memory-mapped: the process crashes if a mapped file is truncated.
-            array = np.load(stream, allow_pickle=False)
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except DAMAGE as error:
-        if isinstance(error, ReadError):
-            raise
-        raise ReadError(
-            f"{path}: this .npy file is damaged or contains Python objects ({first_line(error)})."
-        ) from None
+    with errors_of_library(path, _DAMAGED.format("npy")), errors_of_system(path), path.open("rb") as stream:
+        shape, _, _ = header(stream, path.stat().st_size)
+        check_memory(path, math.prod(shape), 1)
+        stream.seek(0)
+        # Read, not memory-mapped: the process crashes if a mapped file is truncated.
+        array = np.load(stream, allow_pickle=False)
     return _from_arrays(path, {"data": array}, None)
 
 
@@ -80,18 +64,14 @@ def header(stream: Any, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]
 
 def read_npz(path: Path, instance: str | None) -> Table:
     """Named arrays: one per column, or a block ``counts`` (n, k) or (n, units, k), ``t_s``, ``fs_hz``."""
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            _check_members(path, archive)
-            arrays = {name: archive[name] for name in archive.files}
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except DAMAGE as error:
-        if isinstance(error, ReadError):
-            raise
-        raise ReadError(
-            f"{path}: this .npz file is damaged or contains Python objects ({first_line(error)})."
-        ) from None
+    with (
+        errors_of_library(path, _DAMAGED.format("npz")),
+        errors_of_system(path),
+        path.open("rb") as stream,
+        np.load(stream, allow_pickle=False) as archive,
+    ):
+        _check_members(path, archive)
+        arrays = {name: archive[name] for name in archive.files}
     return _from_arrays(path, arrays, instance)
 
 

@@ -5,6 +5,7 @@ import io
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,11 @@ import numpy as np
 
 from trihedron.errors import InputError
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
-from trihedron.records import Finding, FindingCode, Onboard
+from trihedron.records import Finding, FindingCode
 
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
 """Parameters of the corrections that the board applies to readings (the INS library of ArduPilot)."""
@@ -33,54 +34,48 @@ _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each with its own timestamps.
 
-    Raises
-    ------
-    ReadError
-        When pymavlink is not installed, the log is damaged, or contains several IMUs and none is chosen.
+    Raises ``ReadError`` when pymavlink is not installed, the log is damaged, or contains several IMUs and none is
+    chosen.
     """
     try:
         from pymavlink import DFReader
     except ImportError:
         raise missing_package(path, "an ArduPilot .bin log", "pymavlink") from None
-    rows: dict[tuple[str, str], list[list[float]]] = {}
-    names: dict[tuple[str, str], list[str]] = {}
+    messages: dict[tuple[str, str], _Messages] = {}
     held = Parameters(_PARAMETERS)
     # pymavlink prints problems on stderr; damaged bytes that it skipped become a finding.
     said = io.StringIO()
     # Created before it is initialised, so that its file can be closed when initialising fails.
     log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
+    damage = errors_of_library(path, "pymavlink cannot read this log ({}); copy it again")
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
+        with damage, contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
             log.__init__(str(path))
             while (message := log.recv_match(type=_TYPES)) is not None:
                 if message.get_type() == "PARM":
-                    held.note(message.Name, message.Value, has_readings=bool(rows))
+                    held.note(message.Name, message.Value, has_readings=bool(messages))
                 else:
-                    _keep(message, rows, names)
-    # For damaged logs pymavlink raises errors of any kind.
-    except Exception as error:
-        raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
+                    _keep(message, messages)
     finally:
         for name in ("data_map", "filehandle"):
             # A memory map that pymavlink still uses cannot be closed; it is freed with the reader.
             with contextlib.suppress(AttributeError, BufferError):
                 getattr(log, name).close()
-    imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
-    raw = [Stream("ACC", len(r), i) for (t, i), r in sorted(rows.items()) if t == "ACC" and ("GYR", i) in rows]
+    streams = [Stream(word, len(messages[word, i].rows), i) for word, i in sorted(messages)]
+    imu = [s for s in streams if s.topic == "IMU"]
+    raw = [s for s in streams if s.topic == "ACC" and ("GYR", s.instance) in messages]
     streams = imu + raw
     offered = streams if choice.topic is not None or not imu else imu
     taken = pick(path, offered, choice, "this log")
-    note = (*choice_note("log", taken, streams), *_skipped(said.getvalue()))
-    sha256 = file_sha256(path)
     # Readings of every message, ACC and GYR included, are logged after offset, scale and rotation to the board's axes.
     onboard = held.onboard("ardupilot", (int(taken.instance),) * 2, "body")
-    note = (*note, *said_of(onboard))
+    notes = (*choice_note("log", taken, streams), *_skipped(said.getvalue()), *said_of(onboard))
+    common = Table(path, None, (), file_sha256(path), onboard=onboard)
+    first = replace(_filled(common, messages[taken.topic, taken.instance]), findings=notes)
     if taken.topic == "IMU":
-        return (_table(path, ("IMU", taken.instance), rows, names, sha256, onboard, note, None),)
-    return (
-        _table(path, ("ACC", taken.instance), rows, names, sha256, onboard, note, "accelerometer"),
-        _table(path, ("GYR", taken.instance), rows, names, sha256, onboard, (), "gyroscope"),
-    )
+        return (first,)
+    second = _filled(common, messages["GYR", taken.instance])
+    return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
 
 
 @contextlib.contextmanager
@@ -104,39 +99,35 @@ def _skipped(said: str) -> tuple[Finding, ...]:
     return (Finding.of(FindingCode.SAMPLES_LOST, "bytes-skipped", bytes=sum(skips), count=len(skips)),)
 
 
-def _keep(
-    message: Any, rows: dict[tuple[str, str], list[list[float]]], names: dict[tuple[str, str], list[str]]
-) -> None:
+@dataclass(frozen=True)
+class _Messages:
+    """Messages of one type and instance: the fields kept, the timestamp first, its unit, and their values."""
+
+    fields: tuple[str, ...]
+    unit: str
+    rows: list[list[float]]
+
+
+def _keep(message: Any, messages: dict[tuple[str, str], _Messages]) -> None:
     """Append a message's fields to the rows of its type and instance; IMU2 of older logs is instance 1."""
     word, number = re.fullmatch(r"([A-Z]+)(\d?)", message.get_type()).groups()  # type: ignore[union-attr]
     fields = message.to_dict()
     instance = str(fields.get("I", int(number or 1) - 1))
-    key = (word, instance)
-    if key not in names:
+    held = messages.get((word, instance))
+    if held is None:
         timestamp, unit = next(((s, u) for s, u in _TIMESTAMPS if s in fields), ("", ""))
         if not timestamp:
             raise InputError(f"{message.get_type()} has no timestamp")
-        names[key] = [f"{timestamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
-        rows[key] = []
-    plain = [names[key][0].split(" ")[0], *names[key][1:]]
-    rows[key].append([float(fields[name]) for name in plain])
+        names = (timestamp, *(name for name in _FIELDS[word] if name in fields))
+        held = messages[word, instance] = _Messages(names, unit, [])
+    held.rows.append([float(fields[name]) for name in held.fields])
 
 
-def _table(
-    path: Path,
-    key: tuple[str, str],
-    rows: dict[tuple[str, str], list[list[float]]],
-    names: dict[tuple[str, str], list[str]],
-    sha256: str,
-    onboard: Onboard | None,
-    findings: tuple[Finding, ...],
-    sensor: Any,
-) -> Table:
-    values = np.array(rows[key])
-    labels = []
-    for name in names[key]:
+def _filled(table: Table, messages: _Messages) -> Table:
+    """The table with names and columns of the messages."""
+    labels = [f"{messages.fields[0]} [{messages.unit}]"]
+    for name in messages.fields[1:]:
         unit = _UNITS.get(name[:3])
         labels.append(f"{name} [{unit}]" if unit else {"T": "temperature", "Temp": "temperature"}.get(name, name))
-    clock = StatedClock(time=0, unit="ms" if "[ms]" in labels[0] else "us")
-    columns = tuple(np.ascontiguousarray(values[:, k]) for k in range(values.shape[1]))
-    return Table(path, tuple(labels), columns, sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard)
+    columns = tuple(np.array(messages.rows).T.copy())
+    return replace(table, names=tuple(labels), columns=columns, clock=StatedClock(time=0, unit=messages.unit))

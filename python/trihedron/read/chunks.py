@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.output import Temporary, clear_leftovers
-from trihedron.read.archive import DAMAGE, header
+from trihedron.read.archive import header
 from trihedron.read.errors import (
     ReadError,
     check_readable,
+    errors_of_library,
     errors_of_polars,
-    first_line,
-    from_os_error,
+    errors_of_system,
+    first_bytes,
     reject_after_fork,
 )
 from trihedron.read.text.layout import MISSING, Layout, detect
@@ -29,21 +31,11 @@ Rows = Callable[[int, int, tuple[int, ...]], npt.NDArray[Any]]
 
 
 def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
-    """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type.
-
-    Raises
-    ------
-    ReadError
-        When the file is damaged, or its array is not a table of numbers; from the function, when it was truncated.
-    """
-    try:
-        with path.open("rb") as stream:
-            shape, by_columns, dtype = header(stream, path.stat().st_size)
-            offset = stream.tell()
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except DAMAGE as error:
-        raise ReadError(f"{path}: this .npy file is damaged ({first_line(error)}); write it again.") from None
+    """Numbers of rows and columns of a .npy file, and a function that reads them in the file's data type."""
+    damage = "this .npy file is damaged ({}); write it again"
+    with errors_of_library(path, damage), errors_of_system(path), path.open("rb") as stream:
+        shape, by_columns, dtype = header(stream, path.stat().st_size)
+        offset = stream.tell()
     if dtype.kind not in "iuf" or len(shape) != len(("rows", "columns")):
         raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {dtype} {shape}.")
     n, width = shape
@@ -56,13 +48,10 @@ def _rows_of_array(path: Path) -> tuple[int, int, Rows]:
         return part
 
     def read(start: int, stop: int, columns: tuple[int, ...]) -> npt.NDArray[Any]:
-        try:
-            with path.open("rb") as stream:
-                if by_columns:
-                    return np.column_stack([taken(stream, k * n + start, stop - start) for k in columns])
-                part = taken(stream, start * width, (stop - start) * width).reshape(-1, width)
-        except OSError as error:
-            raise from_os_error(path, error) from None
+        with errors_of_system(path), path.open("rb") as stream:
+            if by_columns:
+                return np.column_stack([taken(stream, k * n + start, stop - start) for k in columns])
+            part = taken(stream, start * width, (stop - start) * width).reshape(-1, width)
         return part if columns == tuple(range(width)) else np.ascontiguousarray(part[:, columns])
 
     return n, width, read
@@ -114,19 +103,9 @@ class TextOnDisk:
 
 
 def _layout_of(log: Path) -> Layout:
-    """The layout of a text log.
-
-    Raises
-    ------
-    ReadError
-        When it is not a text of numbers that can be read in chunks.
-    """
+    """The layout of a text log."""
     ways = "only .npy, Parquet and plain text tables are read in pieces; write the log as one of these."
-    try:
-        with log.open("rb") as stream:
-            head = stream.read(HEAD_BYTES)
-    except OSError as error:
-        raise from_os_error(log, error) from None
+    head = first_bytes(log, HEAD_BYTES)
     if b"\0" in head:
         raise ReadError(f"{log}: {ways}")
     text = head.decode("utf-8-sig", errors="replace")
@@ -180,19 +159,19 @@ class ChunkedLog:
     columns: tuple[int, ...]
     read: Rows
 
-    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
+    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[FloatArray]:
         """Yield arrays (k, columns) in order from row ``first`` on, in the file's data type."""
         for start in range(first, self.n_rows, rows):
             yield self.read(start, min(start + rows, self.n_rows), self.columns)
 
-    def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+    def rows(self, start: int, stop: int) -> FloatArray:
         """Rows ``[start, stop)`` as float64 (stop - start, columns)."""
         start, stop = min(max(start, 0), self.n_rows), min(stop, self.n_rows)
         if stop <= start:
             return np.empty((0, len(self.columns)))
         return np.asarray(self.read(start, stop, self.columns), dtype=np.float64)
 
-    def whole(self) -> npt.NDArray[np.float64]:
+    def whole(self) -> FloatArray:
         """All rows (n, columns)."""
         return self.read(0, self.n_rows, self.columns)
 
@@ -201,17 +180,10 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     """A NumPy, Parquet or text log with given columns: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not
     read. A text is first converted to a Parquet table in the temporary folder.
 
-    Raises
-    ------
-    ReadError
-        When the file has another format, or the columns do not fit it.
+    Raises ``ReadError`` when the file has another format, or the columns do not fit it.
     """
     check_readable(path)
-    try:
-        with path.open("rb") as stream:
-            magic = stream.read(6)
-    except OSError as error:
-        raise from_os_error(path, error) from None
+    magic = first_bytes(path, 6)
     if magic == b"\x93NUMPY":
         n_rows, n_columns, read = _rows_of_array(path)
     else:

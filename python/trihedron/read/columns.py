@@ -72,10 +72,7 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     ``mapping`` is ``"time=t,ax=3,..."`` (names or numbers from 1) or ``"t,ax,ay,az,-,gx,gy,gz"`` (roles in file order);
     ``sensor`` is the sensor of columns named ``x y z`` alone.
 
-    Raises
-    ------
-    ReadError
-        When no sensor is found, or the mapping names a column that does not exist.
+    Raises ``ReadError`` when no sensor is found, or the mapping names a column that does not exist.
     """
     explicit = _mapped(table, mapping, sensor) if mapping is not None and mapping.strip() else None
     if explicit is not None and (explicit.accelerometer or explicit.gyroscope):

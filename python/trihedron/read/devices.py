@@ -5,10 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
-from trihedron.read.clock.order import unwrap
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.read.clock.base import unwrap
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
@@ -30,10 +29,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
 
     The table is unchanged where names do not identify devices, or none is chosen and sensors are recognised without.
 
-    Raises
-    ------
-    ReadError
-        When no sensor is recognised without a device, and none is chosen.
+    Raises ``ReadError`` when no sensor is recognised without a device, and none is chosen.
     """
     devices = _devices(table.names or ())
     if instance in devices:
@@ -127,10 +123,7 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
     alternate as the readings do (in order of time if there is one). Alternating devices without such a column are a
     serious finding; ``--instance 1`` then takes the first row of each turn.
 
-    Raises
-    ------
-    ReadError
-        When there are several devices and none is chosen, or the chosen one does not exist.
+    Raises ``ReadError`` when there are several devices and none is chosen, or the chosen one does not exist.
     """
     used, time = chosen_columns.used(), chosen_columns.time
     column, words, codes = _device_column(table, used, chosen_columns.device)
@@ -181,7 +174,7 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
     )
 
 
-def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], bool]:
+def _changes_with(table: Table, time: int) -> Callable[[IntArray], bool]:
     """A test whether codes (n,) change where the clock goes back and almost nowhere else; False if the clock wraps."""
     raw = table.columns[time]
     back = np.flatnonzero(np.diff(raw) < 0.0)
@@ -190,7 +183,7 @@ def _changes_with(table: Table, time: int) -> Callable[[npt.NDArray[np.int64]], 
     return lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1)
 
 
-def _in_time(table: Table, time: int | None, most: int) -> npt.NDArray[np.int64]:
+def _in_time(table: Table, time: int | None, most: int) -> IntArray:
     """Indices of the first rows in order of time; in file order without a time, or where the clock wraps."""
     as_they_stand = np.arange(min(table.n_rows, most))
     if time is None or len(table.columns[time]) != table.n_rows:
@@ -219,8 +212,8 @@ def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
 
 
 def _device_column(
-    table: Table, used: set[int], only: int | None = None, fits: Callable[[npt.NDArray[np.int64]], bool] | None = None
-) -> tuple[int, list[str], npt.NDArray[np.int64]]:
+    table: Table, used: set[int], only: int | None = None, fits: Callable[[IntArray], bool] | None = None
+) -> tuple[int, list[str], IntArray]:
     """Column, words and codes (n,) of the device column: ``only``, or the first whose codes pass ``fits``, or the
     first whose name means device."""
     for i in range(len(table.columns)) if only is None else (only,):

@@ -43,15 +43,36 @@ class ReadError(InputError):
 
 
 @contextmanager
+def errors_of_system(path: Path) -> Iterator[None]:
+    """Convert errors of the operating system to a :class:`ReadError` with advice."""
+    try:
+        yield
+    except OSError as error:
+        raise from_os_error(path, error) from None
+
+
+@contextmanager
+def errors_of_library(path: Path, damage: str, kinds: tuple[type[Exception], ...] = (Exception,)) -> Iterator[None]:
+    """Convert errors of a library to a :class:`ReadError` that states ``damage``, with ``{}`` for the error's words.
+
+    For damaged files libraries raise errors of every layer below them, hence all kinds unless some are named.
+    """
+    try:
+        yield
+    except ReadError:
+        raise
+    except kinds as error:
+        raise ReadError(f"{path}: {damage.format(first_line(error))}.") from None
+
+
+@contextmanager
 def errors_of_polars(path: Path, damage: str, remedy: str = "") -> Iterator[None]:
     """Convert errors and panics of polars, and of the system, to a :class:`ReadError` that states ``damage``."""
     import polars
 
     try:
-        with panics_unprinted():
+        with errors_of_system(path), panics_unprinted():
             yield
-    except OSError as error:
-        raise from_os_error(path, error) from None
     except polars.exceptions.PanicException:
         raise ReadError(f"{path}: {damage}{remedy}.") from None
     except polars.exceptions.PolarsError as error:
@@ -77,10 +98,7 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
 def reject_after_fork(path: Path) -> None:
     """Error in a child process made by fork, where polars would wait forever.
 
-    Raises
-    ------
-    ReadError
-        Where the library that parses tables cannot be used.
+    Raises ``ReadError``: Where the library that parses tables cannot be used.
     """
     try:
         check_tables()
@@ -91,25 +109,21 @@ def reject_after_fork(path: Path) -> None:
 def check_readable(path: Path) -> int:
     """Size in bytes of a readable regular file.
 
-    Raises
-    ------
-    ReadError
-        When it is missing, a directory, not a regular file, empty, or may not be read.
+    Raises ``ReadError`` when it is missing, a directory, not a regular file, empty, or may not be read.
     """
-    try:
-        status = path.stat()
+    with errors_of_system(path):
+        try:
+            status = path.stat()
+        except ValueError:
+            raise ReadError(
+                f"{str(path)!r}: this is not a possible file name; check it for stray characters."
+            ) from None
         if path.is_dir():
             raise IsADirectoryError
         if not path.is_file():
             raise ReadError(f"{path}: this is not a plain file; save the stream to a file first.")
         if not os.access(path, os.R_OK):
             raise PermissionError
-    except ValueError as error:
-        if isinstance(error, ReadError):
-            raise
-        raise ReadError(f"{str(path)!r}: this is not a possible file name; check it for stray characters.") from None
-    except OSError as error:
-        raise from_os_error(path, error) from None
     if status.st_size == 0:
         raise ReadError(f"{path}: the file is empty; record again or copy it again.")
     return status.st_size
@@ -118,10 +132,13 @@ def check_readable(path: Path) -> int:
 def file_sha256(path: Path) -> str:
     """SHA-256 of the bytes of a file, hexadecimal."""
     digest = hashlib.sha256()
-    try:
-        with path.open("rb") as stream:
-            while block := stream.read(1 << 22):
-                digest.update(block)
-    except OSError as error:
-        raise from_os_error(path, error) from None
+    with errors_of_system(path), path.open("rb") as stream:
+        while block := stream.read(1 << 22):
+            digest.update(block)
     return digest.hexdigest()
+
+
+def first_bytes(path: Path, n: int) -> bytes:
+    """The first ``n`` bytes of a file."""
+    with errors_of_system(path), path.open("rb") as stream:
+        return stream.read(n)

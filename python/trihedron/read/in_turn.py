@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import BoolArray, IntArray
 from trihedron.read.columns import Sensor, Triad, find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
@@ -23,10 +23,7 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
     """The accelerometer's rows and the gyro's, where they alternate, or where one fills only every second, third ...
     row; else the table itself.
 
-    Raises
-    ------
-    ReadError
-        When rows alternate and no column contains their time, or as ``find_columns``.
+    Raises ``ReadError`` when rows alternate and no column contains their time, or as ``find_columns``.
     """
     chosen = find_columns(table, mapping, sensor or table.sensor)
     if chosen.accelerometer is None or chosen.gyroscope is None:
@@ -58,7 +55,7 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
     return _filled(first), _filled(second)
 
 
-def _has_reading(table: Table, triad: Triad, most: int | None) -> npt.NDArray[np.bool_]:
+def _has_reading(table: Table, triad: Triad, most: int | None) -> BoolArray:
     has = np.zeros(len(table.columns[triad[0]][:most]), dtype=np.bool_)
     for column in triad:
         if len(table.columns[column][:most]) == len(has):
@@ -66,7 +63,7 @@ def _has_reading(table: Table, triad: Triad, most: int | None) -> npt.NDArray[np
     return has
 
 
-def _is_every_other(rows: npt.NDArray[np.int64]) -> bool:
+def _is_every_other(rows: IntArray) -> bool:
     step = np.diff(rows)
     usual = int(np.median(step))
     return usual > 1 and bool(np.mean(step == usual) >= _IN_STEP)

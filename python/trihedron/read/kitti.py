@@ -21,10 +21,7 @@ def oxts_folder(path: Path) -> Path | None:
 def read_kitti(folder: Path) -> Table:
     """Specific force [m/s²] and angular rate [rad/s] of a drive, in the vehicle's axes.
 
-    Raises
-    ------
-    ReadError
-        When a file is damaged, or the numbers of samples and timestamps differ.
+    Raises ``ReadError`` when a file is damaged, or the numbers of samples and timestamps differ.
     """
     digest = hashlib.sha256()
     rows: list[list[float]] = []

@@ -72,11 +72,8 @@ def rows_that_fit(left: int, n_columns: int) -> int:
 def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
     """Reject a log that does not fit into memory.
 
-    Raises
-    ------
-    ReadError
-        When ``n_rows * n_columns * 16`` bytes, less 8 for every cell of the ``n_held`` rows already read, exceed the
-        available memory; the message says how many rows fit.
+    Raises ``ReadError`` when ``n_rows * n_columns * 16`` bytes, less 8 for every cell of the ``n_held`` rows already
+    read, exceed the available memory; the message says how many rows fit.
     """
     left = available_memory_bytes() if available is None else available
     if left is None:
@@ -95,10 +92,7 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
 def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
     """Reject a malicious archive.
 
-    Raises
-    ------
-    ReadError
-        When ``unpacked`` is more than 500 times ``packed`` (both in bytes), and more than 100 MB.
+    Raises ``ReadError`` when ``unpacked`` is more than 500 times ``packed`` (both in bytes), and more than 100 MB.
     """
     if unpacked > RATIO_MATTERS_FROM and unpacked > MOST_RATIO * max(packed, 1):
         raise ReadError(
@@ -110,10 +104,7 @@ def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") 
 def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
     """Reject a malicious archive, or one whose content does not fit into memory.
 
-    Raises
-    ------
-    ReadError
-        As :func:`check_ratio`, or when ``unpacked`` bytes exceed the available memory.
+    Raises ``ReadError`` as :func:`check_ratio`, or when ``unpacked`` bytes exceed the available memory.
     """
     check_ratio(path, packed, unpacked, what)
     left = available_memory_bytes()
@@ -133,10 +124,7 @@ def table_of(data: object) -> Table:
     ``data`` is an array (n, k) or (n,) structured, anything with the array interface, a mapping of names to arrays (n,)
     or (n, 3), or a data frame (pandas, polars, Arrow, or any that supports the data frame interchange protocol).
 
-    Raises
-    ------
-    ReadError
-        (a ``ValueError``) when it is none of these, or lengths disagree.
+    Raises ``ReadError``: when it is none of these, or lengths disagree.
     """
     if isinstance(data, Mapping):
         return columns_table("dict", _flat(data))
@@ -226,10 +214,7 @@ def _series(series: Any) -> Any:
 def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
     """Named arrays (n,) or (n, k) as a table; single values are metadata.
 
-    Raises
-    ------
-    ReadError
-        When lengths disagree, or there is no column of numbers.
+    Raises ``ReadError`` when lengths disagree, or there is no column of numbers.
     """
     names: list[str] = []
     columns: list[FloatArray] = []

@@ -138,10 +138,7 @@ def merge(
     The accelerometer's clock is the base and its samples are unchanged, unless the gyro is more than 1.2 times faster:
     then the accelerometer is interpolated, because fewer gyro samples would impair the integration of rotations.
 
-    Raises
-    ------
-    ReadError
-        When the two clocks do not overlap.
+    Raises ``ReadError`` when the two clocks do not overlap.
     """
     acc_t = accelerometer_s + accelerometer_start_s
     gyr_t = gyroscope_s + gyroscope_start_s

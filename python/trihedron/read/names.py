@@ -242,7 +242,7 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
     if single is not None:
         return single
     axis = index or glued_axis
-    rest = list(expanded)
+    rest = expanded
     if words[0] in _RATES and (len(words) == 1 or _unit("gyroscope", words[1:])):
         unit = _unit("gyroscope", unit_words) or _unit("gyroscope", words[1:])
         return ColumnName("gyroscope", _RATES[words[0]], "p q r", unit, rank=-1, words=tuple(unit_words))

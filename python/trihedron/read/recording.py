@@ -14,15 +14,14 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
-from trihedron.read.audit.readings import audit_readings, audit_steps
-from trihedron.read.audit.seam import audit_seam
+from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.column_roles import mapping_of
 from trihedron.read.columns import Sensor, Triad
 from trihedron.read.devices import Choice, by_sensor, one_beside
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import ReadError, errors_of_system
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.merge import merge_sensors
@@ -93,11 +92,9 @@ def read_recording(
 
 
 def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    try:
+    # Errors before a format's reader is called: a name that is too long, a folder without permission.
+    with errors_of_system(path):
         tables = read_tables(path, options.choice, options.progress)
-    except OSError as error:
-        # Errors before a format's reader is called: a name that is too long, a folder without permission.
-        raise from_os_error(path, error) from None
     return of_tables(tables, sensor, options)
 
 
@@ -145,11 +142,7 @@ def audited(
     _accounted(sensors, findings)
     time_s = sensors.time_s
     rate = _rate_hz(sensors)
-    present = {
-        name: triad
-        for name, triad in (("accelerometer", sensors.accelerometer), ("gyroscope", sensors.gyroscope))
-        if triad is not None
-    }
+    present = sensors.triads
     extremes = {name: _finite_extremes(triad) for name, triad in present.items()}
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.table import Table
 from trihedron.records import Finding
 from trihedron.records.progress import Progress
@@ -43,10 +43,7 @@ def listed(streams: list[Stream]) -> Words:
 def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream:
     """The chosen stream, or the only one.
 
-    Raises
-    ------
-    ReadError
-        When there is no stream, none or several match the choice, or the matching one is empty.
+    Raises ``ReadError`` when there is no stream, none or several match the choice, or the matching one is empty.
     """
     if not streams:
         raise ReadError(f"{path}: {what} without readings of an accelerometer or a gyro that are known here.")
@@ -94,10 +91,7 @@ _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "recei
 def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """The messages of one topic, or of an accelerometer's and a gyro's topic, with the timestamps of their headers.
 
-    Raises
-    ------
-    ReadError
-        When rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
+    Raises ``ReadError`` when rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -110,16 +104,11 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
         if suffix and path.suffix != suffix:
             named = Path(folder) / f"bag{suffix}"
             named.symlink_to(path.absolute())
-        try:
-            with AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader:
-                return _tables(path, reader, choice, progress)
-        except ReadError:
-            raise
-        # For damaged bags rosbags raises errors of every layer below it: struct, zlib, sqlite, assertions.
-        except Exception as error:
-            raise ReadError(
-                f"{path}: rosbags cannot read this bag ({first_line(error)}); reindex or copy it again."
-            ) from None
+        with (
+            errors_of_library(path, "rosbags cannot read this bag ({}); reindex or copy it again"),
+            AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader,
+        ):
+            return _tables(path, reader, choice, progress)
 
 
 def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:

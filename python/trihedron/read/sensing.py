@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -76,10 +76,7 @@ def judge_accelerometer(
     if whole and not _is_near(norm, 1.0):
         found = AccelerationUnit.COUNTS
         if _is_near(norm, 1000.0):
-            return Judged(
-                found,
-                (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm),),
-            )
+            return Judged(found, (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm),))
         return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm),))
     lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
     nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
@@ -144,14 +141,8 @@ def judge_gyroscope(
         unit = parse_unit(RateUnit, given if given is not None else named)
         against = None
         if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
-            against = Finding.of(
-                FindingCode.UNIT_CONTRADICTED,
-                "gyro-by-turning",
-                is_given=given is not None,
-                unit=unit.value,
-                factor=turning.factor(unit),
-                percent=turning.percent,
-                correlation=turning.correlation,
+            against = _of_turning(
+                FindingCode.UNIT_CONTRADICTED, "gyro-by-turning", turning, unit, is_given=given is not None
             )
         return Judged(unit, _stated("gyro", unit, against, is_given=given is not None))
     if whole:
@@ -159,26 +150,23 @@ def judge_gyroscope(
     if turning is None:
         return _gyroscope_by_magnitude(extremes, windows)
     unit = min(turning.candidates, key=lambda unit: abs(math.log(turning.factor(unit))))
-    factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
+    code, case = FindingCode.UNIT_CONTRADICTED, "gyro-no-unit"
     if turning.fits(unit):
-        told = Finding.of(
-            FindingCode.UNIT_DETECTED,
-            "gyro-by-turning",
-            unit=unit.value,
-            factor=factor,
-            percent=percent,
-            correlation=correlation,
-        )
-    else:
-        told = Finding.of(
-            FindingCode.UNIT_CONTRADICTED,
-            "gyro-no-unit",
-            unit=unit.value,
-            factor=factor,
-            percent=percent,
-            correlation=correlation,
-        )
-    return Judged(unit, (told,))
+        code, case = FindingCode.UNIT_DETECTED, "gyro-by-turning"
+    return Judged(unit, (_of_turning(code, case, turning, unit),))
+
+
+def _of_turning(code: FindingCode, case: str, turning: Turning, unit: RateUnit, **stated: Any) -> Finding:
+    """A finding on the gyro's unit with the numbers of the rotation of gravity."""
+    return Finding.of(
+        code,
+        case,
+        **stated,
+        unit=unit.value,
+        factor=turning.factor(unit),
+        percent=turning.percent,
+        correlation=turning.correlation,
+    )
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:
@@ -191,10 +179,7 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
         unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
     else:
         unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
-    return Judged(
-        unit,
-        (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", static=rest, largest=largest, unit=unit.value),),
-    )
+    return Judged(unit, (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", static=rest, largest=largest, unit=unit.value),))
 
 
 def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tuple[bool | None, str]:

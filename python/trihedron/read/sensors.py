@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
-from trihedron.read.clock.base import Clock, build_clock
-from trihedron.read.clock.order import in_order
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.read.clock.base import Clock, build_clock, in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
@@ -62,11 +61,17 @@ class Sensors:
     has_clock: bool
     gyroscope_unit: str = ""
     sampling: Sampling = UNJUDGED
-    lost_behind: npt.NDArray[np.int64] | None = None
+    lost_behind: IntArray | None = None
     timestamps_s: FloatArray | None = None
     findings: tuple[Finding, ...] = field(default=())
     rows_in_file: int = 0
     rows_read: int = 0
+
+    @property
+    def triads(self) -> dict[str, FloatArray]:
+        """Readings (n, 3) of the sensors present."""
+        both = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
+        return {name: triad for name, triad in both.items() if triad is not None}
 
     def row(self, sample: int) -> int:
         """Row of the base table that contains a sample."""
@@ -111,10 +116,7 @@ def _triad(
 def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors:
     """One table's sensors (only ``sensor``, if given) on the table's clock.
 
-    Raises
-    ------
-    ReadError
-        When the table cannot become readings on a time base.
+    Raises ``ReadError`` when the table cannot become readings on a time base.
     """
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
@@ -206,10 +208,9 @@ def settled(sensors: Sensors) -> Sensors:
     """The sensors on the clock that timestamps, counter and motion determine; unchanged if that is done already."""
     if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
-    triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
     counter = sensors.columns.counter
     numbers = None if counter is None else sensors.column(counter)
-    found = settle_clock(sensors.time_s, sensors.start_s, triads, numbers)
+    found = settle_clock(sensors.time_s, sensors.start_s, list(sensors.triads.values()), numbers)
     return replace(
         sensors,
         time_s=found.time_s,
@@ -284,13 +285,7 @@ TOO_FEW_TO_JUDGE = 20
 
 
 def _reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
-    """Reject readings (n, 3), from columns ``where``, of which an axis is constant.
-
-    Raises
-    ------
-    ReadError
-        When an axis is constant or has no finite reading; the message names the first such column.
-    """
+    """Reject readings (n, 3), from columns ``where``, of which an axis is constant."""
     for k, column in enumerate(where):
         head = triad[:1000, k]
         if np.isfinite(head[0]) and np.any(np.isfinite(head) & (head != head[0])):

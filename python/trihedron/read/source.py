@@ -6,7 +6,7 @@ from pathlib import Path
 
 from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.read.errors import ReadError, check_readable, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
 from trihedron.read.table import Table
 from trihedron.read.zipped import read_zip
@@ -32,10 +32,7 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
 def reject_foreign(path: Path, magic: bytes) -> None:
     """Reject a file of a known format that is not supported.
 
-    Raises
-    ------
-    ReadError
-        When the format is known; the message names it and says how to get its numbers.
+    Raises ``ReadError`` when the format is known; the message names it and says how to get its numbers.
     """
     for start, kind, remedy in _FOREIGN:
         if magic.startswith(start):
@@ -60,10 +57,7 @@ def reject_foreign(path: Path, magic: bytes) -> None:
 def read_table(path: Path) -> Table:
     """The table of a file that contains one table.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read, is not a log, or contains one table per sensor.
+    Raises ``ReadError`` when the file cannot be read, is not a log, or contains one table per sensor.
     """
     tables = read_tables(path, Choice())
     if len(tables) > 1:
@@ -74,10 +68,7 @@ def read_table(path: Path) -> Table:
 def read_tables(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """One table, or the accelerometer's and the gyro's (in this order) where each has its own clock.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read or is not a log, or contains several devices and none is chosen.
+    Raises ``ReadError`` when the file cannot be read or is not a log, or contains several devices and none is chosen.
     """
     if path.is_dir() and (path / "metadata.yaml").is_file():
         from trihedron.read.ros import read_bag
@@ -86,11 +77,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if path.is_dir() and (oxts := oxts_folder(path)) is not None:
         return (read_kitti(oxts),)
     size = check_readable(path)
-    try:
-        with path.open("rb") as stream:
-            magic = stream.read(512)
-    except OSError as error:
-        raise from_os_error(path, error) from None
+    magic = first_bytes(path, 512)
     if magic.startswith(b"\x93NUMPY"):
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
@@ -99,15 +86,15 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if magic.startswith(b"PAR1"):
         from trihedron.read.parquet import read_parquet
 
-        return by_sensor(read_parquet(path))
+        return (read_parquet(path),)
     known = _ecosystem(path, magic, choice, progress)
     if known is not None:
         return tuple(replace(table, is_chosen=True) for table in known)
     reject_foreign(path, magic)
-    from trihedron.read.text.blocks import compression_of
+    from trihedron.read.text.blocks import TextFile, compression_of
     from trihedron.read.text.open import read_text
 
-    tables = read_text(path, compression_of(magic), size, progress)
+    tables = read_text(TextFile(path, size, compression_of(magic), progress))
     return by_sensor(tables[0]) if len(tables) == 1 else tables
 
 

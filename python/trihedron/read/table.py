@@ -6,10 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
-
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Finding, Onboard
 from trihedron.records.words import Words, words
 
@@ -46,10 +43,10 @@ class Table:
     sha256: str = ""
     metadata: dict[str, str] = field(default_factory=dict)
     first_line: int = 0
-    line_of_row: npt.NDArray[np.int64] | None = None
+    line_of_row: IntArray | None = None
     findings: tuple[Finding, ...] = ()
     words: dict[int, str] = field(default_factory=dict)
-    labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = field(default_factory=dict)
+    labels: dict[int, tuple[tuple[str, ...], IntArray]] = field(default_factory=dict)
     sensor: Literal["accelerometer", "gyroscope"] | None = None
     clock: StatedClock = field(default_factory=StatedClock)
     onboard: Onboard | None = None
@@ -64,7 +61,7 @@ class Table:
         """Number of rows in the file, including rows excluded from this table."""
         return self.rows_in_file or self.n_rows
 
-    def take(self, rows: npt.NDArray[np.int64], n_in_file: int, *findings: Finding) -> Table:
+    def take(self, rows: IntArray, n_in_file: int, *findings: Finding) -> Table:
         """The table of the given rows, in this order; ``n_in_file`` is its number of rows in the file."""
         lines = None
         if self.line_of_row is not None:
@@ -81,7 +78,7 @@ class Table:
         )
 
     def by_sensor(
-        self, accelerometer: npt.NDArray[np.int64], gyroscope: npt.NDArray[np.int64], n_left_out: int, note: Finding
+        self, accelerometer: IntArray, gyroscope: IntArray, n_left_out: int, note: Finding
     ) -> tuple[Table, Table]:
         """The tables of the accelerometer's and the gyro's rows; ``n_left_out`` rows, stated in ``note``, are in
         neither."""

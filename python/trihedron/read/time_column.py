@@ -56,10 +56,7 @@ def reject_unread_time(table: Table, chosen: Columns, mapping: str | None, rate_
 
     ``rate_hz`` is the rate that is known without a clock, if any.
 
-    Raises
-    ------
-    ReadError
-        When there is such a column; the message names it and the options to give.
+    Raises ``ReadError`` when there is such a column; the message names it and the options to give.
     """
     if table.names is None or (mapping is not None and re.search(r"(?:t|time)\s*=", mapping)):
         return

@@ -1,9 +1,15 @@
-"""HDF5 and MATLAB files: groups of arrays; the group with an accelerometer or a gyro is the log."""
+"""HDF5 and MATLAB files: groups of arrays, or tables; the group or table with an accelerometer or a gyro is the log.
+
+Tables and timetables, which are objects in MATLAB files, are decoded by mat-io, one data frame each. MATLAB Mobile
+saves a timetable for each sensor (``Acceleration``, ``AngularVelocity``) with columns X, Y, Z.
+"""
 
 import pickle
 import subprocess
 import sys
+import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.columns import columns_or_none
+from trihedron.read.columns import columns_or_none, sensor_of_file_name
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
-from trihedron.read.matlab import read_objects
-from trihedron.read.memory import columns_table
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_line
+from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
 
@@ -26,10 +31,7 @@ MIN_ROWS = 8
 def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of an HDF5 or MATLAB 7.3 file; two tables where MATLAB saved one for each sensor.
 
-    Raises
-    ------
-    ReadError
-        When h5py is not installed, the file is damaged, or it is ambiguous which group to read.
+    Raises ``ReadError`` when h5py is not installed, the file is damaged, or it is ambiguous which group to read.
     """
     try:
         import h5py
@@ -44,15 +46,11 @@ def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
             parent, _, leaf = name.rpartition("/")
             groups.setdefault(parent, {})[leaf] = node[()]
 
-    try:
-        with h5py.File(path, "r") as file:
-            has_objects = "#subsystem#" in file
-            file.visititems(visit)
-    # For damaged files h5py raises errors of several kinds.
-    except Exception as error:
-        raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
+    with errors_of_library(path, "h5py cannot read this file ({}); copy it again"), h5py.File(path, "r") as file:
+        has_objects = "#subsystem#" in file
+        file.visititems(visit)
     if has_objects and not _tables(path, groups):
-        return read_objects(path, choice)
+        return _objects(path, choice)
     return (_of_groups(path, groups, choice, "this HDF5 file"),)
 
 
@@ -68,10 +66,8 @@ pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protoc
 def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
-    Raises
-    ------
-    ReadError
-        When the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to read.
+    Raises ``ReadError`` when the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to
+    read.
     """
     child = subprocess.run([sys.executable, "-c", _LOAD, str(path)], capture_output=True, check=False)
     try:
@@ -82,7 +78,7 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
     if "__function_workspace__" in content and not _tables(path, groups):
-        return read_objects(path, choice)
+        return _objects(path, choice)
     if not groups:
         raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
     return (_of_groups(path, groups, choice, "this MATLAB file"),)
@@ -100,8 +96,18 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
 
 def _tables(path: Path, groups: Groups) -> dict[str, Table]:
     """Groups with an accelerometer or a gyro, by name."""
-    tables = {name or "/": _table(path, arrays) for name, arrays in groups.items()}
-    return {name: table for name, table in tables.items() if table is not None and columns_or_none(table) is not None}
+    return _with_sensors(path, {name or "/": _columns(arrays) for name, arrays in groups.items()})
+
+
+def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dict[str, Table]:
+    """Tables of named columns in which a sensor is recognised, by name."""
+    found: dict[str, Table] = {}
+    for name, columns in named.items():
+        with suppress(ReadError):  # lengths differ, or no numbers
+            table = replace(columns_table(str(path), columns), path=path)
+            if columns_or_none(table) is not None:
+                found[name] = table
+    return found
 
 
 def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
@@ -118,15 +124,15 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
         raise ReadError(
             f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains {held[:300]}."
         )
+    return _picked(path, tables, choice, what)
+
+
+def _picked(path: Path, tables: dict[str, Table], choice: Choice, what: str) -> Table:
+    """The chosen one of several tables, with a finding that names it."""
     streams = [Stream(name, table.n_rows) for name, table in tables.items()]
     taken = pick(path, streams, choice, what)
-    chosen = tables[taken.topic]
-    return replace(
-        chosen,
-        path=path,
-        sha256=file_sha256(path),
-        findings=(*chosen.findings, *choice_note(what.removeprefix("this "), taken, streams)),
-    )
+    table, note = tables[taken.topic], choice_note(what.removeprefix("this "), taken, streams)
+    return replace(table, sha256=file_sha256(path), findings=(*table.findings, *note))
 
 
 def _upright(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -135,8 +141,8 @@ def _upright(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return plain.T if plain.ndim == 2 and plain.shape[0] <= 12 < plain.shape[1] else plain
 
 
-def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
-    """Arrays of the group's most frequent length as columns, after :func:`_upright`; None where there is no table."""
+def _columns(arrays: Mapping[str, npt.NDArray[Any]]) -> list[tuple[str, Any]]:
+    """Arrays of the group's most frequent length, after :func:`_upright`, and single values."""
     shaped: dict[str, npt.NDArray[Any]] = {}
     for name, array in arrays.items():
         if array.dtype.names:
@@ -145,11 +151,48 @@ def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
         shaped[name] = _upright(array)
     lengths = [a.shape[0] for a in shaped.values() if a.ndim in (1, 2) and a.shape[0] >= MIN_ROWS]
     if not lengths:
-        return None
+        return []
     n = max(set(lengths), key=lengths.count)
     kept = [(name, a) for name, a in shaped.items() if a.ndim in (1, 2) and a.shape[0] == n]
     single = [(name, a) for name, a in shaped.items() if a.ndim == 0]
+    return [*kept, *single]
+
+
+_AXES = {"x", "y", "z"}
+
+
+def _objects(path: Path, choice: Choice) -> tuple[Table, ...]:
+    """The log in a MATLAB file of tables: one table, or one for each sensor."""
     try:
-        return columns_table(str(path), [*kept, *single])
-    except ReadError:
-        return None
+        from matio import load_from_mat
+    except ImportError:
+        raise missing_package(path, "a MATLAB file of tables or timetables", "mat-io") from None
+    damage = "mat-io cannot read this MATLAB file ({}); save it again"
+    with errors_of_library(path, damage), warnings.catch_warnings():
+        # SciPy, which mat-io uses, warns about internal data of the objects.
+        warnings.simplefilter("ignore")
+        content = load_from_mat(str(path))
+    frames = {name: value for name, value in content.items() if hasattr(value, "columns") and hasattr(value, "dtypes")}
+    tables = _with_sensors(path, {name: _columns_of_frame(name, frame) for name, frame in frames.items()})
+    if not tables:
+        held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
+        raise ReadError(
+            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it contains {held[:300]}."
+        )
+    if choice.topic is None and len(tables) == 2:
+        found = {name: columns_or_none(table) for name, table in tables.items()}
+        acc = [tables[name] for name, of in found.items() if of and of.accelerometer and not of.gyroscope]
+        gyr = [tables[name] for name, of in found.items() if of and of.gyroscope and not of.accelerometer]
+        if len(acc) == len(gyr) == 1:
+            sha256 = file_sha256(path)
+            return replace(acc[0], sensor="accelerometer", sha256=sha256), replace(
+                gyr[0], sensor="gyroscope", sha256=sha256
+            )
+    return (_picked(path, tables, choice, "this MATLAB file"),)
+
+
+def _columns_of_frame(name: str, frame: Any) -> list[tuple[str, Any]]:
+    """Columns of a data frame; those named only ``x``, ``y``, ``z`` get the name of their table as prefix."""
+    items = frame_columns(frame)
+    is_bare = {label.lower() for label, _ in items} >= _AXES and sensor_of_file_name(name) is not None
+    return [(f"{name}_{label}" if is_bare and label.lower() in _AXES else label, data) for label, data in items]

@@ -10,15 +10,15 @@ import contextlib
 import io
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.ros import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
@@ -28,7 +28,7 @@ from trihedron.records.onboard import Stage
 SUFFIX = "_fifo"
 
 
-def expanded(data: dict[str, Any]) -> dict[str, npt.NDArray[np.float64]] | None:
+def expanded(data: dict[str, Any]) -> dict[str, FloatArray] | None:
     """All samples in order: ``timestamp_sample`` [µs] and X, Y, Z in SI, each (n,); None where fields are missing."""
     present = {"timestamp_sample", "dt", "scale", "samples"} <= set(data)
     width = sum(f"x[{k}]" in data for k in range(256))
@@ -63,24 +63,18 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     Raw topics are read if they were logged at full rate (at least half as many rows as ``sensor_combined``), else
     batches of raw samples (``sensor_accel_fifo``) if there are any.
 
-    Raises
-    ------
-    ReadError
-        When pyulog is not installed, the log is damaged, or contains several IMUs and none is chosen.
+    Raises ``ReadError`` when pyulog is not installed, the log is damaged, or contains several IMUs and none is chosen.
     """
     try:
         from pyulog import ULog
     except ImportError:
         raise missing_package(path, "a PX4 ULog", "pyulog") from None
     _check_definitions(path)
-    try:
-        # pyulog prints messages on stdout, which is reserved for results.
-        # The stream is opened here, because pyulog leaves its own open when it fails.
-        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as stream:
-            log = ULog(stream, _TOPICS)
-    # For damaged logs pyulog raises errors of any kind.
-    except Exception as error:
-        raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
+    # pyulog prints messages on stdout, which is reserved for results.
+    quiet = contextlib.redirect_stdout(io.StringIO())
+    # The stream is opened here, because pyulog leaves its own open when it fails.
+    with errors_of_library(path, "pyulog cannot read this log ({}); copy it again"), quiet, path.open("rb") as stream:
+        log = ULog(stream, _TOPICS)
     data = _unrolled(log)
     counts = {key: len(columns[_timestamp(columns)]) for key, columns in data.items()}
     combined = counts.get((_COMBINED, 0), 0)
@@ -95,14 +89,13 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, offered, choice, "this log")
     onboard = _onboard(log, taken.topic, int(taken.instance or 0))
     findings = (*choice_note("log", taken, streams), *_losses(log), *said_of(onboard))
-    sha256 = file_sha256(path)
+    common = Table(path, None, (), file_sha256(path), clock=StatedClock(time=0, unit="us"), onboard=onboard)
     if taken.topic == _COMBINED:
-        return (_table(path, data[(_COMBINED, 0)], "", sha256, onboard, findings),)
+        return (replace(_filled(common, data[(_COMBINED, 0)], ""), findings=findings),)
     i = int(taken.instance)
-    return (
-        _table(path, data[(taken.topic, i)], _RAW, sha256, onboard, findings),
-        _table(path, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO, sha256, onboard, ()),
-    )
+    first = _filled(common, data[(taken.topic, i)], _RAW)
+    second = _filled(common, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO)
+    return replace(first, findings=findings), second
 
 
 def _unrolled(log: Any) -> dict[tuple[str, int], dict[str, Any]]:
@@ -143,9 +136,7 @@ def _check_definitions(path: Path) -> None:
     raise ReadError(f"{path}: this ULog ends before its first message; 0 messages were logged.")
 
 
-def _table(
-    path: Path, data: dict[str, Any], topic: str, sha256: str, onboard: Onboard | None, findings: tuple[Finding, ...]
-) -> Table:
+def _filled(table: Table, data: dict[str, Any], topic: str) -> Table:
     # The timestamp of the sample if the log has it; `timestamp` is that of publishing the message.
     timestamp = _timestamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[timestamp], dtype=np.float64)]
@@ -154,10 +145,7 @@ def _table(
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
             names.append(f"{word}_{name} [{unit}]" if sensor and name in AXES else name)
             columns.append(np.asarray(values, dtype=np.float64))
-    clock = StatedClock(time=0, unit="us")
-    return Table(
-        path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard
-    )
+    return replace(table, names=tuple(names), columns=tuple(columns), sensor=sensor)
 
 
 def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:

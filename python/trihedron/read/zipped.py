@@ -8,12 +8,13 @@ from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError, file_sha256, first_line, from_os_error
+from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
 from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
+_OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError)
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 _KINDS = {
     "accelerometer": re.compile(r"acc(el(erometer|eration)?)?(uncalibrated)?|totalacceleration|imu"),
@@ -25,35 +26,24 @@ _WITHOUT_GRAVITY = re.compile(r"linear|withoutg|user|gravity|meta")
 def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
     """Tables of a zip: a NumPy archive, one text file, or the accelerometer's and the gyro's.
 
-    Raises
-    ------
-    ReadError
-        When the archive is damaged, is another program's container, or it is ambiguous which members to read.
+    Raises ``ReadError`` when the archive is damaged, is another program's container, or it is ambiguous which members
+    to read.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [info.filename for info in archive.infolist() if not info.is_dir()]
-            if not names or any(name.endswith(".npy") for name in names):
-                return (read_npz(path, choice.instance),)
-            _reject_containers(path, names)
-            members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
-            picked = _chosen(path, members, choice.topic) or _by_name(members)
-            if not picked:
-                raise ReadError(
-                    f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
-                    "with --topic NAME, or unpack it and give --accel and --gyro."
-                )
-            sha256 = file_sha256(path)
-            tables = [
-                table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)
-            ]
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError) as error:
-        if isinstance(error, ReadError):
-            raise
-        why = first_line(error)
-        raise ReadError(f"{path}: this zip archive is damaged or locked ({why}); export it again.") from None
+    damage = errors_of_library(path, "this zip archive is damaged or locked ({}); export it again", _OF_DAMAGE)
+    with damage, errors_of_system(path), zipfile.ZipFile(path) as archive:
+        names = [info.filename for info in archive.infolist() if not info.is_dir()]
+        if not names or any(name.endswith(".npy") for name in names):
+            return (read_npz(path, choice.instance),)
+        _reject_containers(path, names)
+        members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
+        picked = _chosen(path, members, choice.topic) or _by_name(members)
+        if not picked:
+            raise ReadError(
+                f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
+                "with --topic NAME, or unpack it and give --accel and --gyro."
+            )
+        sha256 = file_sha256(path)
+        tables = [table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)]
     others = [name for name in names if name not in picked]
     if others:
         note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)
@@ -108,6 +98,7 @@ def _member(
 ) -> tuple[Table, ...]:
     # Parsing needs a large library, which a NumPy archive does not.
     from trihedron.read.columns import sensor_of_file_name
+    from trihedron.read.text.blocks import TextFile
     from trihedron.read.text.open import read_text
 
     info = archive.getinfo(name)
@@ -119,7 +110,7 @@ def _member(
         raise ReadError(f"{path}: its member {name} is not as long as the archive says; export it again.")
     if not content.strip():
         raise ReadError(f"{path}: its member {name} is empty; record or export again.")
-    tables = read_text(path / name, None, len(content), progress, content, sha256)
+    tables = read_text(TextFile(path / name, len(content), None, progress, content, sha256))
     if len(tables) == 1:
         tables = by_sensor(tables[0])
     if is_of_several and len(tables) == 1:

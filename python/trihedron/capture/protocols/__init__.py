@@ -4,8 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from trihedron.capture.errors import CaptureError
-from trihedron.capture.protocols.declared import DeclaredDecoder
-from trihedron.capture.protocols.framing import Decoder, Frame
+from trihedron.capture.protocols.framing import DeclaredDecoder, Decoder, Frame
 from trihedron.capture.protocols.lines import LineColumns, LinesDecoder, NameColumns, name_by_position
 from trihedron.folders import modules_of
 from trihedron.records.frame_declaration import FrameDeclaration
@@ -23,10 +22,7 @@ def decoder_factory(
 ) -> Callable[[], Decoder]:
     """A function that makes decoders of one protocol.
 
-    Raises
-    ------
-    CaptureError
-        When no protocol has that name.
+    Raises ``CaptureError`` when no protocol has that name.
     """
     if isinstance(protocol, FrameDeclaration):
         return lambda: DeclaredDecoder(protocol)

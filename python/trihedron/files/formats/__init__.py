@@ -21,8 +21,6 @@ from trihedron.files.formats.contract import ExportOptions as ExportOptions
 from trihedron.files.formats.contract import Format, given
 from trihedron.files.formats.contract import NoiseFigure as NoiseFigure
 from trihedron.files.formats.contract import SensorNoise as SensorNoise
-from trihedron.files.formats.matrices import lower_orthogonal as lower_orthogonal
-from trihedron.files.formats.matrices import upper_frame as upper_frame
 from trihedron.files.plausible import require_plausible
 from trihedron.folders import modules_of
 from trihedron.records import Calibration

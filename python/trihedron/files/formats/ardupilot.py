@@ -20,8 +20,8 @@ from trihedron.files.formats.autopilot import (
     said_of_misfit,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, heading, number
-from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, number
+from trihedron.files.formats.losses import lost_gyro_scale
 from trihedron.records import Calibration, Onboard
 
 REFERENCE_DEGC = 35.0
@@ -34,10 +34,7 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
     board = board_of(calibration, options, "ardupilot", "INS_")
     own, sensors = composed(calibration, options, "ArduPilot", lambda name: correction_of(board, name))
     equation = "corrected = (reading - P(T) + P(CALTEMP) - OFFS) * SCAL per axis, SI; a gyro has no SCAL."
-    held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
-    lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
-    turns = f"AHRS_ORIENTATION {board.parameters.get('AHRS_ORIENTATION', 0.0):g}"
-    lines += [f"# {line}" for line in about(board, turns)]
+    lines = about(own, board, equation, f"AHRS_ORIENTATION {board.parameters.get('AHRS_ORIENTATION', 0.0):g}")
     for name, one in sensors.items():
         imu = board.accel if name == "accelerometer" else board.gyro
         letters, suffix = ("ACC" if name == "accelerometer" else "GYR"), _suffix(imu)

@@ -13,7 +13,8 @@ from numpy.polynomial import polynomial
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
-from trihedron.files.formats.contract import ExportOptions, Thermal, given, of_si_readings, thermal_of
+from trihedron.files.formats.contract import ExportOptions, Thermal, given, heading, of_si_readings, thermal_of
+from trihedron.files.formats.losses import lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard, SensorCalibration
 from trihedron.records.onboard import Autopilot
 from trihedron.records.plain import as_plain, from_plain
@@ -213,14 +214,16 @@ def held_by(
     return given(autopilot, pairs, board_parameters=as_plain(board))
 
 
-def about(board: Onboard, turns: str) -> list[str]:
-    """Comments on the corrections that the readings had when they were logged, and on the orientation of the board."""
-    if board.stage == "raw":
-        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
-    return [
+def about(own: Calibration, board: Onboard, equation: str, turns: str) -> list[str]:
+    """Comments at the head of the file, on the corrections of the log's readings and on the board's orientation too."""
+    held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
+    said = [
         "The log's readings had been corrected on board; these values include that correction and replace it.",
         f"They hold for {turns}; load all of them, once.",
     ]
+    if board.stage == "raw":
+        said = ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
+    return [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own), *said)]
 
 
 def common_range(limits: Sequence[tuple[float, float] | None]) -> tuple[float, float] | None:

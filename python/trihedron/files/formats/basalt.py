@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading
-from trihedron.files.formats.matrices import in_lower
+from trihedron.files.formats.kalibr import in_lower
 from trihedron.files.formats.noise_keys import limits
 from trihedron.files.formats.parsing import array_of, json_of
 from trihedron.records import Calibration

@@ -6,9 +6,9 @@ end.
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
-from trihedron.files.formats.matrices import upper_frame
-from trihedron.records import Calibration
+from trihedron.records import Calibration, SensorCalibration
 
 
 def to_imu_tk(calibration: Calibration, _options: ExportOptions) -> dict[str, str]:
@@ -43,6 +43,17 @@ def from_imu_tk(text: str) -> Calibration | None:
             return None
         sensors[name] = T @ K, -T @ K @ B
     return given("imu_tk", sensors) if sensors else None
+
+
+def upper_frame(calibration: Calibration) -> tuple[FloatArray, list[tuple[SensorCalibration, FloatArray, FloatArray]]]:
+    """Both sensors rotated by R so that the accelerometer's S is upper triangular: R and (sensor, R S, R b)."""
+    q, r = np.linalg.qr(calibration.accelerometer.S)
+    # The diagonal keeps its signs: a left-handed triad is not corrected by a reflection of the body frame.
+    rotation = (q * (np.sign(np.diag(r)) * np.sign(np.diag(calibration.accelerometer.S)))).T
+    turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for _, sensor in calibration.sensors]
+    # Rounding errors below the diagonal are set to 0, as the target expects.
+    turned[0] = (turned[0][0], np.triu(turned[0][1]), turned[0][2])
+    return rotation, turned
 
 
 FORMATS = (Format("imu_tk", to_imu_tk, from_imu_tk, pair=("acc", "gyro")),)

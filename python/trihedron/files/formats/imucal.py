@@ -22,7 +22,8 @@ _WORDS = {"dps": "deg/s", "a.u.": "counts", "": "counts"}
 def to_imucal(calibration: Calibration, _options: ExportOptions) -> str:
     """JSON of ``FerrarisCalibrationInfo``: K is the length of the rows of ``S⁻¹``, R their directions."""
     out: dict[str, object] = {"cal_type": "Ferraris"}
-    for (name, sensor), letter in zip(calibration.sensors, "ag", strict=False):
+    said = (("a", "acc", "m/s^2"), ("g", "gyr", "deg/s"))
+    for (name, sensor), (letter, word, unit) in zip(calibration.sensors, said, strict=False):
         forward, b = other_form(sensor.S, sensor.b)
         if name == "gyroscope":
             G = g_sensitivity(calibration)
@@ -30,8 +31,8 @@ def to_imucal(calibration: Calibration, _options: ExportOptions) -> str:
             forward = forward / degrees_from_radians(1.0)
         length = np.linalg.norm(forward, axis=1)
         out |= {
-            f"{'acc' if letter == 'a' else 'gyr'}_unit": "m/s^2" if letter == "a" else "deg/s",
-            f"from_{'acc' if letter == 'a' else 'gyr'}_unit": sensor.raw_unit,
+            f"{word}_unit": unit,
+            f"from_{word}_unit": sensor.raw_unit,
             f"K_{letter}": np.diag(length).tolist(),
             f"R_{letter}": (forward / length[:, None]).tolist(),
             f"b_{letter}": [float(v) for v in b],

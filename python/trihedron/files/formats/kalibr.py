@@ -5,7 +5,7 @@ M is lower triangular, C a rotation. Kalibr's results have the same keys under `
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.files.formats.contract import (
     NO_GYRO,
     ExportOptions,
@@ -15,13 +15,13 @@ from trihedron.files.formats.contract import (
     heading,
     matrix_rows,
     number,
+    of_si_readings,
     row,
 )
-from trihedron.files.formats.matrices import in_lower, lower_orthogonal
 from trihedron.files.formats.noise_keys import KEYS, required, si_rows
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
-from trihedron.sensor_model import other_form
+from trihedron.sensor_model import in_frame, other_form
 
 
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
@@ -76,10 +76,36 @@ def from_kalibr(text: str) -> Calibration | None:
     return given("kalibr", sensors, without_bias=without, g_sensitivity=G)
 
 
-def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def g_sensitivity(calibration: Calibration) -> FloatArray:
     """(3, 3) gyro g-sensitivity [(rad/s)/(m/s²)] in the body frame; 0 where the calibration lacks it."""
     values = effect_parameters(calibration, "gyro-g-sensitivity")
     return np.array([[values.get(f"G_{i}{j}", 0.0) for j in AXES] for i in AXES])
+
+
+def in_lower(
+    calibration: Calibration, target: str, options: ExportOptions
+) -> tuple[Calibration, FloatArray, FloatArray]:
+    """The calibration of SI readings in the lower-triangular frame, and M, b of ``reading = M force + b``."""
+    lower = in_frame(calibration, "lower") if calibration.frame != "lower" else calibration
+    lower = of_si_readings(lower, target, options)
+    M, b = other_form(lower.accelerometer.S, lower.accelerometer.b)
+    return lower, np.tril(M), b
+
+
+def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``A = L Q`` with L lower triangular and Q a proper rotation, det Q = +1.
+
+    The diagonal of L is positive where det A > 0. For a mirrored triad one diagonal element of L is negative, in the
+    axis whose diagonal element of Q is smallest, so that Q contains no reflection.
+    """
+    q, r = np.linalg.qr(A.T)
+    signs = np.where(np.diag(r) < 0.0, -1.0, 1.0)
+    L, Q = (r * signs[:, None]).T, (q * signs).T
+    if np.linalg.det(Q) < 0.0:
+        flip = np.ones(3)
+        flip[int(np.argmin(np.diag(Q)))] = -1.0
+        L, Q = L * flip, flip[:, None] * Q
+    return L, Q
 
 
 FORMATS = (Format("kalibr", to_kalibr, from_kalibr, in_si=True),)

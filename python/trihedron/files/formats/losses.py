@@ -24,12 +24,12 @@ def has_bias(sensor: SensorCalibration) -> bool:
     return bool(exceeds(sensor.b, sensor.sigma_b).any())
 
 
-def size_of_bias(name: str, bias: FloatArray) -> str:
+def size_of_bias(name: str, bias: FloatArray | float, digits: int = 3) -> str:
     """The norm of a bias (3,), in SI, as text in deg/s or mm/s^2."""
     length = float(np.linalg.norm(bias))
     if name == "gyroscope":
-        return f"{degrees_from_radians(length):.3g} deg/s"
-    return f"{mm_s2_from_m_s2(length):.3g} mm/s^2"
+        return f"{degrees_from_radians(length):.{digits}g} deg/s"
+    return f"{mm_s2_from_m_s2(length):.{digits}g} mm/s^2"
 
 
 def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
@@ -44,10 +44,8 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
         if not len(seen):
             continue
         share = float(seen.max())
-        if name == "accelerometer":
-            size = f"{mm_s2_from_m_s2(share * calibration.gravity_m_s2):.3g} mm/s^2 at 1 g"
-        else:
-            size = f"{degrees_from_radians(share * np.radians(100.0)):.3g} deg/s at 100 deg/s"
+        truth, at = (calibration.gravity_m_s2, "1 g") if name == "accelerometer" else (np.radians(100.0), "100 deg/s")
+        size = f"{size_of_bias(name, share * truth)} at {at}"
         said.append(f"This format has no misalignment: {100.0 * share:.2g} % of the {name}'s is lost, {size}.")
     return said
 

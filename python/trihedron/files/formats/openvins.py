@@ -14,8 +14,7 @@ from trihedron.files.formats.contract import (
     number,
     row,
 )
-from trihedron.files.formats.kalibr import g_sensitivity
-from trihedron.files.formats.matrices import in_lower, lower_orthogonal
+from trihedron.files.formats.kalibr import g_sensitivity, in_lower, lower_orthogonal
 from trihedron.files.formats.noise_keys import KEYS, required, si_rows
 from trihedron.files.formats.parsing import array_of, numbers_in, yaml_of
 from trihedron.records import Calibration

@@ -21,8 +21,8 @@ from trihedron.files.formats.autopilot import (
     said_of_misfit,
     triple,
 )
-from trihedron.files.formats.contract import ExportOptions, Format, Thermal, heading, number
-from trihedron.files.formats.losses import lost_gyro_scale, lost_to_a_diagonal
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, number
+from trihedron.files.formats.losses import lost_gyro_scale
 from trihedron.records import Calibration, Onboard
 
 _REAL, _INTEGER = 9, 6
@@ -37,12 +37,9 @@ def to_px4(calibration: Calibration, options: ExportOptions) -> str:
     equation = "corrected = (reading - thermal(T) - OFF) * SCALE per axis, SI" + (
         "." if has_scale else "; a gyro has OFF only."
     )
-    held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
-    lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
     names = ("SENS_BOARD_ROT", *(f"SENS_BOARD_{axis}_OFF" for axis in XYZ))
     turns = ", ".join(f"{name} {board.parameters.get(name, 0.0):g}" for name in names)
-    lines += [f"# {line}" for line in about(board, turns)]
-    lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
+    lines = [*about(own, board, equation, turns), "#", "# Vehicle-Id Component-Id Name Value Type"]
     for name, one in sensors.items():
         root, _ = _names(board, name)
         device = board.parameters.get(f"{root}_ID")

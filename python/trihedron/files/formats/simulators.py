@@ -11,7 +11,7 @@ from trihedron.files.formats.losses import has_bias, has_matrix, lost_to_a_diago
 from trihedron.files.formats.noise_keys import Figures, required
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+from trihedron.units import degrees_from_radians, mg_from_m_s2
 
 
 def distortion(
@@ -52,6 +52,7 @@ def said_of(
     return lines
 
 
+MESSAGE_FIELDS = {"gyroscope": "angular_velocity", "accelerometer": "linear_acceleration"}
 CORRELATION_S = 1e6
 """Eleven days, longer than any run, so that the bias is a random walk."""
 
@@ -71,10 +72,8 @@ def to_gazebo(calibration: Calibration, options: ExportOptions) -> str:
     lines = ["<!--", *(line.replace("--", "- -") for line in said_of(known, options, equation)), "-->"]
     lines += ['<sensor name="imu" type="imu">', f"  <update_rate>{number(figures.rate_hz)}</update_rate>"]
     lines += [f"  <topic>{options.topic.strip('/')}</topic>", "  <imu>"]
-    for element, name, N, K in (
-        ("angular_velocity", "gyroscope", figures.gyro_N, figures.gyro_K),
-        ("linear_acceleration", "accelerometer", figures.accel_N, figures.accel_K),
-    ):
+    for name, element in MESSAGE_FIELDS.items():
+        N, K = figures.of(name)
         lines.append(f"    <{element}>")
         for axis, bias in zip(AXES, pairs[name][1], strict=True):
             lines += [
@@ -130,10 +129,8 @@ def to_mvsim(calibration: Calibration, options: ExportOptions) -> str:
     root = math.sqrt(figures.rate_hz)
     lines = ["<!--", *(line.replace("--", "- -") for line in said), "-->", '<sensor class="imu" name="imu1">']
     lines.append(f"  <sensor_period>{number(1.0 / figures.rate_hz)}</sensor_period>")
-    for word, N, K in (
-        ("angular_velocity", figures.gyro_N, figures.gyro_K),
-        ("linear_acceleration", figures.accel_N, figures.accel_K),
-    ):
+    for name, word in MESSAGE_FIELDS.items():
+        N, K = figures.of(name)
         lines.append(f"  <{word}_white_noise_std_noise>{number(N.value * root)}</{word}_white_noise_std_noise>")
         lines.append(f"  <{word}_random_walk_std_noise>{number(K.value)}</{word}_random_walk_std_noise>")
     return "\n".join([*lines, "</sensor>", ""])
@@ -179,14 +176,12 @@ def to_imusensor(calibration: Calibration, options: ExportOptions) -> str:
     equation = "reading = AxesMisalignment/100 * truth + ConstantBias + noise, SI."
     lines = [f"% {line}" for line in said_of(known, options, equation, holds_matrix=True)]
     lines += [f"imu = imuSensor('accel-gyro', 'SampleRate', {number(figures.rate_hz)});"]
-    for attribute, make, name, N, K in (
-        ("Accelerometer", "accelparams", "accelerometer", figures.accel_N, figures.accel_K),
-        ("Gyroscope", "gyroparams", "gyroscope", figures.gyro_N, figures.gyro_K),
-    ):
+    for name, make in (("accelerometer", "accelparams"), ("gyroscope", "gyroparams")):
         A, b = pairs[name]
+        N, K = figures.of(name)
         rows = "; ".join(row(100.0 * r).replace(",", "") for r in A)
         lines += [
-            f"imu.{attribute} = {make}( ...",
+            f"imu.{name.capitalize()} = {make}( ...",
             f"    'AxesMisalignment', [{rows}], ...",
             f"    'ConstantBias', [{row(b).replace(',', '')}], ...",
             "    'NoiseType', 'double-sided', ...",
@@ -209,13 +204,10 @@ def to_isaac(calibration: Calibration, options: ExportOptions) -> str:
     lines = [f"# {line}" for line in said_of(known, options, equation, holds_matrix=True, lost=lost)]
     lines += ["import torch", "from isaaclab.utils.noise import GaussianNoiseCfg", ""]
     lines.append(f"STEP_S = {number(1.0 / figures.rate_hz)}  # of the environment: std is valid at this step")
-    for term, name, N in (
-        ("IMU_ANG_VEL", "gyroscope", figures.gyro_N),
-        ("IMU_LIN_ACC", "accelerometer", figures.accel_N),
-    ):
+    for name, term in (("gyroscope", "IMU_ANG_VEL"), ("accelerometer", "IMU_LIN_ACC")):
         A, b = pairs[name]
         scale = np.diag(A)
-        std = N.value * math.sqrt(figures.rate_hz) / np.abs(scale)
+        std = figures.of(name)[0].value * math.sqrt(figures.rate_hz) / np.abs(scale)
         lines += [
             f"{term} = {{",
             f'    "scale": ({row(scale)}),',
@@ -226,16 +218,11 @@ def to_isaac(calibration: Calibration, options: ExportOptions) -> str:
 
 
 def _lost_walks(figures: Figures) -> tuple[str, ...]:
-    minute = math.sqrt(60.0)
-    accel, gyro = figures.accel_K, figures.gyro_K
-    sizes = (
-        ("accelerometer", accel, f"{mm_s2_from_m_s2(accel.value * minute):.2g} mm/s^2"),
-        ("gyroscope", gyro, f"{degrees_from_radians(gyro.value * minute):.2g} deg/s"),
-    )
     return tuple(
-        f"The walk of the {name}'s bias cannot be held: {size} in a minute is lost."
-        for name, K, size in sizes
-        if K.value > 0.0 and not K.is_limit
+        f"The walk of the {name}'s bias cannot be held: {size_of_bias(name, K.value * math.sqrt(60.0), 2)} in a minute "
+        "is lost."
+        for name in ("accelerometer", "gyroscope")
+        if (K := figures.of(name)[1]).value > 0.0 and not K.is_limit
     )
 
 

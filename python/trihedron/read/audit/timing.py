@@ -4,10 +4,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.rate import steps_of, steps_of_counter, usual_step
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
@@ -140,7 +139,7 @@ def audit_timing(sensors: Sensors, rate_hz: float) -> list[Finding]:
     return findings
 
 
-def _lost_behind(sensors: Sensors) -> npt.NDArray[np.int64] | None:
+def _lost_behind(sensors: Sensors) -> IntArray | None:
     """(n - 1,) samples lost after each: those that the clock counts, else those of long steps; None if unknown."""
     if sensors.lost_behind is not None:
         return sensors.lost_behind
@@ -173,7 +172,7 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
     ]
 
 
-def _gap(step: FloatArray, lost: npt.NDArray[np.int64], place: Place) -> Finding:
+def _gap(step: FloatArray, lost: IntArray, place: Place) -> Finding:
     gaps = np.flatnonzero(lost > 0)
     longest = int(gaps[np.argmax(step[gaps])])
     total = int(lost.sum())

@@ -9,7 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.quantiles import median, quantiles
-from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
+from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, lateness, track
 from trihedron.read.clock.period import Period, find_period
 from trihedron.records.sampling import TimestampKind
 
@@ -77,17 +77,11 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     n, period, is_seen = len(time_s), found.period_s, found.is_seen
     # One buffer for lateness, clock and error in turn: a second one takes memory and time for a long log.
     room = _core.new_array(n, 1).reshape(-1)
+    width = block_rows(time_s, period, found.coherence)
     if counter is not None:
-        tick, pauses, width, moved_back = (
-            counter,
-            np.zeros(0, np.int64),
-            block_rows(time_s, period, found.coherence),
-            0.0,
-        )
-        is_seen = True
+        tick, pauses, moved_back, is_seen = counter, np.zeros(0, np.int64), 0.0, True
         period = _long_run(time_s, counter)
     else:
-        width = block_rows(time_s, period, found.coherence)
         period, tick, pauses, moved_back = track(time_s, period, width, is_seen, found.coherence > 0.9, room)
     even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
     error = _error(time_s, even)
@@ -128,7 +122,7 @@ def _long_run(time_s: FloatArray, tick: IntArray) -> float:
     width = max(len(time_s) // 300, 8)
     for _ in range(3):
         late = time_s - period * tick
-        at = earliest(late, width)
+        at = _core.earliest_timestamps(late, width)
         slope = np.polyfit(tick[at] - tick[at[0]], late[at], 1)[0] if len(at) > 2 else 0.0
         period += float(slope)
     return period
@@ -165,7 +159,7 @@ def _lay(
             x = _core.block_mean_ticks(tick[a : a + cut], width)
             y = each = _core.block_medians(piece[:cut], width)
         else:
-            at = earliest(piece, width)
+            at = _core.earliest_timestamps(piece, width)
             x, each = tick[a:b][at].astype(np.float64), piece[at]
             y = ahead(each, STALL_STEPS // width + 1)
         x0, scale = x.mean(), max(float(np.ptp(x)), 1.0)

@@ -37,11 +37,6 @@ def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
     return int(np.clip(np.ceil(width), 4, max(n // 12, 8)))
 
 
-def earliest(late: FloatArray, width: int) -> IntArray:
-    """Row of the earliest timestamp of every block of ``width`` rows (the last one may be longer)."""
-    return _core.earliest_timestamps(late, width)
-
-
 def lateness(time_s: FloatArray, tick: IntArray | None, period: float, room: FloatArray) -> FloatArray:
     """``time_s - period * tick``, written into ``room`` (n,); without ticks the row number is the tick."""
     _core.timestamp_lateness(time_s, tick, period, room)
@@ -76,7 +71,7 @@ def track(
         slopes, weights = [], []
         for a, b in pairwise(edges):
             if b - a >= 4 * width:
-                at = earliest(late[a:b], width) + a
+                at = _core.earliest_timestamps(late[a:b], width) + a
                 slopes.append(float((late[at[-1]] - late[at[0]]) / (at[-1] - at[0])))
                 weights.append(b - a)
         if slopes:
@@ -111,7 +106,7 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
 
     Returns the number of blocks that moved back by a period, and that of all blocks.
     """
-    at = earliest(late, width)
+    at = _core.earliest_timestamps(late, width)
     first = late[at]
     if _is_unmoved(first):
         # Minima over neighbours do not move further either, so nothing is lost.

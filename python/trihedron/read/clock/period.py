@@ -132,14 +132,10 @@ def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum
 
 
 def _mean_power(windows: list[FloatArray], frequency_hz: FloatArray) -> FloatArray:
-    out: FloatArray = np.mean([_direct(w, frequency_hz) for w in windows], axis=0)
-    return out
-
-
-def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
-    """Power of the phase sum of the first timestamps at every frequency (k,), evenly spaced."""
+    """Power of the phase sums of the first timestamps at every frequency (k,), evenly spaced."""
     first, step = float(frequency_hz[0]), float(frequency_hz[1] - frequency_hz[0])
-    return _core.direct_power(time_s[:512], first, step, len(frequency_hz))
+    powers = [_core.direct_power(w[:512], first, step, len(frequency_hz)) for w in windows]
+    return np.asarray(np.mean(powers, axis=0))
 
 
 def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import build_clock
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.devices import Choice
@@ -59,10 +58,8 @@ class Role:
 def roles_of(table: Table, said: str | None) -> list[Role]:
     """Roles of the columns that have one, in file order.
 
-    Raises
-    ------
-    ReadError
-        When the columns have neither names nor a statement of the user, or the statement does not fit the file.
+    Raises ``ReadError`` when the columns have neither names nor a statement of the user, or the statement does not fit
+    the file.
     """
     if said is None:
         if table.names is None:
@@ -158,10 +155,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
 def of_recording(recording: Recording) -> ReferenceMotion:
     """A reference from the log of another unit that moved with this one: its rate and specific force.
 
-    Raises
-    ------
-    ReadError
-        When its gyro reads counts, or it has no gyro.
+    Raises ``ReadError`` when its gyro reads counts, or it has no gyro.
     """
     recording = recording.with_distinct_timestamps()
     to_rate = rate_to_si(recording.gyroscope_unit)
@@ -186,7 +180,7 @@ def of_recording(recording: Recording) -> ReferenceMotion:
     )
 
 
-def _triad(table: Table, roles: list[Role], what: str, rows: npt.NDArray[np.int64], name: str) -> FloatArray | None:
+def _triad(table: Table, roles: list[Role], what: str, rows: IntArray, name: str) -> FloatArray | None:
     part = {role.index: role for role in roles if role.what == what}
     if not part:
         return None
@@ -235,13 +229,10 @@ ROUNDING = 0.02
 """Largest error of a quaternion's norm, and a third of that of a matrix's orthonormality: three digits err less."""
 
 
-def attitude_of(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray | None:
+def attitude_of(table: Table, roles: list[Role], rows: IntArray) -> FloatArray | None:
     """(n, 3, 3) body → world; ``None`` where there are no columns of attitude.
 
-    Raises
-    ------
-    ReadError
-        When a column is missing, a unit is ambiguous, or the numbers are not a rotation.
+    Raises ``ReadError`` when a column is missing, a unit is ambiguous, or the numbers are not a rotation.
     """
     by = {what: [role for role in roles if role.what == what] for what in ("q", "r", "rot", "rpy")}
     if by["q"]:
@@ -253,7 +244,7 @@ def attitude_of(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) ->
     return None
 
 
-def _quaternion(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
+def _quaternion(table: Table, roles: list[Role], rows: IntArray) -> FloatArray:
     part = {role.index: role for role in roles}
     if set(part) != set("wxyz") or len(roles) != 4:
         raise ReadError(
@@ -271,7 +262,7 @@ def _quaternion(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) ->
     return np.asarray(Rotation.from_quat(q).as_matrix(), dtype=np.float64)
 
 
-def _matrix(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
+def _matrix(table: Table, roles: list[Role], rows: IntArray) -> FloatArray:
     base = "1" if any("3" in role.index for role in roles) else "0"
     part = {(int(r.index[0]) - int(base), int(r.index[1]) - int(base)): r for r in roles}
     if len(part) != 9 or len(roles) != 9:
@@ -298,7 +289,7 @@ def _matrix(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> Flo
     return np.asarray(Rotation.from_matrix(C).as_matrix(), dtype=np.float64)
 
 
-def _angles(table: Table, turns: list[Role], named: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
+def _angles(table: Table, turns: list[Role], named: list[Role], rows: IntArray) -> FloatArray:
     if turns:
         if len(turns) != 3:
             raise ReadError(f"{table.path}: Euler angles need three columns rot_x, rot_y, rot_z in the order of turns.")

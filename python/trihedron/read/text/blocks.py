@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import check_ratio
+from trihedron.records.progress import Progress
 
 BLOCK_BYTES = 1 << 23
 """Bytes parsed at a time: enough for polars to use every core, and little memory (parsing takes about twelve times the
@@ -31,6 +32,19 @@ _TAIL = 1 << 12
 """Bytes at the end of a block that nearly always contain a line end."""
 _PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
+
+
+@dataclass(frozen=True, eq=False)
+class TextFile:
+    """A text: ``size`` of the file [bytes], its ``compression``, or its ``content`` if it is unpacked (a member of a
+    zip) or rewritten already, with the ``sha256`` of the file; ``progress`` of reading it."""
+
+    path: Path
+    size: int
+    compression: str | None = None
+    progress: Progress | None = None
+    content: bytes | None = None
+    sha256: str = ""
 
 
 @dataclass
@@ -48,34 +62,29 @@ def compression_of(magic: bytes) -> str | None:
     return next((name for start, name in _COMPRESSED.items() if magic.startswith(start)), None)
 
 
-def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
+def open_binary(file: TextFile) -> io.BufferedIOBase:
     """A stream of the decompressed bytes of a file."""
-    if compression == "gzip":
-        return gzip.open(path, "rb")
-    if compression == "bzip2":
-        return bz2.open(path, "rb")
-    if compression == "xz":
-        return lzma.open(path, "rb")
-    return path.open("rb")
+    if file.content is not None:
+        return io.BytesIO(file.content)
+    if file.compression == "gzip":
+        return gzip.open(file.path, "rb")
+    if file.compression == "bzip2":
+        return bz2.open(file.path, "rb")
+    if file.compression == "xz":
+        return lzma.open(file.path, "rb")
+    return file.path.open("rb")
 
 
-def blocks(
-    path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None
-) -> Generator[Bytes, None, None]:
+def blocks(file: TextFile, cursor: Cursor) -> Generator[Bytes, None, None]:
     """Blocks (k,) that end with a complete line, each read while the previous one is parsed, and valid until the next
-    one is requested; ``content`` are the file's bytes if they are unpacked already.
+    one is requested.
 
-    Raises
-    ------
-    ReadError
-        When the file cannot be read, is damaged, or has no line ends.
+    Raises ``ReadError`` when the file cannot be read, is damaged, or has no line ends.
     """
+    path, compression, is_plain = file.path, file.compression, file.compression is None and file.content is None
     most, digest, lines, unpacked = BLOCK_BYTES, hashlib.sha256(), 0, 0
     try:
-        with (
-            open_binary(path, compression) if content is None else io.BytesIO(content) as stream,
-            ThreadPoolExecutor(1) as reader,
-        ):
+        with open_binary(file) as stream, ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
                 nonlocal lines, unpacked
@@ -87,7 +96,7 @@ def blocks(
                 unpacked += size
                 if compression is not None:
                     check_ratio(path, path.stat().st_size, unpacked)
-                elif content is None:
+                elif is_plain:
                     digest.update(view[:size])
                 return size
 
@@ -99,7 +108,7 @@ def blocks(
                 block = _joined(rest, buffer, size)
                 cursor.is_last = size < most
                 if cursor.is_last:
-                    cursor.sha256 = digest.hexdigest() if compression is None and content is None else ""
+                    cursor.sha256 = digest.hexdigest() if is_plain else ""
                     if len(block):
                         yield block
                     return
@@ -136,22 +145,17 @@ def _behind_last_line(block: Bytes) -> int:
     return near + found + 1 if found >= 0 else block.tobytes().rfind(b"\n") + 1
 
 
-def beginning(path: Path, compression: str | None, n: int, content: bytes | None = None) -> bytes:
+def beginning(file: TextFile, n: int) -> bytes:
     """The first ``n`` bytes of the text.
 
-    Raises
-    ------
-    ReadError
-        As :func:`blocks`.
+    Raises ``ReadError`` as :func:`blocks`.
     """
-    if content is not None:
-        return content[:n]
     try:
-        with open_binary(path, compression) as stream:
+        with open_binary(file) as stream:
             return stream.read(n)
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
         # Raises the error with the line after which the damage is.
-        with closing(blocks(path, compression, Cursor())) as parts:
+        with closing(blocks(file, Cursor())) as parts:
             return next(parts, np.empty(0, dtype=np.uint8)).tobytes()[:n]
 
 

@@ -28,10 +28,7 @@ def of_json(path: Path, text: str) -> Rewritten:
     """The readings of a JSON text as comma-separated lines, and the line of each (its row, where the text is one
     value).
 
-    Raises
-    ------
-    ReadError
-        When the text is damaged, or contains no rows of readings.
+    Raises ``ReadError`` when the text is damaged, or contains no rows of readings.
     """
     lines: list[int] | None
     try:

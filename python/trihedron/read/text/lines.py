@@ -4,11 +4,11 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import IntArray
 from trihedron.read.text.layout import COMMENT_STARTS, Layout
 
-Counts = npt.NDArray[np.int64]
+Counts = IntArray
 _COMMENTS = tuple(mark.encode() for mark in COMMENT_STARTS)
 _QUOTED = re.compile(rb'"[^"]*"')
 

@@ -3,34 +3,39 @@
 from collections.abc import Iterable
 from contextlib import closing
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.columns import columns_or_none
 from trihedron.read.errors import ReadError, file_sha256
 from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
-from trihedron.read.text.blocks import Bytes, Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
+from trihedron.read.text.blocks import (
+    Bytes,
+    Cursor,
+    TextFile,
+    as_utf8,
+    blocks,
+    has_semicolon_remarks,
+    with_hash_remarks,
+)
 from trihedron.read.text.cells import (
     MAX_WORDS,
     TextColumn,
     find_text_columns,
     numbers,
     parse,
+    past_midnight,
     reject_words,
     sparse_words,
 )
-from trihedron.read.text.dates import past_midnight
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
 from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 18
 _ROWS_CHECKED = 1_000_000
@@ -40,23 +45,11 @@ _ROWS_CHECKED = 1_000_000
 class TextReader:
     """Reads one text log block by block; error messages name file, line and column.
 
-    ``content`` are the bytes of the file if they are unpacked or rewritten already; ``lines`` (n,) is then the line in
-    the file of each of its lines.
+    ``lines`` (n,) is the line in the file of each line of a rewritten text.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        compression: str | None,
-        size: int,
-        progress: Progress | None,
-        content: bytes | None = None,
-        lines: npt.NDArray[np.int64] | None = None,
-        sha256: str | None = None,
-    ) -> None:
-        self.path, self.compression, self.size, self.progress = path, compression, size, progress
-        self.content, self.true_lines = content, lines
-        self.sha256 = sha256
+    def __init__(self, file: TextFile, lines: IntArray | None = None) -> None:
+        self.file, self.path, self.true_lines = file, file.path, lines
         self.cursor = Cursor()
         self.store = Store(0)
         self.lines = RowLines()
@@ -64,7 +57,7 @@ class TextReader:
         self.findings: list[Finding] = []
         self.n_rows, self.n_rows_checked = 0, -_ROWS_CHECKED
         self.n_bytes = 0
-        self.comments: list[npt.NDArray[np.int64]] = []
+        self.comments: list[IntArray] = []
         self.n_left_out = 0
         self.may_be_plain, self.n_odd_blocks = True, 0
         self.semicolons = False
@@ -72,7 +65,7 @@ class TextReader:
     def read(self) -> Table:
         """The whole file as a table."""
         # Closed even after an exception, so that the file does not stay open until the next garbage collection.
-        with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
+        with closing(blocks(self.file, self.cursor)) as parts:
             return self._table(self._read(parts))
 
     def _read(self, parts: Iterable[Bytes]) -> Layout:
@@ -82,9 +75,9 @@ class TextReader:
             if layout is None or self.semicolons or not self._plain(part, layout):
                 layout = self._odd_part(part.tobytes(), layout)
             self.n_bytes += len(part)
-            if self.progress is not None:
-                done = min(self.n_bytes / self.size, 1.0) if self.compression is None else 0.5
-                self.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
+            if self.file.progress is not None:
+                done = min(self.n_bytes / self.file.size, 1.0) if self.file.compression is None else 0.5
+                self.file.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
         if layout is None:
             raise ReadError(f"{self.path}: the file contains no text after unpacking; record or copy it again.")
         return layout
@@ -214,13 +207,13 @@ class TextReader:
         """Expected number of rows of the whole log; rejected if they do not fit into memory."""
         rows = self.n_rows + n_new
         rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
-        expected = int(self.size * rows_per_byte) if self.compression is None else rows
+        expected = int(self.file.size * rows_per_byte) if self.file.compression is None else rows
         if expected > _ROWS_CHECKED and rows >= self.n_rows_checked + _ROWS_CHECKED:
             check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
             self.n_rows_checked = rows
         return max(expected, rows)
 
-    def _take(self, columns: list[FloatArray], lines: npt.NDArray[np.int64], n_bytes: int, layout: Layout) -> None:
+    def _take(self, columns: list[FloatArray], lines: IntArray, n_bytes: int, layout: Layout) -> None:
         """Store the rows of a block, unless the expected number of rows does not fit into memory."""
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, columns))
@@ -228,9 +221,7 @@ class TextReader:
         self.lines.append(lines)
         self.n_rows += len(lines)
 
-    def _incomplete(
-        self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
-    ) -> tuple[npt.NDArray[np.int64], bytes]:
+    def _incomplete(self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout) -> tuple[IntArray, bytes]:
         """The block without an incomplete last line of the file; any other irregular line is rejected."""
         fields = int(found.fields[i])
         is_end = i == len(found.number) - 1 and self.cursor.is_last
@@ -251,7 +242,7 @@ class TextReader:
         )
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
 
-    def _parse(self, data: bytes, lines: npt.NDArray[np.int64], layout: Layout) -> None:
+    def _parse(self, data: bytes, lines: IntArray, layout: Layout) -> None:
         import polars as pl
 
         schema: dict[str, type[pl.DataType]] = {
@@ -300,7 +291,7 @@ class TextReader:
         columns: list[FloatArray] = []
         names: list[str] = []
         words: dict[int, str] = {}
-        labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = {}
+        labels: dict[int, tuple[tuple[str, ...], IntArray]] = {}
         has_time = any(parse_name(name).role == "time" for name in layout.names or ())
         dated = {i for i, column in self.text_columns.items() if column.form and column.form != "date"}
         for i, given in enumerate(self.store.columns()):
@@ -322,7 +313,7 @@ class TextReader:
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
-            sha256=self.sha256 or self.cursor.sha256 or file_sha256(self.path),
+            sha256=self.file.sha256 or self.cursor.sha256 or file_sha256(self.path),
             metadata=layout.metadata,
             first_line=self.lines.first,
             line_of_row=self.lines.all(),
