@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -141,8 +141,14 @@ def judge_gyroscope(
         unit = parse_unit(RateUnit, given if given is not None else named)
         against = None
         if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
-            against = _of_turning(
-                FindingCode.UNIT_CONTRADICTED, "gyro-by-turning", turning, unit, is_given=given is not None
+            against = Finding.of(
+                FindingCode.UNIT_CONTRADICTED,
+                "gyro-by-turning",
+                is_given=given is not None,
+                unit=unit.value,
+                factor=turning.factor(unit),
+                percent=turning.percent,
+                correlation=turning.correlation,
             )
         return Judged(unit, _stated("gyro", unit, against, is_given=given is not None))
     if whole:
@@ -150,23 +156,26 @@ def judge_gyroscope(
     if turning is None:
         return _gyroscope_by_magnitude(extremes, windows)
     unit = min(turning.candidates, key=lambda unit: abs(math.log(turning.factor(unit))))
-    code, case = FindingCode.UNIT_CONTRADICTED, "gyro-no-unit"
+    factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
     if turning.fits(unit):
-        code, case = FindingCode.UNIT_DETECTED, "gyro-by-turning"
-    return Judged(unit, (_of_turning(code, case, turning, unit),))
-
-
-def _of_turning(code: FindingCode, case: str, turning: Turning, unit: RateUnit, **stated: Any) -> Finding:
-    """A finding on the gyro's unit with the numbers of the rotation of gravity."""
-    return Finding.of(
-        code,
-        case,
-        **stated,
-        unit=unit.value,
-        factor=turning.factor(unit),
-        percent=turning.percent,
-        correlation=turning.correlation,
-    )
+        told = Finding.of(
+            FindingCode.UNIT_DETECTED,
+            "gyro-by-turning",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    else:
+        told = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "gyro-no-unit",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    return Judged(unit, (told,))
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:
