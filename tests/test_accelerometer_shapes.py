@@ -125,13 +125,6 @@ def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3
 
 
-def test_poses_alike_leave_nothing_to_judge_by():
-    rng = np.random.default_rng(9)
-    up, _ = drawn(rng, 9)
-    alike = np.repeat(up[:5], 8, axis=0)
-    assert not np.any(covariance_by_bends(alike, rng.normal(size=40), np.ones(40), np.zeros((40, 0)), G))
-
-
 def test_a_drift_that_is_known_is_no_bend():
     rng = np.random.default_rng([31, 24])
     up, sigma = drawn(rng, 24)

@@ -4,7 +4,6 @@ import http.client
 import json
 import re
 import shutil
-from dataclasses import replace
 from itertools import pairwise
 from urllib.parse import urlsplit
 
@@ -16,7 +15,7 @@ import trihedron
 from following_hand import FollowingHand
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.planning_poses import move_rows, shortest_path
-from trihedron.api.replaying import readings_of, replay, steps
+from trihedron.api.replaying import readings_of, steps
 from trihedron.api.simulating import simulate
 from trihedron.capture.guide import Guide
 from trihedron.capture.stillness import Stillness
@@ -24,8 +23,8 @@ from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
 from trihedron.files.log import write_recording
-from trihedron.records.guiding import Accuracy, Examination, Phase
-from trihedron.simulate import hand_session, scenario_by_name
+from trihedron.records.guiding import Accuracy, Phase
+from trihedron.simulate import scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
@@ -81,21 +80,6 @@ def test_the_guide_waits_holds_moves_checks_and_ends_in_this_order(led):
     assert all(view.instruction for view in views)
     # Every pose rings once: poses of the calibration and of the check.
     assert views[-1].n_events == views[-1].n_poses + 3
-
-
-def test_time_that_a_pose_lacked_is_not_requested_of_the_next():
-    up = np.array([[0.0, 0.0, 1.0]])
-    # Nothing after the first pose counts.
-    seen = Examination(up, (), np.inf, np.array([1.0, 0.0, 0.0]), "+X up", "", pose_s=3.0)
-    guide, rng, now, asked = Guide(ACCURACY, lambda: seen), np.random.default_rng(1), 0.0, []
-    for still_s, towards in ((8.0, [0.0, 0.0, 9.8]), (4.0, [9.8, 0.0, 0.0]), (1.0, [0.0, 9.8, 0.0])):
-        time = now + np.arange(0.0, still_s + 1.0, 0.01)
-        force = towards + 0.01 * rng.normal(size=(len(time), 3))
-        force[time > now + still_s] += rng.normal(size=3) * 5.0 * np.sin(9.0 * time[time > now + still_s])[:, None]
-        asked += [guide.advance(time[i : i + 25], force[i : i + 25]).pose_s for i in range(0, len(time), 25)]
-        now = time[-1] + 0.01
-    assert max(asked) > 4.0
-    assert asked[-1] == seen.pose_s
 
 
 def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
@@ -197,16 +181,6 @@ def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, cap
     assert "Accuracy reached. 3 more poses to check it." in " ".join(said.split())
     assert "Verification" in said
     assert trihedron.read_calibration(calibration).is_trustworthy
-
-
-def test_poses_of_a_log_that_was_not_guided_count_where_the_segmentation_finds_them():
-    # Every pose is shorter than the six seconds that the guide requests for the first.
-    motion = hand_session(n_poses=8, pose_s=3.0, first_pose_s=3.0)
-    recording, truth = trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)
-    done = replay(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2)
-    assert done.view.n_poses == trihedron.segment(recording).n_poses
-    assert done.view.n_poses >= 8
-    assert done.view.target_up is not None
 
 
 def get(page, path, cookie="", host=None):

@@ -71,19 +71,6 @@ def test_verify_on_another_session_passes_and_a_limit_turns_the_status(session, 
     assert "NOT VERIFIED" in capsys.readouterr().out
 
 
-def test_two_files_with_clocks_of_their_own_are_merged(recording, tmp_path, capsys):
-    late = recording.time_s + 0.003
-    for name, time_s, readings in (
-        ("a.csv", recording.time_s, recording.accelerometer),
-        ("g.csv", late, recording.gyroscope),
-    ):
-        rows = "\n".join(",".join(f"{v:.9g}" for v in row) for row in np.column_stack([time_s, readings]))
-        (tmp_path / name).write_text("t,x,y,z\n" + rows + "\n")
-    arguments = ["--accel", str(tmp_path / "a.csv"), "--gyro", str(tmp_path / "g.csv"), "--gravity", G]
-    assert main(["calibrate", *arguments]) == 0
-    assert "Gyroscope" in capsys.readouterr().out
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_simulations")
 def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monkeypatch, capsys):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
-from trihedron.cli.options import signs
 from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose
 from written_session import G, log_text, recording, rejected, session, simulated
@@ -35,19 +34,6 @@ __all__ = ["recording", "session"]
 )
 def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, said):
     assert said in rejected(capsys, *arguments)
-
-
-def test_a_gyro_that_is_missing_from_every_third_row_leaves_the_accelerometer(tmp_path, capsys, recording):
-    gyroscope = recording.gyroscope.copy()
-    gyroscope[::3] = np.nan
-    log = tmp_path / "gaps.csv"
-    log.write_text(log_text(replace(recording, gyroscope=gyroscope)))
-    assert main(["check", str(log)]) in (0, 2)
-    assert "gyro" in capsys.readouterr().out
-
-
-def test_signs_of_axes_are_taken_in_their_order():
-    assert signs("--axis-signs", "-+-") == [-1, 1, -1]
 
 
 def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):
@@ -92,15 +78,3 @@ def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tm
     assert "still" in rejected(capsys, "calibrate", shaken)
     assert main(["check", str(shaken)]) == 2
     assert "NOT FIT" in capsys.readouterr().out
-
-
-def test_what_comes_next_is_the_remedy_of_what_is_wrong_and_keeps_the_rate_that_was_said(tmp_path, capsys):
-    rng = np.random.default_rng(2)
-    poses = np.vstack([np.eye(3), -np.eye(3)]) * 16384.0
-    rows = np.repeat(np.hstack([poses, np.zeros((6, 3))]), 200, axis=0) + rng.normal(scale=20.0, size=(1200, 6))
-    np.savetxt(tmp_path / "board.csv", rows, fmt="%d", delimiter=",")
-    main(["check", str(tmp_path / "board.csv")])
-    assert "Calibrate:" not in capsys.readouterr().out
-    main(["check", str(tmp_path / "board.csv"), "--rate", "50", "--columns", "ax,ay,az,-,-,-"])
-    said = capsys.readouterr().out
-    assert "NOT FIT" in said or "--columns ax,ay,az,-,-,- --rate 50 --latitude DEG -o calibration.json`" in said

@@ -5,7 +5,6 @@ import pytest
 
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.gyroscope.turn_angles import Turn
-from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
@@ -57,21 +56,6 @@ def test_known_turns_of_a_coarse_gyro_lie_within_their_error_bars(step, is_table
     assert np.mean(np.abs(scores) < 1.96) > 0.90
     assert np.sqrt(np.mean(scores[:, :9] ** 2)) > 0.4
     assert np.abs(scores).max() < 5.0
-
-
-def test_a_steady_reading_inside_one_step_is_one_error_and_a_ramp_is_none():
-    readings = np.zeros((1000, 3))
-    readings[400:600, 0] = 7.0
-    readings[600:, 0] = 0.0
-    readings[300:400, 1] = np.repeat(np.arange(10.0), 10)
-    edges, still = np.array([[400, 600], [300, 410], [380, 700]]), np.array([[0, 300]])
-    hidden = np.sum(hidden_angles(readings, 0.01, np.ones(3), edges, still, np.eye(3)[[0, 1, 0]]) ** 2, axis=2)
-    # Two seconds at 7: the turn is off by 2 s of a step's uniform error; of the ramp the step where it turns back.
-    assert hidden[0, 0] == pytest.approx(2.0**2 / 12.0)
-    assert hidden[1, 1] == pytest.approx((0.1**2 + 0.2**2) / 12.0)
-    assert hidden[-1] == pytest.approx(np.full(3, 1.0 / 12.0))
-    # The same turn with rest at its ends, 0.2 and 1 s in the step of the bias, which is one error more.
-    assert hidden[2, 0] == pytest.approx((2.0**2 + 1.2**2) / 12.0)
 
 
 def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars():

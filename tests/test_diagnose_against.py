@@ -124,25 +124,3 @@ def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve
     assert "overwrite" in capsys.readouterr().err
     assert main(["diagnose", "log.csv", "--against", "sim.csv", "--improved", str(given)]) == 1
     assert ".toml" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):
-    profile, accel, gyro = unit
-    logs = []
-    for layout, seed, start in ((31, 61, 25.0), (32, 62, 34.0)):
-        scenario = with_effect(
-            Scenario(hand_session(24, layout=layout), "unit", accel, gyro, profile.clock),
-            "accel-thermal-scale", per_k=(6e-4, -5e-4, 7e-4),
-        )  # fmt: skip
-        temperature = replace(
-            scenario.environment.temperature, start_degc=start, warm_up_k=8.0, warm_up_tau_s=60.0, logged=True
-        )
-        logs.append(
-            simulate(replace(scenario, environment=replace(scenario.environment, temperature=temperature)), seed)[0]
-        )
-    found = trihedron.diagnose(logs[1], against=logs[0], gravity_m_s2=9.80665)
-    scale = max(abs(p.difference) for p in found.parameters if p.id == "accel-scale")
-    # Nine kelvins of 6e-4 are there, and belong to the effect that both have.
-    assert scale > 3e-3
-    assert not any(p.significant for p in found.parameters), [p.id for p in found.parameters if p.significant]

@@ -10,7 +10,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.search import threshold
-from trihedron.diagnose.session.observations import _turned_at_ends, observe
+from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.records import Recording
@@ -73,13 +73,3 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree():
     assert before["moves"].disagrees
     assert after["moves"].chi2_per_dof < 0.7 * before["moves"].chi2_per_dof
     assert after["static-gyro"].disagrees
-
-
-def test_a_pose_that_was_not_still_is_turned_at_its_ends_and_a_noisy_session_is_not():
-    lasts = np.array([2.0, 8.0, 2.0, 4.0])
-    sigma = 1e-4 / np.sqrt(lasts)[:, None] * np.ones(3)
-    np.testing.assert_array_equal(_turned_at_ends(sigma, lasts), 0.0)
-    sigma[2] = 5e-3
-    turned = _turned_at_ends(sigma, lasts)
-    np.testing.assert_array_equal(turned[[0, 1, 3]], 0.0)
-    np.testing.assert_allclose(turned[2], (5e-3 * 1.0) ** 2, rtol=0.01)  # half of 2 s

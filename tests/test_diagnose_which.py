@@ -1,13 +1,10 @@
 """Which of several explanations: shapes of one effect, a temperature or a drift, vibration or none, codes."""
 
-import numpy as np
 import polars as pl
 import pytest
 
 import trihedron
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.effects.quantisation import missing_codes
-from trihedron.session.rounding import before_adc
 
 
 def diagnosed(tmp_path, *drawn):
@@ -29,29 +26,6 @@ def test_a_straight_line_among_zeros_that_scatter_is_no_curve_and_a_soft_support
 ):
     found, _ = diagnosed(tmp_path, flaw, seed)
     assert [(one.id, one.model["variant"]) for one in found.effects[:1]] == first
-
-
-def test_still_readings_on_two_codes_show_their_grid_and_the_noise_before_it():
-    rng = np.random.default_rng(3)
-    step, noise, zero = 0.02, 0.2, 0.31
-    poses = [step * np.round(zero + noise * rng.normal(size=400)) for _ in range(20)]
-    assert len(np.unique(np.concatenate(poses))) == 2
-    assert missing_codes(poses, float(np.concatenate(poses).std()), step) == 0
-    # The same shares of two codes in all: a mean farther from the edge with more noise, or nearer with less.
-    found = before_adc(poses, step)
-    assert abs(np.mean([one.mean() for one in poses]) / step + found.shift.mean() - zero) < 3.0 * found.common
-    assert 0.03 < found.common < 0.2
-    # Means in several places of a step show the noise, and each mean.
-    places = np.linspace(-1.2, 1.3, 20)
-    found = before_adc([step * np.round(at + noise * rng.normal(size=400)) for at in places], step)
-    assert found.sigma == pytest.approx(noise, rel=0.1)
-    # A pose that turns in its second half has the mean of its first.
-    turning = [step * np.round(zero + 0.05 * rng.normal(size=80) + np.repeat([0.0, 0.5 * k % 2], 40)) for k in range(9)]
-    found = before_adc(turning, step)
-    assert np.ptp(np.array([one.mean() for one in turning]) / step) > 0.2
-    assert np.ptp(np.array([one.mean() for one in turning]) / step + found.shift) < 0.1
-    # One code shows no grid.
-    assert missing_codes([np.zeros(100)] * 5, 0.0, 0.02) is None
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import trihedron
 from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
 from trihedron.cli import main
 from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
-from trihedron.files.formats.parsing import yaml_of
 
 READ = [name for name, one in formats().items() if one.read is not None]
 BOARDS = ("ardupilot", "px4")
@@ -179,24 +178,6 @@ def test_the_result_of_imucal_on_a_recording_is_read(real_data):
     p = {k: np.array(v) for k, v in json.loads(file.read_text()).items() if isinstance(v, list)}
     acc = (READINGS - p["b_a"]) @ (np.linalg.inv(p["R_a"]) @ np.linalg.inv(p["K_a"])).T
     np.testing.assert_allclose(READINGS @ back.accelerometer.S.T + back.accelerometer.b, acc, **ROUNDING)
-
-
-def test_small_yaml_is_read_as_the_library_reads_it():
-    text = """imu0:
-  T_i_b:
-  - [1.0, 0.0]
-  - - 0.5
-    - -1.0e-3
-  model: scale-misalignment  # a comment
-  rostopic: "/imu0"
-  update_rate: 200.0
-"""
-    whole = yaml.safe_load(text)["imu0"]
-    small = yaml_of(text)["imu0"]
-    assert small["T_i_b"] == [v for r in whole["T_i_b"] for v in r]
-    assert {k: small[k] for k in ("model", "rostopic", "update_rate")} == {
-        k: whole[k] for k in ("model", "rostopic", "update_rate")
-    }
 
 
 def test_a_foreign_calibration_is_exported_to_another_program(tmp_path):

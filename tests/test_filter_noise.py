@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from scipy.spatial.transform import Rotation
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
@@ -21,7 +20,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
     informed,
     parts_of,
 )
-from trihedron.estimate.filter_noise.strengths import Fitted, Prior, _of_axes, _without_noise, fit, unlike_axes_beside
+from trihedron.estimate.filter_noise.strengths import Prior, fit
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording
@@ -84,29 +83,6 @@ def test_strengths_lie_within_their_intervals():
     assert np.all(found.draws[:, 1] == 0.0)
     assert found.is_settled
     assert not replace(found, n_effective=1.0).is_settled
-
-
-def turning(m, ratios, seed):
-    """A body that turns by a radian in a second about all axes, its gyro's axes unlike by ``ratios``."""
-    attitude = Rotation.from_rotvec(np.cumsum(np.random.default_rng(seed).normal(size=(m, 3)), axis=0)).as_matrix()
-    plain = replace(still(m), attitude=attitude)
-    strengths = np.array([N, 0.0, 0.0, 1e-5, 0.0, 0.0, 1.0])
-    V = sum(r**2 * basis for r, basis in zip(ratios, _of_axes(plain, strengths), strict=True))
-    V = V + _without_noise(plain, strengths) + plain.columns @ plain.columns.T
-    seen = np.linalg.cholesky(V) @ np.random.default_rng(seed).normal(size=3 * m)
-    return replace(plain, observed=seen), Fitted(strengths, 0.0, strengths[None], 1.0)
-
-
-@pytest.mark.slow
-def test_axes_that_differ_in_motion_have_an_n_of_their_own():
-    known = Bounded(N, N / 1.1, N * 1.1)
-    found = unlike_axes_beside([turning(150, (0.6, 1.0, 2.0), 4)[0]], turning(150, (0.6, 1.0, 2.0), 4)[1], known)
-    for one, ratio in zip(found, (0.6, 1.0, 2.0), strict=True):
-        assert one.lower < ratio * N < one.upper
-    stretch, alike = turning(150, (1.0, 1.0, 1.0), 4)
-    assert unlike_axes_beside([stretch], alike, known) == ()
-    # All axes together are the noise that is the same along every one.
-    assert np.sum(_of_axes(stretch, alike.mode), axis=0) == pytest.approx(N**2 * np.kron(stretch.alike[0], np.eye(3)))
 
 
 def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():

@@ -6,34 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from test_filter_noise import SLOW, STRENGTHS, TAU, K, N, drawn
-from trihedron.estimate.filter_noise.beside_reference import VELOCITY
+from test_filter_noise import SLOW, TAU, K, N, drawn
 from trihedron.estimate.filter_noise.strengths import (
-    COORDINATES,
     Prior,
     _slope,
     height,
     most_likely,
-    whole,
-    with_slow_error_of,
 )
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
-
-
-def test_an_accelerometers_reference_is_as_wrong_as_the_gyro_found_it():
-    draws = np.tile(STRENGTHS, (50, 1))
-    draws[:, 4] = 0.6 * SLOW * np.geomspace(0.5, 2.0, 50)
-    draws[:, 5] = 0.8 * SLOW * np.geomspace(0.5, 2.0, 50)
-    told = with_slow_error_of(VELOCITY, draws)
-    assert whole(told, told.mean)[4:] == pytest.approx([0.6 * SLOW, 0.8 * SLOW, TAU], rel=1e-6)
-    slow, others = COORDINATES.index("slow"), [COORDINATES.index(name) for name in ("noise", "bias_walk", "white")]
-    assert told.sigma[slow] == pytest.approx(2.0 * np.std(np.log(draws[:, 4])))
-    assert not told.may_be_nothing[slow]
-    assert np.all(told.mean[others] == VELOCITY.mean[others])
-    # The prior's height is the normal's there, and the search's slope its derivative.
-    x = told.mean + 0.3 * told.sigma
-    both = [height([drawn(3)], told, x + sign * 1e-3 * np.eye(7)[slow]) for sign in (1.0, -1.0)]
-    assert _slope([drawn(3)], told, x)[0][slow] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
 
 
 @pytest.mark.parametrize("far", [0.1, 10.0])

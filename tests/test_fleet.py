@@ -15,7 +15,6 @@ from trihedron.fleet import find_jobs, running, summarise
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
-from trihedron.sanitise import escaped
 
 
 @pytest.fixture(scope="module")
@@ -116,19 +115,6 @@ def row(serial, name, numbers, sigma=1e-4):
     }
 
 
-def test_a_log_of_too_few_poses_is_no_usable_calibration_and_its_device_is_named_first(tmp_path):
-    """Its diagnosis begins from nominal values, which are no calibration."""
-    for unit, n_poses in (("sound", 14), ("short", 2)):
-        path = tmp_path / "logs" / unit / "log.csv"
-        path.parent.mkdir(parents=True)
-        trihedron.convert(recorded(Instrument(), 3, n_poses=n_poses), path)
-    found = trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, gravity_m_s2=G)
-    assert [(log.serial, log.status) for log in found.summary.logs] == [("short", "rejected"), ("sound", "done")]
-    document = fleet_report(found.summary)
-    assert "(short)" in document.verdict
-    assert document.level == "usable"
-
-
 def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path):
     rng = np.random.default_rng(8)
     found, alarms = 0, 0
@@ -181,19 +167,6 @@ def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
         assert said["log_2.csv"][0] == "rejected"
         assert "pipe" in said["log_2.csv"][1]
         assert "a folder without logs" in said["log_1.csv"][1]
-
-
-def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_path):
-    (tmp_path / "logs").mkdir()
-    (tmp_path / "logs" / "a\x1b[2J\x9b\u202eb.csv").write_text("no log\n")
-    Path(os.fsdecode(os.fsencode(tmp_path) + b"/logs/c\xff.csv")).write_text("no log\n")
-    trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G)
-    for name in ("fleet.csv", "fleet.html"):
-        text = (tmp_path / "out" / name).read_text()
-        assert "a\\x1b[2J\\x9b\\u202eb.csv" in text
-        assert escaped(text) == text
-    names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
-    assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -26,18 +26,6 @@ def bridged(counts):
     return 0 if found is None else int(found.is_clipped.sum())
 
 
-def test_a_steady_turn_that_wavers_about_its_extreme_is_not_at_a_limit():
-    rng = np.random.default_rng(2)
-    counts = np.zeros((6000, 3))
-    for first in range(500, 5500, 1000):
-        counts[first : first + 60, 0] = 8137.0
-    counts[:, 0] += np.where(counts[:, 0] > 0, rng.integers(0, 2, 6000), 0)
-    # It ends on the extreme code twice in a row, and falls steeply.
-    counts[558:560, 0] = 8138.0
-    counts[556:558, 0] = 8137.0
-    assert bridged(counts) == 0
-
-
 def test_a_pair_at_the_end_of_the_codes_is_a_limit_and_elsewhere_is_none():
     bump = turns(np.random.default_rng(4), n_moves=4, peak=3000.0)
     # A move of a quarter of a second of which two samples are beyond the end: as brisk hands do.

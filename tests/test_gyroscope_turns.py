@@ -109,18 +109,6 @@ def test_two_turns_that_disagree_are_serious_because_nothing_tells_which_is_wron
     assert found.sigma_S[2, 2] > 0.005
 
 
-def test_turns_without_a_wall_widen_the_error_bars_and_say_so():
-    rng = np.random.default_rng(2)
-    recording, truth, turns, zeros = session()
-    for index, turn in enumerate(turns):
-        recording = with_wrong_turn(recording, turn, (2, 0, 1)[index // 6], 3.0 * DEG * rng.normal())
-    found, findings = calibrate_turns(recording, turns, zeros)
-    assert FindingCode.TURN_NOT_A_MULTIPLE in codes(findings)
-    assert np.abs(z_scores(found, truth)).max() < 4.0
-    # Three degrees on turns of 90 to 360 deg, six per axis: about three parts in a thousand.
-    assert 1e-3 < found.sigma_S[2, 2] < 2e-2
-
-
 def test_a_given_angle_is_believed_and_a_contradiction_is_a_finding():
     recording, truth, turns, zeros = session(turns_deg=(90.0, -90.0, 200.0, -200.0))
     given = [replace(t, angle_rad=a * DEG) for t, a in zip(turns, (90.0, -90.0, 200.0, -200.0) * 3, strict=True)]

@@ -9,9 +9,6 @@ from scipy.ndimage import gaussian_filter1d
 from trihedron import _core, probability
 from trihedron.diagnose.session.state import smoothed_slope
 from trihedron.ranges import edges_of, ranges_of
-from trihedron.segment.noise import MeanNoise
-
-NOISE = MeanNoise(np.array([0.1, 0.2, 0.0]), np.array([1e-3, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))
 
 
 def test_means_over_ranges_pass_over_what_is_no_number():
@@ -64,11 +61,6 @@ def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     plain = [explained(t, x, 2.9 + 0.011 * k) for k in range(41)]
     # A phase of 10^4 turns is good to 10^-11 of a turn; three samples may see sine and cosine nearly alike.
     assert np.abs(found - plain).max() < 1e-8 * (x @ x)
-
-
-def test_readings_need_as_many_times():
-    with pytest.raises(ValueError, match="5 readings need as many times"):
-        _core.sinusoid_power(np.zeros(4), np.zeros(5), start_hz=1.0, step_hz=0.1, count=3)
 
 
 def exact(values, time_s, width):

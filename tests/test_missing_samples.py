@@ -1,13 +1,10 @@
 """Samples lost from a log whose timestamps were made anew: the calibration says that its gyro is not to be trusted."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import trihedron
-from trihedron import _core
 from trihedron.estimate.gyroscope.missing_samples import missing_samples
 from trihedron.records import Severity
 from trihedron.records.recording import spread_timestamps
@@ -44,41 +41,6 @@ def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
     for seed in (5, 6):
         log = session(0.0, seed, move_s, grade)
         assert missing_samples(log, segment_recording(log), 1e-3) == []
-
-
-def test_a_joint_shows_what_is_missing_where_it_is_and_takes_no_jolt_for_it():
-    rng = np.random.default_rng(11)
-    path = np.cumsum(np.cumsum(rng.normal(size=(400, 6)), axis=0), axis=0) + 0.1 * rng.normal(size=(400, 6))
-    path[300:303] += 30.0 * rng.normal(size=(3, 6))
-    kept = np.delete(np.arange(400), [130, 210, 211])
-    sensors = [np.ascontiguousarray(path[kept, :3]) / 0.1, np.ascontiguousarray(path[kept, 3:]) / 0.1]
-    moves, whole = np.array([[60, 190], [190, 390]]), np.zeros(len(kept), dtype=bool)
-    sample, count, gain, certain, telling = _core.motion_joints(sensors, moves, whole, 60, 20.0)
-    assert dict(zip(sample, count, strict=True)) == {129: 1, 208: 2}
-    assert gain[0] >= gain[1] > 20.0
-    assert np.all(certain > 20.0)
-    # Most of some three hundred joints: white noise twice integrated is predicted to a step's noise.
-    assert 200 < telling < 330
-    # None is asked where a window spans a gap, an unknown reading or a limit.
-    assert len(_core.motion_joints(sensors, moves, whole | (np.arange(len(kept)) == 131), 60, 20.0)[0]) == 1
-    sensors[1][210, 2] = np.nan
-    assert 208 not in _core.motion_joints(sensors, moves, whole, 60, 20.0)[0]
-    with pytest.raises(ValueError, match="ranges"):
-        _core.motion_joints(sensors, np.array([[10, 500]]), whole, 60, 20.0)
-    with pytest.raises(ValueError, match="moves are ranges of the readings"):
-        _core.motion_joints([sensors[0][:-1]], moves, whole, 60, 20.0)
-
-
-def test_samples_with_one_stamp_do_not_crash_the_diagnosis():
-    scenario = _of(profile_by_name("mpu"), hand_session(10, pose_s=2.0, first_pose_s=4.0, layout=3), "session", 3)
-    session = simulate(scenario, 3)[0]
-    delay = np.random.default_rng(1).exponential(0.02, session.n_samples)
-    t = np.maximum.accumulate(np.round(session.time_s + delay, 3))
-    assert np.any(np.diff(t) == 0.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RuntimeWarning)
-        result = trihedron.diagnose(replace(session, time_s=t - t[0]), gravity_m_s2=9.80665)
-    assert result.verdict
 
 
 @pytest.mark.parametrize("side", ["before", "behind"])

@@ -1,6 +1,5 @@
 """Noise inside poses: simulated sessions of known figures, and one held against another."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -116,28 +115,6 @@ def test_a_stand_that_rings_on_one_axis_is_no_filter_and_no_white_noise(quality,
     assert [axis.corner_hz for axis in axes] == [None] * 3
     # 9000 readings: a density to 1 %; what the hump leaves elsewhere adds some.
     assert axes[1].white.value == pytest.approx(1e-3, rel=0.05)
-
-
-def test_holds_that_a_hand_shakes_lift_white_noise_below_a_corner_no_more_than_they_lift_octaves():
-    """Tremor below the corner hardly shows in differences of readings, which rounding fills."""
-    from scipy.signal import butter, sosfilt
-
-    rng, rate_hz, length = np.random.default_rng(20), 100.0, 512
-    low_pass = butter(2, 12.0, fs=rate_hz, output="sos")
-    tremor = butter(2, (1.0, 8.0), btype="band", fs=rate_hz, output="sos")
-    parts = []
-    for k in range(20):
-        x = sosfilt(low_pass, rng.normal(size=(length + 64, 3)), axis=0)
-        if k % 3 == 0:
-            x += 4.0 * sosfilt(tremor, rng.normal(size=(length + 64, 3)), axis=0)
-        parts.append(np.round(x[64:] / 1.5) * 1.5)
-    poses = [(k * length, (k + 1) * length) for k in range(20)]
-    for axis in noise_of_poses(np.concatenate(parts), rate_hz, poses):
-        assert axis.corner_hz is not None
-        assert axis.white is not None
-        below = [o.density.value for o in axis.octaves if o.low_hz >= 1.0 and o.high_hz <= 8.0]
-        # The mean over all poses is six times the octaves' typical pose, its root 2.4; a filter's shape is worth 10 %.
-        assert axis.white.value < 1.3 * math.sqrt(float(np.mean(below)))
 
 
 @pytest.mark.parametrize("corner_hz", [0.5, 3.0, 19.0])

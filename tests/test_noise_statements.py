@@ -8,11 +8,7 @@ from noise_coverage import in_time
 from noise_series import series
 from trihedron import _core
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
-from trihedron.report.chart import Note
-from trihedron.report.noise import noise_report
-from trihedron.report.noise_charts import LEAST_SHARE, allan_chart
 
 
 def slow_deviance(bins, strength):
@@ -85,22 +81,6 @@ def test_intervals_hold_whatever_is_named(runs, least):
     assert min(inside.values()) >= least, inside
 
 
-@pytest.mark.slow
-def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
-    rng = np.random.default_rng(63)
-    invented = slow = 0
-    for _ in range(60):
-        axis = identify_noise(in_time(rng, 1 << 16, 100.0, N=1e-2, K=3e-4), 100.0).axes[0]
-        invented += any(axis.terms[TermName(s)].is_present for s in "QBR")
-        slow += axis.slow_pair.is_present
-        if axis.is_slow_noise_unresolved:
-            assert FindingCode.SLOW_NOISE_UNRESOLVED in {f.code for f in axis.findings}
-            assert axis.fitted("B") + axis.fitted("K") > 0.0
-    # Before: B or a ramp in 19 of 60. Four false names at 0.5 % each have a probability of 1e-3.
-    assert invented <= 3
-    assert slow >= 25
-
-
 @pytest.mark.parametrize(
     "truth", [{"N": 1e-2, "K": 6e-4}, pytest.param({"N": 1e-3, "B": 2e-2}, marks=pytest.mark.slow)]
 )
@@ -116,31 +96,3 @@ def test_scattered_loss_leaves_the_terms_where_they_are(truth):
         inside += sum(terms[TermName(s)].lower <= v <= terms[TermName(s)].upper for s, v in truth.items())
     # Twelve intervals of 95 %: nine or more with a probability of 0.998.
     assert inside >= 9
-
-
-@pytest.fixture(scope="module")
-def walking():
-    """An axis of white noise alone, and one with a random walk."""
-    rng = np.random.default_rng(4)
-    readings = np.column_stack([series(rng, 1 << 15, 50.0, N=2e-3), series(rng, 1 << 15, 50.0, N=2e-3, K=2e-4)])
-    return identify_noise(readings, 50.0, names=("gyro x", "gyro y"))
-
-
-def test_the_figure_names_the_terms_that_the_table_names_and_marks_the_others_as_limits(walking):
-    panels = allan_chart(walking.curve, walking.axes[0].unit, walking.axes).panels
-    for axis, panel in zip(walking.axes, panels, strict=True):
-        texts = [mark.text for mark in panel.marks if isinstance(mark, Note)]
-        drawn = {text[0]: text for text in texts if text.split()[0] in TermName._value2member_map_}
-        tau = walking.curve.tau_s[walking.curve.tau_s > 0.0]
-        total, parts = axis.allan_variance(tau), axis.allan_parts(tau)
-        # A part too small to be seen anywhere has no line and no name.
-        assert set(drawn) == {symbol for symbol, part in parts.items() if np.max(part / total) >= LEAST_SHARE}
-        assert all(("<" not in text) == axis.terms[TermName(symbol)].is_present for symbol, text in drawn.items())
-        assert {term.value for term in TermName if axis.terms[term].is_present} <= set(drawn)
-
-
-def test_an_axis_whose_best_averaging_time_lies_beyond_the_log_is_named_beside_the_others(walking):
-    found = [axis.optimal_averaging() is None for axis in walking.axes]
-    beside = [line.beside for line in noise_report(walking).headlines if "averaging" in line.what]
-    assert found == [True, False]
-    assert ["X beyond" in text for text in beside] == [True]

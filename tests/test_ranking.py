@@ -12,8 +12,7 @@ from trihedron.cli import main
 from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
 from trihedron.records import FindingCode, Onboard, Severity
-from trihedron.report.ranking import ranking_report, said_of
-from trihedron.report.verification import verification_report
+from trihedron.report.ranking import said_of
 
 DRIFT = FindingCode.GYRO_BIAS_DRIFT
 SWAPPED = np.eye(3)[[1, 0, 2]]
@@ -171,36 +170,6 @@ def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(ses
     assert ranking.best.behind == 0.0
 
 
-def test_a_ranking_shows_its_order_and_says_which_to_use(session):
-    log, known = session
-    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
-    document = ranking_report(trihedron.rank([wrong, known], log, gravity_m_s2=9.81))
-    assert document.next_step.startswith("Use calibration 2: `trihedron apply FILE LOG")
-    assert document.verdict.startswith("calibration 2 fits this log best; calibration 1 is rejected. Verified")
-    again = trihedron.calibrate(trihedron.simulate("hand-session", 7)[0], gravity_m_s2=9.81).calibration
-    alike = ranking_report(trihedron.rank([again, known], log, gravity_m_s2=9.81)).verdict
-    assert "calibration 1 fit this log equally well" in alike or "calibration 2 fit this log equally well" in alike
-    gravity, tilt = document.lead.chart().panels
-    assert gravity.y.names == tilt.y.names == ("calibration 2", "calibration 1")
-    interval, right, rejected = gravity.marks
-    assert (right.colour, rejected.colour) == ("c1", "accent")
-    assert interval.x[0] <= right.x[0] <= interval.x[1] < rejected.x[0]
-
-
-def test_the_best_of_several_has_the_verdict_that_it_has_alone(session):
-    """Also where it is doubtful: another gyro scale by 0.2 %."""
-    log, known = session
-    off = replace(known, gyroscope=replace(known.gyroscope, S=1.002 * known.gyroscope.S))
-    alone = trihedron.verify(off, log, gravity_m_s2=9.81)
-    single = verification_report(alone.verification)
-    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
-    document = ranking_report(trihedron.rank([wrong, off], log, gravity_m_s2=9.81))
-    assert "Doubtful" in single.verdict
-    assert document.verdict.endswith(single.verdict)
-    assert (document.level, document.foremost, document.what_next) == (single.level, single.foremost, single.what_next)
-    assert document.headlines == single.headlines
-
-
 def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification(session):
     """No bias of such a log is the next one's, whatever the file states; a log without drift has no such warning."""
     log, known = session
@@ -210,27 +179,3 @@ def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
     ]
     assert found == [[], [Severity.WARNING]]
-
-
-def test_only_an_error_of_one_pose_is_blamed_on_that_pose(session):
-    """Another gravity is a common offset; a bias on one axis has either sign, and stands in all poses too."""
-    log, known = session
-    elsewhere = trihedron.verify(known, log, gravity_m_s2=9.83).verification
-    b = known.accelerometer.b + np.array([0.05, 0.0, 0.0])
-    biased = replace(known, accelerometer=replace(known.accelerometer, b=b))
-    segments = trihedron.segment(log)
-    touched = segments.accelerometer_mean.copy()
-    touched[3] *= 1.01
-    of_one = replace(segments, accelerometer_mean=touched)
-    judged = (
-        elsewhere,
-        trihedron.verify(biased, log, gravity_m_s2=9.81).verification,
-        trihedron.verify(known, log, gravity_m_s2=9.81, segments=of_one).verification,
-    )
-    offset, everywhere, single = (
-        next(f for f in v.findings if f.code is FindingCode.RESIDUAL_ABOVE_NOISE) for v in judged
-    )
-    assert offset.numbers["n_same"] == len(elsewhere.norm_error)
-    assert [" pose " in found.action for found in (offset, everywhere, single)] == [False, False, True]
-    assert offset.numbers["mean_m_s2"] == pytest.approx(9.81 - 9.83, abs=5e-3)
-    assert "pose 4;" in single.action

@@ -197,14 +197,6 @@ def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     assert list(scale_findings(S, RateUnit.COUNTS)) == []
 
 
-def test_two_files_account_for_the_rows_of_both(tmp_path):
-    table = readings(200)
-    acc = write(tmp_path / "acc.csv", table[:150, :4], "t,x,y,z\n")
-    gyr = write(tmp_path / "gyr.csv", table[20:, [0, 4, 5, 6]], "t,x,y,z\n")
-    recording = read_recording(accelerometer_path=acc, gyroscope_path=gyr)
-    assert recording.rows_in_file == recording.rows_read + recording.rows_reported == 330
-
-
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from formats.layout import G
-from formats.written import session
+from formats.session import G, session
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit

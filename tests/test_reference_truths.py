@@ -18,16 +18,6 @@ def z_of_bias(found, trial):
     return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
 
 
-# Another walk whose truth wanders is below.
-@pytest.mark.slow
-def test_a_sound_truth_is_not_refused_for_the_filters_rounding():
-    # The strengths' search passes by a white error of nothing beside slow ones: rounding was all that was left of a
-    # variance, and every third walk was rejected.
-    trial = truth(6, "walk", has_path=True)
-    found = fit_reference(trial.log, trial.motion, G)
-    assert np.abs(z_of_bias(found, trial)).max() < 4.5
-
-
 # Beside a tracker at rest: tests/test_reference.py.
 @pytest.mark.slow
 def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():

@@ -4,7 +4,6 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
@@ -37,24 +36,6 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
         assert all(word in said for word in cell.split())
     for cell in ROW[1:]:
         assert cell in text
-
-
-def test_s_and_b_stand_side_by_side_on_a_narrow_terminal_with_uncertainties_below():
-    lines = to_text(whole(), width=70).splitlines()
-    assert not any("(continued" in line for line in lines)
-    first = next(k for k, line in enumerate(lines) if line.startswith("f1 ="))
-    row, below = lines[first : first + 2]
-    assert row.split() == ["f1", "=", "2.412814", "0", "0", "−79.9221"]
-    assert below.split() == ["±", "0.000083", "±", "0.0025"]
-    assert below.index("± 0.0025") + len("± 0.0025") == len(row)
-    assert "2.412814 ± 0.000083" in to_text(whole(), width=120)
-
-
-def test_what_to_do_stands_below_the_verdict():
-    lines = to_text(replace(whole(), next_step="Test it on another recording. " * 4), width=80).splitlines()
-    after = lines.index("Usable, with 1 warning.") + 1
-    assert lines[after].startswith("→ Test it")
-    assert lines[after + 1].startswith("  ")
 
 
 def coloured():
@@ -139,17 +120,3 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, caps
         known = capsys.readouterr().out
         for option in re.findall(r" (--?[a-z][a-z-]*)", line):
             assert option in known, (line, option)
-
-
-def test_every_part_of_a_divided_table_repeats_what_distinguishes_its_rows():
-    rows = tuple((f"sensor {k // 2}", f"axis {k % 2}", *["9.87654321"] * 8) for k in range(4))
-    table = Table(("sensor", "axis", *(f"quantity {k}" for k in range(8))), rows)
-    said = to_text(Document("T", "", "V", True, (Section("S", (table,)),)), width=60)
-    assert said.count("(continued: ") > 0
-    assert said.count("sensor 1   axis 0") == said.count("(continued: ") + 1
-
-
-def test_a_column_without_a_value_is_left_out():
-    table = Table(("name", "empty", "value"), (("a", "–", "1"), ("b", "", "2")))
-    assert table.head == ("name", "value")
-    assert table.rows == (("a", "1"), ("b", "2"))

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import trihedron.estimate.session.solved as solved_session
-from confidence.design import session
 from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT, far_moves
-from trihedron.session.aliasing import unresolved_variance
 
 
 @pytest.fixture
@@ -64,23 +62,6 @@ def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
     assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.4
 
 
-def test_smooth_motion_is_not_fast_because_samples_between_are_missing():
-    rng = np.random.default_rng(3)
-    t = np.arange(1200) / 100.0
-    inside = (t >= 5.0) & (t < 7.0)
-    rate = np.where(inside, np.sin(np.pi * (t - 5.0) / 2.0) ** 2, 0.0)[:, None] * [2.0, 1.0, 0.5]
-    rate = rate + 1e-3 * rng.standard_normal(rate.shape)
-    kept = np.ones(len(t), dtype=bool)
-    kept[510:690:19] = False
-    stop = int(np.count_nonzero(kept[:700]))
-    ranges, poses = ((500, stop),), [(0, 480), (stop + 20, stop + 480)]
-    seen = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3), t[kept])
-    blind = unresolved_variance(rate[kept], ranges, poses, 0.01, np.zeros(3))
-    white = 1e-6 * 0.01 * 2.0
-    assert np.all(seen < 0.1 * white)
-    assert np.any(blind > white)
-
-
 @pytest.mark.parametrize(("usual", "far"), [(1.0, 6.5), (30.0, 195.0)])
 def test_a_move_far_from_the_others_is_left_out_and_all_that_miss_alike_are_not(usual, far):
     """In phone rec_3 one of fifteen was off by nine standard errors and widened the others by 2.5."""
@@ -111,21 +92,3 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     rms = np.sqrt(np.mean(np.square(scores)))
     # 27 numbers, correlated within a session: 1 +- 0.3. It was 0.36 to 0.40 over 40 and 60 sessions.
     assert 0.55 < rms < 1.4
-
-
-def test_motion_faster_than_the_samples_that_is_not_there_costs_no_certainty(monkeypatch):
-    # Its variance is extrapolated; at 50 Hz, in a hand that trembles, to twenty times the error that there is.
-    made = session(7, tremor_deg_s=0.0)
-    recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
-    plain = calibrate(recording, gravity_m_s2=G)
-
-    def far_too_large(readings, ranges, poses, step_s, quantum, time_s=None):
-        white = np.var(readings[poses[0, 0] : poses[0, 1]], axis=0)
-        added = [400.0 * white * (b - a) * step_s**2 for a, b in ranges]
-        return unresolved_variance(readings, ranges, poses, step_s, quantum, time_s) + np.array(added)
-
-    monkeypatch.setattr("trihedron.session.noise.unresolved_variance", far_too_large)
-    charged = calibrate(recording, gravity_m_s2=G)
-    wider = np.diag(charged.gyroscope.sigma_S) / np.diag(plain.gyroscope.sigma_S)
-    # Twenty times as wide before the evidence found how much of it there is.
-    assert wider.max() < 2.0
