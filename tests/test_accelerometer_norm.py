@@ -96,16 +96,6 @@ def test_a_touched_pose_is_found():
     assert [f.numbers["pose"] for f in outliers] == [8.0]
 
 
-def test_the_same_six_faces_again_and_again_do_not_become_eighteen_poses():
-    up = np.tile(np.vstack([np.eye(3), -np.eye(3)]), (3, 1))
-    up = up + 3e-4 * np.random.default_rng(51).standard_normal(up.shape)
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    sensor, findings = calibrate_norm(readings(up, 51), SIGMA, G)
-    assert FindingCode.NOT_OBSERVABLE in codes(findings)
-    # Angles that nobody has seen may not be paid for with the scales that everybody has.
-    np.testing.assert_allclose(np.diag(sensor.S), np.diag(S_TRUE), rtol=5e-3)
-
-
 @pytest.mark.parametrize("kept", [slice(0, 12), slice(4, 18)])
 def test_the_first_advised_pose_beats_every_other_candidate(kept):
     from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words

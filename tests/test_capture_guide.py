@@ -14,7 +14,6 @@ from matplotlib.image import imread
 import trihedron
 from following_hand import FollowingHand
 from trihedron.api.guiding import conclude, examine, part_of
-from trihedron.api.planning_poses import move_rows, shortest_path
 from trihedron.api.replaying import readings_of, steps
 from trihedron.api.simulating import simulate
 from trihedron.capture.guide import Guide
@@ -91,48 +90,6 @@ def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
     assert (state.poses_needed or 0) > 0
     # Six faces leave the angles between axes open: an edge is requested, with both its axes half up.
     assert np.sum(np.abs(state.next_up) > 0.3) >= 2
-
-
-def test_the_next_pose_brings_what_was_promised():
-    """Uncertainties promised for the next pose against those that are there when it is taken."""
-    ratios, before = [], None
-    hand = FollowingHand(scenario_by_name("hand-session"), 40, miss_deg=3.0)
-    while hand.n_poses < 15:
-        recording, truth = hand.session()
-        now = examine(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2, look_ahead=False)
-        if before is not None and hand.n_poses > 11:
-            pairs = zip(before.uncertain, now.uncertain, strict=True)
-            ratios += [new.now / old.after_next for old, new in pairs if new.now and old.now]
-        before = now
-        hand.go(now.next_up, now.pose_s)
-    # The pose is off by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
-    assert 0.75 < np.median(ratios) < 1.33
-    assert np.quantile(ratios, 0.9) < 2.5
-
-
-def test_the_moves_that_are_planned_see_the_gyro_as_numbers_do():
-    """move_rows against a difference: gravity carried by a gyro in error, integrated step by step."""
-    start, stop = (v / np.linalg.norm(v) for v in np.random.default_rng(0).normal(size=(2, 3)))
-    path = shortest_path(start, stop, 200)
-
-    def carried(error):
-        up = start.copy()
-        for step in path:
-            turned = (np.eye(3) + error) @ step
-            angle = np.linalg.norm(turned)
-            axis = turned / angle
-            # The body turns by the step, so that up turns by its inverse in the body (Rodrigues).
-            up = up * np.cos(-angle) + np.cross(axis, up) * np.sin(-angle) + axis * (axis @ up) * (1 - np.cos(-angle))
-        return up
-
-    assert np.allclose(carried(np.zeros((3, 3))), stop, atol=1e-9)
-    rows = move_rows(path, stop)
-    for k in range(9):
-        error = np.zeros(9)
-        error[k] = 1e-6
-        moved = (carried(error.reshape(3, 3)) - stop) / 1e-6
-        # A turn δθ moves up by -δθ × up: the length is that of its two components across up.
-        assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(rows[:, k]), abs=2e-2)
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 400.0])

@@ -105,20 +105,6 @@ def test_the_baud_rate_is_found_by_itself():
         source.close()
 
 
-def test_two_clocks_are_fitted_along_the_earliest_arrivals():
-    rng = np.random.default_rng(0)
-    device = np.arange(0.0, 120.0, 0.01)
-    true_ppm, offset = 80.0, 3.25
-    fit = ClockFit()
-    for d, late in zip(device, rng.exponential(0.004, len(device)), strict=True):
-        fit.add(float(d), offset + float(d) / (1.0 + true_ppm * 1e-6) + float(late))
-    line = fit.line()
-    assert abs(line.rate_ppm - true_ppm) < 4.0 * line.sigma_ppm
-    assert line.sigma_ppm < 2.0
-    assert line.offset_s == pytest.approx(offset, abs=5e-4)
-    assert line.jitter_rms_s == pytest.approx(0.004, rel=0.1)
-
-
 def test_a_device_clock_in_error_is_found_within_its_error_bar():
     rng = np.random.default_rng(0)
     ratios = []

@@ -66,15 +66,6 @@ def test_codes_that_were_not_visited_leave_the_step_as_it_is():
     assert adc_step(np.where(rng.random(8000) < 0.5, single.astype(float), codes * SCALE)) == pytest.approx(SCALE, 1e-3)
 
 
-def test_of_two_steps_in_one_log_the_one_of_most_parts_is_told_and_of_multiples_the_finer():
-    x = session(5, sigma=0.3)
-    fine, coarse = 0.0061, np.sqrt(5.0) / 230.0
-    switched = np.where(np.arange(8000) < 3000, fine * np.round(x), coarse * np.round(x * fine / coarse))
-    assert adc_step(switched) == pytest.approx(coarse, rel=1e-3)
-    codes = np.round(x)
-    assert adc_step(np.where(np.arange(8000) < 3000, codes, 4.0 * np.round(codes / 4.0))) == 1.0
-
-
 def test_a_recording_carries_its_facts_and_another_has_its_own():
     counts = np.round(np.column_stack([session(k, sigma=2.0) for k in range(3)]))
     recording = Recording(np.arange(8000) / 100.0, counts, None, 100.0)
@@ -138,17 +129,6 @@ def test_swings_of_one_height_end_on_no_limit(sigma):
         phase = 2 * np.pi * rng.uniform(0.05, 2.0, 3) * t[:, None] + rng.uniform(0.0, 6.0, 3)
         swings = np.round(rng.uniform(5.0, 3000.0, 3) * np.sin(phase) + sigma * rng.normal(size=(6000, 3)))
         assert Recording(t, None, swings, 100.0).facts.of("gyroscope").limits == (), seed
-
-
-def test_a_limit_carries_every_reading_on_it_and_moves_with_samples_that_are_put_in():
-    codes = cut(3, 2000.0)
-    facts = Recording(np.arange(6000) / 100.0, None, codes, 100.0).facts
-    at = facts.of("gyroscope").at_limits(6000)
-    np.testing.assert_array_equal(at, np.abs(codes) == 2000.0)
-    places = np.arange(6000) + (np.arange(6000) >= 50)
-    moved = facts.moved(places).of("gyroscope").at_limits(6001)
-    np.testing.assert_array_equal(moved[places], at)
-    assert not moved[50].any()
 
 
 @pytest.mark.parametrize("are_still", [False, True])

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from small_session import made_once
 from trihedron import read, segment
 from trihedron.cli import main
 from trihedron.simulate import Motion, MoveTo, Pose, hand_session
@@ -105,21 +104,6 @@ def test_a_reader_that_leaves_early_is_no_error(session):
     assert done.stdout.startswith("t [s],ax [m/s^2]")
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
-
-
-@pytest.mark.parametrize("command", ["calibrate", pytest.param("guide", marks=pytest.mark.slow)])
-def test_a_reader_that_never_came_costs_no_file_that_was_asked_for(tmp_path, command):
-    asked = {
-        "calibrate": ["--gravity", G, "-o", "c.json", "--report", "r.html", "--json", "-"],
-        "guide": ["--gravity", G, "-o", "c.json", "--every"],
-    }[command]
-    words = [sys.executable, "-m", "trihedron", command, str(made_once() / "log.csv"), *asked]
-    read_end, write_end = os.pipe()
-    os.close(read_end)
-    done = subprocess.run(words, cwd=tmp_path, stdout=write_end, stderr=subprocess.PIPE, text=True)
-    os.close(write_end)
-    assert "Traceback" not in done.stderr
-    assert {path.name for path in tmp_path.iterdir()} == {name for name in asked if name in ("c.json", "r.html")}
 
 
 def test_a_pipe_without_a_writer_is_no_saved_result_and_not_waited_for(tmp_path, capsys):

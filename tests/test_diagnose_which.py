@@ -42,9 +42,3 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
     # To one sample or one in ten of what is missing: gravity cannot count a loss in a turn about the vertical.
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1, abs=1.0), what
-
-
-@pytest.mark.parametrize("flaw", ["gyro-saturation", pytest.param("sensor-lag", marks=pytest.mark.slow)])
-def test_moves_that_contradict_for_another_reason_lost_nothing(tmp_path, flaw):
-    found, _ = diagnosed(tmp_path, flaw, 11, 1.0, False)
-    assert "dropped-samples" not in [effect.id for effect in found.effects]

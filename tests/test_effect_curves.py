@@ -1,14 +1,11 @@
 """Effects as curves over the variable that drives them, found from their columns, with what poses show beside them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from diagnosed_session import diagnosed
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
-from trihedron.diagnose.effects.thermal import GyroThermalBias
 from trihedron.diagnose.session.state import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
 
@@ -50,24 +47,6 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         # Three standard normal numbers: 4 sigma is passed by chance once in 5000 runs.
         assert np.max(np.abs(z)) < 4.0
         assert effect.held_out[0].chi2_per_dof_after < 1.3 < effect.held_out[0].chi2_per_dof_before
-
-
-def variants(temperature, rate, n_poses=10):
-    obs = SimpleNamespace(n_poses=n_poses)
-    log = SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=obs, on_gyros=on_axes)
-    return GyroThermalBias().variants(log)
-
-
-def on_axes(values):
-    return np.eye(3)[None] * values[:, None, :]
-
-
-def test_the_gap_between_branches_is_twice_the_parameter():
-    t = np.r_[np.linspace(0, 20, 40), np.linspace(20, 0, 40)] - 10.0
-    made = variants(t, np.repeat([0.04, -0.04], 40))[3]
-    values = made.distortion.rate @ np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0])
-    np.testing.assert_allclose(values[0], [1.0, 2.0, 3.0])
-    np.testing.assert_allclose(values[0] - values[-1], [2.0, 4.0, 6.0])
 
 
 def turning(latitude, azimuth):

@@ -21,7 +21,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
     parts_of,
 )
 from trihedron.estimate.filter_noise.strengths import Prior, fit
-from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
+from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording
 from trihedron.records.filter_noise import Bounded, StaticNoise
@@ -50,16 +50,6 @@ def drawn(seed, m=60):
     stretch = still(m)
     L, _ = stretch.factor(STRENGTHS)
     return replace(stretch, observed=L @ np.random.default_rng(seed).normal(size=3 * m))
-
-
-def test_covariances_are_those_of_the_processes():
-    # Written out: a walk's block mean has a variance of t_start + h/3, a later one t_mid in common with it.
-    noise = still(4).alike[0]
-    assert noise[2, 2] == pytest.approx(2.0 + 1.0 / 3.0)
-    assert noise[1, 3] == pytest.approx(1.5)
-    # A bias that steps by one at each of three blocks' starts (the first begins at its middle): 2 s, 1.5 s, 0.5 s.
-    assert still(3).bias_walk[::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
-    assert matern(np.array([0.0, 1e-9, 50.0]), 1.0) == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
 
 
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():

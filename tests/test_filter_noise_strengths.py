@@ -32,20 +32,6 @@ def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
         assert slope[k] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
 
 
-def test_a_strength_that_may_be_nothing_has_a_usual_size_and_a_mean_square():
-    only = Prior(np.array([0.0, 0.0, np.log(K), 0.0, 0.0, 0.0, 0.0]), np.full(7, np.log(30.0)), np.eye(7)[2])
-    x = np.log(K) + np.linspace(-12.0, 12.0, 4001)
-    density = np.exp([height([], only, np.array([one])) for one in x])
-    step = x[1] - x[0]
-    assert np.sum(density) * step == pytest.approx(1.0, abs=1e-3)
-    # To half a step of the grid, which ends beside the median.
-    assert np.sum(density[x < np.log(K)]) * step == pytest.approx(0.5, abs=0.5 * step)
-    # Half a Student's distribution of three degrees of freedom: three times the square of its scale. The tail beyond
-    # e^12 holds 1e-4 of it.
-    scale = K / 0.7649
-    assert np.sum(density * np.exp(2.0 * x)) * step == pytest.approx(3.0 * scale**2, rel=1e-2)
-
-
 G, HZ = 9.81, 100.0
 
 

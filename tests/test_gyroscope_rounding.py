@@ -32,30 +32,6 @@ def test_settling_inside_a_step_is_charged_whichever_way_the_moves_go(noise, way
     assert np.abs(scores).max() < 6.0
 
 
-def test_readings_of_a_steady_rate_share_one_error():
-    # Axis after axis at one speed behind ramps: what is read of the other axes, too, stands still for a second.
-    rng = np.random.default_rng(11)
-    scores, white = [], []
-    for _ in range(150):
-        # Beside the bias's own step, whose error is the bias's.
-        levels = rng.uniform(3.0, 30.0, 12) * rng.choice([-1.0, 1.0], 12)
-        up = np.linspace(0.0, 1.0, 20)
-        still = np.zeros(60)
-        rate = np.concatenate([np.concatenate([still, x * up, np.full(120, x), x * up[::-1]]) for x in levels])
-        zero = rng.uniform(-0.5, 0.5)
-        codes = np.round(rate + zero)
-        given = np.repeat(codes[:, None], 3, 1), np.ones(3), np.zeros(3), np.array([True] * 3)
-        variance = rounding_variance(*given)[:, 0]
-        for k in range(len(levels)):
-            plateau = slice(220 * k + 80, 220 * k + 200)
-            error = (codes - rate - zero)[plateau].sum()
-            scores.append(error / np.sqrt(variance[plateau].sum()))
-            white.append(error / np.sqrt(120 / 12.0))
-    assert np.sqrt(np.mean(np.square(scores))) < 1.15
-    assert np.abs(scores).max() < 5.5
-    assert np.sqrt(np.mean(np.square(white))) > 3.0, "as if independent it would be far too little"
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 def test_moves_that_begin_and_end_inside_a_step_are_off_by_what_their_poses_are(noise):
     rng = np.random.default_rng(5)

@@ -55,14 +55,6 @@ def test_error_bars_cover_the_truth_at_their_stated_rate():
         assert abs(np.mean(np.abs(scores) < level) - expected) < margin
 
 
-def test_turns_axes_and_whole_multiples_are_recognised():
-    recording, truth, turns, zeros = session(turns_deg=(90.0, -180.0, 360.0, -720.0))
-    assert len(turns) == 12
-    found, findings = calibrate_turns(recording, turns, zeros)
-    assert not findings
-    assert np.abs(z_scores(found, truth)).max() < 4.0
-
-
 def test_the_manuals_eight_half_turns_in_counts_are_recognised_with_a_nominal_scale_three_per_cent_off():
     S = tuple(map(tuple, np.array(SCALE) * 1e-3))
     gyroscope = Gyroscope(S=S, b=BIAS, unit="counts", noise=NoiseTerms(N=(2e-4,) * 3))

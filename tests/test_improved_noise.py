@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses
+from trihedron.api.driving import MovedAlike, bias_in_moves
 from trihedron.channel_facts.low_pass import gain_of
-from trihedron.comparison.noise import _are_even
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
-from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,
@@ -86,13 +84,6 @@ def session(seed, strays=0.0):
     return scenario, simulate(scenario, seed)[0]
 
 
-def at_rest(pose_s):
-    """A unit and its session without flaws."""
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    return accel, Scenario(hand_session(24, pose_s=pose_s, layout=8), "unit", accel, gyro, profile.clock)
-
-
 def beside(made, seed=0):
     """What a scenario is held against: a calibrated recording, or one that is simulated."""
     log = made if isinstance(made, Recording) else simulate(made, seed)[0]
@@ -115,31 +106,3 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
     little = bias_in_moves(clean, beside(other))
     assert little is None or max(little) < 0.4 * 2e-3
-
-
-@pytest.mark.slow
-def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
-    accel, clean = at_rest(3.0)
-    electronics = replace(accel.electronics, bias_repeatability=(0.02,) * 3)
-    scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
-    own = beside(scattered, 6)
-    found = bias_of_poses(clean, own)
-    # 24 poses less nine parameters and the worst: a root known to a fifth; two of those, and the pose that is excluded.
-    assert found == pytest.approx((0.02,) * 3, rel=0.5)
-    better = replace(accel, electronics=replace(accel.electronics, bias_repeatability=found))
-    again = bias_of_poses(replace(clean, accelerometer=better), own)
-    assert again is None or again == pytest.approx(found, rel=0.15)
-    healthy = beside(clean, 7)
-    little = bias_of_poses(clean, healthy)
-    assert little is None or max(little) < 0.15 * 0.02
-    # What the scenario has too much is taken out.
-    assert max(bias_of_poses(scattered, healthy)) < 0.4 * 0.02
-
-
-@pytest.mark.parametrize(
-    ("values", "sigma", "even"),
-    [((1.0, 1.03, 0.99), 0.001, True), ((1.0, 1.08, 1.0), 0.03, True), ((1.0, 1.08, 1.0), 0.005, False),
-     ((1.0, 1.3, 1.1), 0.2, False)],
-)  # fmt: skip
-def test_axes_are_of_one_density_within_five_per_cent_or_within_what_they_are_known_to(values, sigma, even):
-    assert _are_even([Measured(v, v, v, sigma) for v in values]) is even

@@ -1,6 +1,6 @@
 """From a log and a pose table to the filters: matching, noise from the poses, recordings."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from scipy.optimize import least_squares
 import trihedron
 from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.kalman.identified import noise_from_identified
 from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.norm_invariant import NormFilter, calibrate_without_references, start_from_range
 from trihedron.estimate.kalman.session import (
@@ -99,16 +98,6 @@ def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
     assert np.max(np.abs(difference[free] / scale[free])) < 0.01
 
 
-@pytest.mark.parametrize("run", [1, 2])
-def test_the_filter_trusts_a_session_where_calibrate_does(real_data, run):
-    recording = trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt")
-    by_fit = trihedron.calibrate(recording, gravity_m_s2=9.79871).calibration
-    by_filter = trihedron.kalman(recording, gravity_m_s2=9.79871).calibration
-    assert by_filter.is_trustworthy == by_fit.is_trustworthy == (run == 2)
-    advised = [sensor.accelerometer.observability.advice for sensor in (by_fit, by_filter)]
-    assert advised[0] == advised[1]
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -144,33 +133,6 @@ def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
         read_pose_table(path, gravity_m_s2=GRAVITY)
-
-
-@dataclass(frozen=True)
-class Identified:
-    """An axis as the identification describes it."""
-
-    name: str
-    unit: str
-    terms: dict
-    sample_sigma: float = 0.02
-    resolution: float = 0.001
-    gauss_markov: object = None
-
-    def fitted(self, symbol):
-        return self.terms.get(symbol, 0.0)
-
-
-def test_identified_noise_is_taken_in_the_raw_unit():
-    axes = [Identified("gx", "rad/s", {"N": 1.0})] + [
-        Identified(name, "m/s^2", {"N": 0.02, "K": 0.001, "R": -1e-6}) for name in ("ax", "ay", "az")
-    ]
-    in_g = noise_from_identified(axes, "g")
-    assert in_g[2].white == pytest.approx(0.02 / 9.80665)
-    assert in_g[0].ramp == pytest.approx(1e-6 / 9.80665)
-    assert noise_from_identified(axes, "m/s^2")[1] == AxisNoise(
-        white=0.02, walk=0.001, ramp=1e-6, resolution=0.001, sample_sigma=0.02
-    )
 
 
 S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])

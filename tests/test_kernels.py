@@ -81,17 +81,6 @@ def test_inside_it_is_the_slope_of_the_smoothed_signal(width):
     assert np.abs(slope - asked)[inside].max() < 0.02 * np.abs(asked).max()
 
 
-def test_a_straight_line_keeps_its_slope_between_uneven_stamps_across_pauses_and_to_the_ends():
-    width = 300.0
-    rng = np.random.default_rng(3)
-    step = rng.uniform(0.005, 0.015, 8000)
-    step[[700, 5000]] = 12.0
-    time = np.cumsum(step)
-    assert smoothed_slope(0.25 * time + 4.0, time, width) == pytest.approx(0.25, rel=1e-6)
-    # A signal shorter than a block has none.
-    assert not smoothed_slope(np.arange(5.0), np.arange(5) / 10.0, 100.0).any()
-
-
 def walked(mask):
     out, first = [], None
     for k, is_true in enumerate([*mask, False]):

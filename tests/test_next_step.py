@@ -94,27 +94,6 @@ def test_outputs_are_not_repeated():
     )
 
 
-@pytest.mark.parametrize(
-    ("code", "severity", "said"),
-    [
-        (FindingCode.COLUMNS_ASSUMED, Severity.SERIOUS, "Add poses."),
-        (FindingCode.COLUMNS_ASSUMED, Severity.WARNING, "Add poses. Then: store it."),
-        (
-            FindingCode.WEAKLY_OBSERVABLE,
-            Severity.WARNING,
-            "Add poses. Record a new log with them, then: `... NEW_LOG`.",
-        ),
-        (FindingCode.SPECTRUM_LOW_PASS, Severity.WARNING, "Store it."),
-        (FindingCode.WEAKLY_OBSERVABLE, Severity.NOTE, "Store it."),
-    ],
-)
-def test_a_warning_about_the_whole_result_is_acted_on_before_the_result_is_used(code, severity, said):
-    sections = (Section("Findings", (FindingList((Finding(code, severity, "Seen.", "", "add poses."),)),)),)
-    document = Document("A title", "", "Usable.", severity is not Severity.SERIOUS, sections, next_step="Store it.")
-    assert document.what_next == said
-    assert document.level == {"serious": "bad", "warning": "usable", "note": "good"}[severity.value]
-
-
 def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_which_replaces_its_file():
     begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
     note_log(LogSource(log=Path("my log.csv"), rate=50.0))

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from noise_series import fractional, series
+from noise_series import series
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName
 
@@ -143,27 +142,6 @@ def test_a_coarse_converter_clipping_and_a_channel_that_never_changes_are_seriou
     assert dead.axes[1].value("N") == 0.0
     assert dead.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
     assert not any(noise.is_trustworthy for noise in (coarse, clipped, dead))
-
-
-def test_ordinates_have_the_expectations_of_the_basis():
-    rng = np.random.default_rng(28)
-    n, runs = 4096, 200
-    for k, make in enumerate(
-        (
-            lambda: np.diff(rng.normal(size=n + 1)) * RATE,
-            lambda: rng.normal(size=n) * np.sqrt(RATE),
-            lambda: fractional(rng, n),
-            lambda: np.cumsum(rng.normal(size=n)) / np.sqrt(RATE),
-        )
-    ):
-        band = ordinates(make(), RATE, [(0, n)])[0]
-        mean = np.mean([ordinates(make(), RATE, [(0, n)])[0].power for _ in range(runs)], axis=0)
-        ratio = mean / band.basis[k]
-        # Chi-square with one degree of freedom: 4.5 standard errors for the first ten orders, and in octaves beyond.
-        assert np.all(np.abs(ratio[:10] - 1.0) < 4.5 * np.sqrt(2.0 / runs)), (k, ratio[:10])
-        for start in (16, 128, 1024):
-            group = ratio[start : 2 * start]
-            assert abs(group.mean() - 1.0) < 4.5 * np.sqrt(2.0 / runs / start), (k, start, group.mean())
 
 
 @pytest.mark.parametrize(

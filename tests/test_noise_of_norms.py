@@ -65,10 +65,6 @@ def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
     assert first.p_value == pytest.approx(second.p_value, rel=1e-6)
 
 
-def test_few_poses_or_poses_of_one_axis_are_not_compared():
-    assert compare_slow(session(1, 1e-3, poses=18), session(2, 1e-3)) is None
-
-
 def rolling_twin(values, width):
     n = len(values)
     width = min(width, n)

@@ -8,34 +8,13 @@ import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.domains import DomainTest
-from trihedron.report.chart import Bars, Note, Panel, Scale
+from trihedron.report.chart import Bars
 from trihedron.report.diagnosis_overview_charts import EXPLAINED, strengths_picture
 from trihedron.report.drawn import _path
 from trihedron.report.findings.grouping import combined
 from trihedron.report.findings.wording import filled
-from trihedron.report.layout import Places, _box, _covered, apart, ticks
+from trihedron.report.layout import ticks
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
-
-
-def places_of(x, y):
-    return Places(Panel(Scale("x", limits=x), Scale("y", limits=y), ()))
-
-
-def test_words_of_a_figure_stand_apart_and_inside_it():
-    """A term whose name stands on the left of its mark, and the best averaging time above the curve beside it."""
-    at = places_of((0.0, 1.0), (0.0, 1.0))
-    notes = [
-        Note(0.9, 0.5, "K < 0.000053", side="left"),
-        Note(0.75, 0.45, "237 s"),
-        Note(0.98, 0.9, "N 0.0040", side="right"),
-    ]
-    placed = apart(notes, at, 270.0)
-    boxes = [_box(n.text, n.side, 250.0 * n.x, 270.0 * (1.0 - n.y)) for n in placed]
-    for k, box in enumerate(boxes):
-        assert _covered(box, boxes[:k]) == 0.0
-        assert box[0] >= 0.0
-        assert box[2] <= 250.0
-    assert placed[0].side == "left"
 
 
 @pytest.mark.parametrize("low", [0.0031, 0.31, 5.1])

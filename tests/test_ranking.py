@@ -9,9 +9,8 @@ import pytest
 import trihedron
 from test_export import export_calibration
 from trihedron.cli import main
-from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
-from trihedron.records import FindingCode, Onboard, Severity
+from trihedron.records import FindingCode, Severity
 from trihedron.report.ranking import said_of
 
 DRIFT = FindingCode.GYRO_BIAS_DRIFT
@@ -91,21 +90,6 @@ def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
     assert not any(one.is_rejected for one in ranking.candidates)
     one = next(one for one in ranking.candidates if one.maker == "kalibr")
     assert "has no bias" in said_of(one)
-
-
-def test_parameters_of_a_board_are_judged_behind_what_it_had_done_to_the_log():
-    """A board that logged with offset 0.5 and scale 1.02: other parameters act on what it had corrected."""
-    held = {f"INS_ACCOFFS_{a}": 0.5 for a in "XYZ"} | {f"INS_ACCSCAL_{a}": 1.02 for a in "XYZ"}
-    known = Onboard("ardupilot", 0, 0, "body", {**held, "AHRS_ORIENTATION": 2.0})
-    from trihedron.files.formats.ardupilot import from_ardupilot
-
-    text = "\n".join(f"INS_ACCOFFS_{a},0.2\nINS_ACCSCAL_{a},0.98" for a in "XYZ")
-    made = as_logged(from_ardupilot(text), known)
-    R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    raw = np.random.default_rng(0).normal(0, 5, (20, 3))
-    logged = ((raw - 0.5) * 1.02) @ R.T
-    wanted = ((raw - 0.2) * 0.98) @ R.T
-    np.testing.assert_allclose(logged @ made.accelerometer.S.T + made.accelerometer.b, wanted, atol=1e-12)
 
 
 def wide(sensor):

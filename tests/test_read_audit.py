@@ -6,7 +6,6 @@ import pytest
 from test_read import HEADER, codes, finding, readings, write
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.read import ReadError, read_recording
-from trihedron.read.audit.readings import Repeats
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
@@ -134,11 +133,6 @@ def test_a_packet_counter_tells_lost_samples_and_may_wrap(modulus):
     assert found.numbers["lost_samples"] == 3
     assert found.numbers["count"] == 2
     assert found.numbers["sample"] == 300
-
-
-@pytest.mark.parametrize("n", [2, 30, 64, 65, 200])
-def test_neighbours_that_are_always_equal_are_equal_by_chance_of_one_however_few(n):
-    assert [Repeats(np.ones((n, 3))).chance(k) for k in range(4)] == [1.0] * 4
 
 
 def rows_of(table, separator=",") -> list[str]:

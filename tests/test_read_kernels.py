@@ -114,22 +114,6 @@ def test_repeated_and_missing_readings_are_found_as_row_by_row(n):
     np.testing.assert_array_equal(windows[: cut // 64], same[:cut].reshape(-1, 64, 4).sum(axis=1))
 
 
-def test_numbers_short_and_long_stand_where_they_belong():
-    cells = [
-        ["-0.5", "12345678", "+7.", ".25", "1234567.1234567"],
-        ["1e3", "-123456789.5", "0.12345678", "00", "9"],
-    ] * 50
-    text = "\n".join(",".join(row) for row in cells).encode()
-    blocks = [np.full((120, 2), np.nan), np.full((120, 3), np.nan)]
-    places = [(1, 2), (0, 0), (1, 0), (0, 1), (1, 1)]
-    found = _core.plain_table_into(np.frombuffer(text, np.uint8), ord(","), places, blocks)
-    assert found == (100, True)
-    expected = np.array(cells, dtype=float)
-    for column, (block, place) in enumerate(places):
-        np.testing.assert_array_equal(blocks[block][:100, place], expected[:, column])
-        assert np.isnan(blocks[block][100:, place]).all()
-
-
 WITH_GAPS = [np.nan, np.inf, -0.0, 0.0]
 
 
@@ -180,43 +164,6 @@ def test_phase_power_is_the_transform_of_shared_stamps():
     assert length == fft.next_fast_len(290_001, real=True)
     # Both transforms are good to some 1e-16 of their largest value, which is one.
     np.testing.assert_allclose(power, phase_power_twin(windows, 0.01 / 32, length), rtol=0.0, atol=1e-14)
-
-
-def test_direct_power_is_the_squared_mean_of_exponentials():
-    timestamps = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 512))
-    frequency = 3.0 + 0.01 * np.arange(41)
-    twin = np.abs(np.exp(2j * np.pi * np.outer(frequency, timestamps)).mean(axis=1)) ** 2
-    # Forty turns one after the other gather forty roundings.
-    np.testing.assert_allclose(_core.direct_power(timestamps, 3.0, 0.01, 41), twin, rtol=0.0, atol=1e-13)
-
-
-def test_statistics_of_windows_are_those_of_numpy():
-    readings = np.random.default_rng(4).normal(9.8, 0.1, (1000, 3))
-    starts = np.array([0, 100, 950])
-    block = readings[starts[:, None] + np.arange(50)]
-    mean, noise, spread = _core.window_statistics(readings, starts, 50)
-    np.testing.assert_allclose(mean, block.mean(axis=1), rtol=1e-14)
-    np.testing.assert_allclose(noise, np.diff(block, axis=1).std(axis=1) / np.sqrt(2.0), rtol=1e-12)
-    np.testing.assert_allclose(spread, np.linalg.norm(block.std(axis=1), axis=1), rtol=1e-12)
-    readings[120, 1] = np.nan
-    assert _core.window_statistics(readings, starts, 50) is None
-    assert _core.window_statistics(readings, np.array([980]), 50) is None
-
-
-def test_lengths_in_windows_and_means_of_blocks_are_those_of_numpy():
-    readings = np.random.default_rng(5).normal(3.0, 2.0, (1000, 3))
-    np.testing.assert_array_equal(
-        _core.block_mean_readings(readings, 7, 140), readings[:980].reshape(140, 7, 3).mean(axis=1)
-    )
-    starts = np.array([0, 100, 950])
-    readings[120, 1] = np.nan
-    lengths = np.linalg.norm(readings[starts[:, None] + np.arange(50)], axis=2)
-    assert _core.median_length(readings, starts, 50) == np.nanmedian(lengths)
-    assert np.isnan(_core.median_length(np.full((9, 3), np.nan), np.array([0]), 9))
-    with pytest.raises(ValueError, match="windows must lie"):
-        _core.median_length(readings, np.array([980]), 50)
-    with pytest.raises(ValueError, match="blocks must hold rows"):
-        _core.block_mean_readings(readings, 7, 143)
 
 
 def written(rng: np.random.Generator) -> str:

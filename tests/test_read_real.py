@@ -99,19 +99,6 @@ def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_d
         assert stuck == []
 
 
-def test_imucal_ferraris_units_and_missing_rate(real_data):
-    path = real_data / "imucal_ferraris" / "example_ferraris_session.csv"
-    recording = read_recording(path)
-    written = np.loadtxt(path, delimiter=",", skiprows=1)
-    np.testing.assert_array_equal(recording.gyroscope, written[:, 1:4])
-    np.testing.assert_array_equal(recording.accelerometer, written[:, 4:])
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    assert recording.gyroscope_unit is RateUnit.DEG_S
-    assert list(recording.auxiliary) == ["n_samples"]
-    assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
-    assert read_recording(path, rate_hz=102.4).gyroscope_unit is RateUnit.DEG_S
-
-
 @pytest.mark.parametrize(
     ("name", "n", "clipped"),
     [

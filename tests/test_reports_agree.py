@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.diagnose.session.observations import observe
 from trihedron.records import FindingCode
 from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
@@ -16,7 +15,6 @@ from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.verification import verification_report
-from trihedron.segment import resegment
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from written_session import G, simulated, usual
 
@@ -29,19 +27,6 @@ def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
     document = verification_report(checked.verification, checked.segments)
     moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
     assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
-
-
-def test_a_pose_cut_where_it_was_bumped_keeps_its_number():
-    recording, result, _ = usual()
-    segments = result.segments
-    pose = segments.poses[4]
-    middle = (pose.start + pose.stop) // 2
-    bumped = replace(pose, disturbed=((middle, middle + 10),))
-    cut = resegment(recording, replace(segments, poses=(*segments.poses[:4], bumped, *segments.poses[5:])))
-    obs = observe(recording, cut)
-    assert cut.n_poses == segments.n_poses + 1
-    assert obs.pose_names(range(3, 8)) == ("pose 4", "pose 5", "pose 5", "pose 6", "pose 7")
-    assert obs.move_names(range(3, 6)) == ("move 4", "a disturbance in pose 5", "move 5")
 
 
 def test_a_domain_agrees_exactly_up_to_the_limit_of_its_figure_and_is_never_named_by_its_id():

@@ -5,16 +5,12 @@ import numpy as np
 from confidence.motion import G
 from confidence.sensor import recorded
 from confidence.sessions import hand
-from trihedron import _core, diagnose
+from trihedron import diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.records import Recording
-from trihedron.session.noise import expected_scatter
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
-
-RATE_HZ, POSES, POSE, MOVE = 100.0, 18, 400, 200
-UP = np.tile([0.6, 0.0, 0.8], (POSES, 1))
 
 
 def test_the_zero_of_a_session_is_that_of_its_middle():
@@ -45,33 +41,6 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
         away.append(found.accelerometer.b + drift * middle)
     # A third of what the bias of the first pose is away.
     assert np.sqrt(np.mean(np.square(away))) < drift / 2 / 3
-
-
-def noisy(rng, flicker, white=1.0):
-    """(n, 3) readings of white noise (1/√Hz) and a flicker of density h/f, and the ranges of the poses."""
-    n = POSES * (POSE + MOVE)
-    f = np.fft.rfftfreq(2 * n, 1.0 / RATE_HZ)
-    gain = np.zeros_like(f)
-    gain[1:] = np.sqrt(flicker / f[1:])
-    spectrum = np.fft.rfft(rng.normal(size=(2 * n, 3)) * np.sqrt(RATE_HZ), axis=0) * gain[:, np.newaxis] / np.sqrt(2.0)
-    slow = np.fft.irfft(spectrum, 2 * n, axis=0)[:n]
-    starts = np.arange(POSES) * (POSE + MOVE)
-    readings = slow + white * np.sqrt(RATE_HZ) * rng.normal(size=(n, 3))
-    return readings, np.stack([starts, starts + POSE], axis=1), slow
-
-
-def test_flicker_inside_poses_says_how_far_zeros_scatter_between_them():
-    rng = np.random.default_rng(5)
-    said, true = [], []
-    for _ in range(60):
-        readings, spans, slow = noisy(rng, flicker=1.0)
-        said.append(expected_scatter(readings, spans, UP))
-        means, _ = _core.means_by_owner(slow, spans, np.arange(POSES), POSES)
-        true.append(np.std(means @ UP[0], ddof=1))
-    # Eighteen differences of halves show a size to 17 %; in 60 sessions one standard error of the mean ratio is 3 %.
-    assert 0.8 < np.sqrt(np.mean(np.square(said))) / np.sqrt(np.mean(np.square(true))) < 1.25
-    # Halves differ by 2.2 times what eighths lead to expect; fewer than a sixth of eighteen come out below 1.3.
-    assert np.mean(np.array(said) > 0.0) > 0.7
 
 
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():

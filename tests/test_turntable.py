@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from confidence.sensor import Truth as ConfidenceTruth
 from confidence.sensor import lower
-from trihedron import calibrate, diagnose, segment, verify
-from trihedron.estimate.gyroscope.turntable import with_own_residuals
+from trihedron import calibrate, segment
 from trihedron.records import Recording
 
 G, RATE_HZ, DEG = 9.81, 100.0, np.pi / 180.0
@@ -105,28 +104,3 @@ def test_another_number_of_speeds_is_refused_with_the_turns_that_were_found(tabl
         calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0])
     with pytest.raises(ValueError, match="leave them, or the reference, out"):
         calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0], reference=recording)
-
-
-def test_steady_turns_of_a_table_are_no_end_of_the_gyros_range():
-    # Every turn has another arm: rest after it is contradicted, gravity is not.
-    recording, _ = on_a_table(3, [45.0, 90.0, 180.0] * 2, arm_m=0.05)
-    result = diagnose(recording, gravity_m_s2=G)
-    assert "gyro-saturation" not in [effect.id for effect in result.effects]
-
-
-def test_residuals_are_those_of_the_s_and_b_that_are_saved(table):
-    recording, segments, _ = table
-    plain = calibrate(recording, segments=segments, gravity_m_s2=G)
-    result = calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0] * 4)
-    # The session's own definition: recomputed at its own S and b it is the same.
-    again = with_own_residuals(plain.calibration, recording, segments, 0.0)
-    for sensor in ("accelerometer", "gyroscope"):
-        ours, theirs = (getattr(one, sensor).quality for one in (again, plain.calibration))
-        np.testing.assert_allclose(ours.residual, theirs.residual, atol=1e-9)
-        assert ours.rms_dof == pytest.approx(theirs.rms_dof)
-    judged = verify(result.calibration, recording, segments=segments, gravity_m_s2=G).verification
-    np.testing.assert_allclose(result.accelerometer.quality.residual, judged.norm_error, atol=1e-12)
-    np.testing.assert_allclose(result.gyroscope.quality.angle_deg[judged.moves], judged.angle_deg, atol=1e-9)
-    # The optimum of the moves alone misses them less; what it predicts held out is no figure of this one.
-    assert result.gyroscope.quality.chi2 > plain.gyroscope.quality.chi2
-    assert result.gyroscope.quality.held_out is None
