@@ -22,8 +22,6 @@ from pathlib import Path
 
 import rival_paths  # noqa: F401
 
-ROOT = Path(__file__).parents[1]
-
 
 @dataclass(frozen=True)
 class Subject:

@@ -3,25 +3,10 @@
 Every process is a path on a fine clock; a pose's two numbers are averages of path plus white noise over its halves.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from trihedron import _core
-
-
-@dataclass(frozen=True, eq=False)
-class Zeros:
-    """Half-means (3, 2h), their stated errors, times, pose numbers, verticals (2h, 3), temperature (2h,)."""
-
-    values: np.ndarray
-    sigma: np.ndarray
-    time_s: np.ndarray
-    length_s: np.ndarray
-    pose: np.ndarray
-    up: np.ndarray
-    temperature: np.ndarray
 
 
 def dense_covariance(t, length, pose, variance, direction, strengths):

@@ -9,7 +9,6 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 import trihedron
 from following_hand import FollowingHand
@@ -183,37 +182,22 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium or Chrome on this machine to look at the page with")
-def test_a_real_browser_shows_the_guide(led, tmp_path):
-
+def test_a_real_browser_shows_the_guide(led):
     sync_playwright = pytest.importorskip("playwright.sync_api").sync_playwright
-    _, views, _, _ = led
-    view = next(v for v in views if v.phase is Phase.MOVE and v.n_poses > 9)
+    view = next(v for v in led[1] if v.phase is Phase.MOVE and v.n_poses > 9)
     page = Page()
     page.show(view, lost=3)
-    shot = tmp_path / "page.png"
     try:
         with sync_playwright() as tool:
             browser = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            screen = browser.new_page(viewport={"width": 1280, "height": 800})
+            screen, faults = browser.new_page(viewport={"width": 390, "height": 844}), []
+            screen.on("pageerror", lambda error: faults.append(str(error)))
             screen.goto(page.address)
             # The view comes by the stream of events, after the page.
             screen.wait_for_function(f"document.getElementById('big').textContent.startsWith('{view.n_poses}')")
-            screen.wait_for_timeout(500)
-            screen.screenshot(path=shot)
-            screen.set_viewport_size({"width": 390, "height": 844})
+            assert faults == []
             table, foot = (screen.query_selector(part).bounding_box() for part in ("table", "footer"))
             assert foot["y"] >= table["y"] + table["height"] - 1.0, "on a phone nothing covers the table"
             browser.close()
     finally:
         page.close()
-    image = imread(shot)[..., :3]
-    paper = image[2, 2]
-    inked = np.abs(image - paper).max(axis=2) > 0.2
-    assert inked[:200].mean() > 0.02, "the instruction in large letters"
-    canvas = image[280:740, 40:740]
-    # The board and the poses are greens of their own: more green than red and blue by a good part.
-    green = (canvas[..., 1] > canvas[..., 0] + 0.1) & (canvas[..., 1] > canvas[..., 2] + 0.02)
-    assert 0.03 < green.mean() < 0.6, "the board turning in the middle of the sphere"
-    orange = (canvas[..., 0] > canvas[..., 2] + 0.15) & (canvas[..., 0] > canvas[..., 1] + 0.08)
-    assert orange.sum() > 100, "the ring of the next pose"
-    assert inked[250:740, 780:].mean() > 0.03, "the error bars"

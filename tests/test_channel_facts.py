@@ -52,20 +52,6 @@ def test_readings_on_no_grid_have_no_step_and_resampled_ones_none_that_matters(s
     assert adc_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
 
 
-def test_codes_that_were_not_visited_leave_the_step_as_it_is():
-    rng = np.random.default_rng(3)
-    assert adc_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
-    codes = np.round(session(4, sigma=2.0))
-    assert adc_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
-    few = np.round(0.2 * rng.normal(size=3000))  # static: two or three codes
-    assert adc_step(0.02 * few) == pytest.approx(0.02)
-    assert adc_step(np.zeros(1000)) == 0.0
-    assert adc_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
-    # One code in two spellings is one code.
-    single = codes.astype(np.float32) * np.float32(SCALE)
-    assert adc_step(np.where(rng.random(8000) < 0.5, single.astype(float), codes * SCALE)) == pytest.approx(SCALE, 1e-3)
-
-
 def test_a_recording_carries_its_facts_and_another_has_its_own():
     counts = np.round(np.column_stack([session(k, sigma=2.0) for k in range(3)]))
     recording = Recording(np.arange(8000) / 100.0, counts, None, 100.0)

@@ -11,10 +11,7 @@ import trihedron
 from trihedron.comparison.frames import carried_gravity, sign_of_gravity
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
-from trihedron.estimate.noise.slow import PoseBiases
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-
-N, POSE_S, GAP_S = 9e-5, 4.5, 2.0
 
 
 def model(accel_size, gyro_size, units=("m/s^2", "rad/s")):
@@ -89,23 +86,3 @@ def test_gravity_of_the_other_sign_is_said_pose_by_pose_and_only_of_one_protocol
     assert sign_of_gravity((segments, known), (segments, known)) is None
     other = simulate(replace(scenario_by_name("hand-session"), motion=hand_session(10, pose_s=2.0, layout=9)), 5)[0]
     assert sign_of_gravity((trihedron.segment(other), known), (segments, known)) is None
-
-
-def zeros(seed, walk, flicker=0.0, poses=16):
-    """Three axes of pose means made sample by sample: white noise, a walk, and a chain of 1/f by octaves."""
-    rng = np.random.default_rng(seed)
-    rate = 20.0
-    n, every, length = int(poses * (POSE_S + GAP_S) * rate), int((POSE_S + GAP_S) * rate), int(POSE_S * rate)
-    out = []
-    for _ in range(3):
-        x = N * np.sqrt(rate) * rng.standard_normal(n) + walk / np.sqrt(rate) * np.cumsum(rng.standard_normal(n))
-        if flicker:
-            density = flicker**2 / (2.0 * np.pi * np.maximum(np.fft.rfftfreq(4 * n, 1.0 / rate), 0.25 * rate / n))
-            phase = rng.standard_normal((2, len(density)))
-            spectrum = np.sqrt(density * rate * 4 * n / 2.0) * (phase[0] + 1j * phase[1])
-            x = x + np.fft.irfft(spectrum, 4 * n)[:n]
-        means = np.array([x[k * every : k * every + length].mean() for k in range(poses)])
-        t = np.arange(poses) * (POSE_S + GAP_S)
-        sigma = np.full(poses, N / np.sqrt(POSE_S))
-        out.append(PoseBiases(means - means.mean(), sigma, t, np.full(poses, POSE_S)))
-    return out

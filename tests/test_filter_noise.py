@@ -180,18 +180,6 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
         assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
 
 
-def test_axes_that_differ_are_written_where_a_consumer_has_one_for_each(found):
-    whole = both(found)
-    axes = tuple(Bounded(n, 0.9 * n, 1.1 * n) for n in (1e-3, 2e-3, 3e-3))
-    unlike = replace(whole, sensors=(whole.sensors[0], replace(whole.sensors[1], axes_N=axes)))
-    assert json.loads(filter_noise_text(unlike, "basalt"))["value0"]["accel_noise_std"] == [1e-3, 2e-3, 3e-3]
-    assert "setAccelerometerCovariance(np.diag([1.0e-06, 4.0e-06, 9.0e-06]))" in filter_noise_text(unlike, "gtsam")
-    assert yaml.safe_load(filter_noise_text(unlike, "robot_localization"))["linear_acceleration_covariance"][4] == (
-        pytest.approx(4e-6 * unlike.rate_hz)
-    )
-    assert "accelerometer N of X, Y, Z" in filter_noise_text(unlike, "kalibr")
-
-
 def resting(seed=1, seconds=120, n=N):
     rng = np.random.default_rng(seed)
     m = 100 * seconds

@@ -8,7 +8,6 @@ import pytest
 
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
-from trihedron.estimate.known_vectors import KnownVectors, fit_known
 from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import codes, segments_from_truth, z_scores
@@ -126,23 +125,6 @@ def test_malformed_turns_are_refused():
     ):
         with pytest.raises(ValueError, match=words):
             calibrate_turns(recording, given, still)
-
-
-def test_errors_that_all_turns_share_are_of_the_scale_as_a_whole_and_are_not_averaged_by_more_turns():
-    # All axes turned by one small rotation e change every turn by e x phi: the scale by S [e]x, however many.
-    S_w = np.diag([1.0, 0.9, 1.1]) + 0.02
-    e = np.array([2e-4, -1e-4, 3e-4])
-    for repeats in (1, 10):
-        angles = 2.0 * np.pi * np.tile(np.concatenate([np.eye(3), -np.eye(3)]), (repeats, 1))
-        n = len(angles) + 1
-        vectors = np.append(angles, np.zeros((1, 3)), axis=0)
-        times, noise = np.append(np.full(n - 1, 3.0), 1.0), np.tile(1e-10 * np.eye(3), (n, 1, 1))
-        rows = KnownVectors(vectors @ S_w.T, vectors, times, noise, np.zeros((n, 3, 0)))
-        with_error = replace(rows, shared=(np.cross(e, vectors) @ S_w.T)[:, :, None])
-        added = fit_known(with_error).covariance - fit_known(rows).covariance
-        skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-        pull = np.append((S_w @ skew).ravel(), np.zeros(3))
-        np.testing.assert_allclose(added, np.outer(pull, pull), rtol=1e-6, atol=1e-15)
 
 
 def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.0, -180.0), rate_hz=100.0):

@@ -166,12 +166,6 @@ def test_marks_tell_their_value_a_figure_zooms_and_a_table_is_sorted_and_all_ret
     assert page.inner_text(ticks) != before
     page.click("#residuals .tools button[aria-label^='Whole figure']")
     assert page.get_attribute(svg, "viewBox") == whole
-    page.query_selector("#moves").scroll_into_view_if_needed()
-    box = page.query_selector("#moves .plot").bounding_box()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.9 * box["height"])
-    assert re.search(r"move \d+ .*°", page.inner_text("#tip"))
-    page.locator(".cell").first.hover()
-    assert re.fullmatch(r"[aw] \S+ and [aw] \S+: [+−][01]\.\d\d", page.inner_text("#tip"))
     page.query_selector("summary:has-text('of every pose')").click()
     table = page.query_selector("details[open] table")
     cells = "(t) => [...t.tBodies[0].rows].map((r) => r.cells[4].textContent)"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import fft, ndimage
+from scipy import fft
 
 from trihedron import _core
 from trihedron.read import read_recording
@@ -37,50 +37,6 @@ def test_steps_are_counted_and_their_median_found_as_by_sorting(n):
         np.testing.assert_allclose(numbers, [inside.sum(), inside.std(), inside.min(), inside.max()], rtol=1e-11)
 
 
-@pytest.mark.parametrize(("n", "width"), [(3, 8), (8, 8), (100, 7), (100_000, 38), (1003, 100)])
-def test_the_earliest_of_every_block_takes_in_what_is_left_over(n, width):
-    late = np.random.default_rng(n).standard_normal(n).round(1)  # ties: the first counts
-    blocks = max(n // width, 1)
-    expected = [k * width + int(late[k * width : (k + 1) * width].argmin()) for k in range(blocks)]
-    rest = late[blocks * width :]
-    if len(rest) and rest.min() < late[expected[-1]]:
-        expected[-1] = blocks * width + int(rest.argmin())
-    if n - expected[-1] > width:
-        expected.append(n - width // 2 + int(late[-(width // 2) :].argmin()))
-    np.testing.assert_array_equal(_core.earliest_timestamps(late, width), expected)
-
-
-@pytest.mark.parametrize("kind", [np.int32, np.int64])
-def test_an_even_clock_is_laid_and_left_as_its_formula_says(kind):
-    rng = np.random.default_rng(3)
-    n, period = 150_001, 0.0051
-    tick = np.cumsum(rng.integers(1, 3, n)).astype(kind)
-    time = period * tick + 1e-4 * rng.standard_normal(n)
-    late = np.empty(n)
-    _core.timestamp_lateness(time, tick, period, late)
-    np.testing.assert_array_equal(late, tick * -period + time)
-    _core.timestamp_lateness(time, None, period, late)
-    np.testing.assert_array_equal(late, np.arange(n) * -period + time)
-    late = time - period * tick
-    cut = n // 38 * 38
-    np.testing.assert_array_equal(_core.block_medians(late[:cut], 38), np.median(late[:cut].reshape(-1, 38), axis=1))
-    np.testing.assert_array_equal(_core.block_mean_ticks(tick[:cut], 38), tick[:cut].reshape(-1, 38).mean(axis=1))
-    even = np.empty(n)
-    _core.lay_even_clock(tick, (2.0, -1.0), 10.0, 7.0, period, even)
-    np.testing.assert_allclose(even, 2.0 * ((tick - 10.0) / 7.0) - 1.0 + period * tick, rtol=1e-15)
-
-
-def test_a_line_passes_over_points_that_are_far_off():
-    rng = np.random.default_rng(8)
-    u = np.sort(rng.uniform(-1, 1, 5000))
-    y = 3.0 * u - 2.0 + 1e-3 * rng.standard_normal(5000)
-    clean = np.polyfit(u, y, 1)
-    far = rng.random(5000) < 0.1
-    y[far] += rng.uniform(1.0, 5.0, far.sum())
-    # 4500 points of 1e-3 leave 1e-3 / √4500 · √3 of slope: five of that.
-    np.testing.assert_allclose(_core.robust_line(u, y), clean, atol=1.3e-4)
-
-
 def triad(n: int, seed: int) -> np.ndarray:
     """Readings that repeat, stop, clip and miss."""
     rng = np.random.default_rng(seed)
@@ -112,36 +68,6 @@ def test_repeated_and_missing_readings_are_found_as_row_by_row(n):
     assert (missing, first) == (len(bad), int(bad[0]) if len(bad) else None)
     cut = (n - 1) // 64 * 64
     np.testing.assert_array_equal(windows[: cut // 64], same[:cut].reshape(-1, 64, 4).sum(axis=1))
-
-
-WITH_GAPS = [np.nan, np.inf, -0.0, 0.0]
-
-
-@pytest.mark.parametrize("kind", ["codes", "scaled codes", "all different", "none", "many, then few"])
-def test_levels_are_the_sorted_different_numbers(kind):
-    rng = np.random.default_rng(3)
-    readings = {
-        "codes": rng.integers(-300, 300, 20_000).astype(float),
-        "scaled codes": rng.integers(0, 65_536, 20_000) * 1.221e-4 - 3.0,
-        "all different": rng.normal(size=150_000),
-        "none": np.zeros(0),
-        "many, then few": np.concatenate([rng.normal(size=70_000), np.zeros(50_000)]),
-    }[kind]
-    readings = np.concatenate([readings, WITH_GAPS])
-    triad = np.stack([readings, readings + 1.0, readings], axis=1)
-    finite = readings[np.isfinite(readings)]
-    for column in (readings, triad[:, 0], readings[::-1]):
-        levels, n = _core.levels_of(column)
-        assert n == len(finite)
-        np.testing.assert_array_equal(levels, np.unique(finite))
-
-
-@pytest.mark.parametrize("size", [1, 5, 65, 401])
-@pytest.mark.parametrize("n", [1, 7, 500])
-def test_a_running_median_is_that_of_scipy(size, n):
-    values = np.random.default_rng(size + n).normal(size=n).round(1)
-    twin = ndimage.median_filter(values, size, mode="nearest")
-    np.testing.assert_array_equal(_core.running_median(values, size), twin)
 
 
 def phase_power_twin(windows, cell, length):

@@ -7,10 +7,9 @@ import pytest
 
 from formats.table import LAYOUTS, read_layout, verdict
 from makers.structured import documents, drive
-from test_read_in_silence import motion, table
+from test_read_in_silence import motion
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Severity
-from trihedron.units import AccelerationUnit, RateUnit
 
 
 @pytest.mark.parametrize("separator", [" ", ","])
@@ -47,16 +46,6 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
         read_recording(tmp_path / "bad")
 
 
-def test_whole_numbers_of_json_beyond_a_double_are_no_clock(tmp_path):
-    _, force, rate = motion(n_poses=3)
-    edge = documents(np.arange(len(force)) / 100.0, force, rate)["edge"]
-    edge["payload"] |= {"interval_ms": int("9" * 400)}
-    edge["payload"]["values"].insert(9, None)
-    (tmp_path / "edge").write_text(json.dumps(edge))
-    recording = read_recording(tmp_path / "edge", rate_hz=100.0)
-    assert recording.rows_in_file == len(force) + 1
-
-
 def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     t, force, rate = motion(n_poses=3)
     lines, messages = [], []
@@ -82,17 +71,6 @@ def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
     assert folder.rate_hz == pytest.approx(100.0)
     np.testing.assert_allclose(folder.time_s - folder.time_s[0], t - t[0], atol=1e-6)
     assert read_recording(oxts / "data").rows_read == folder.rows_read
-
-
-def test_names_of_several_words_two_blanks_apart_are_names(tmp_path):
-    columns = table(*motion())
-    names = ["t [s]", *(f"{s} {a} ({u})" for s, u in (("Accel", "m/s^2"), ("Rate", "rad/s")) for a in "XYZ")]
-    log = tmp_path / "log.txt"
-    rows = ["  ".join(f"{x:.6f}" for x in row) for row in zip(*columns, strict=True)]
-    log.write_text("\n".join(["  ".join(names), *rows]) + "\n")
-    recording = read_recording(log)
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    assert recording.gyroscope_unit is RateUnit.RAD_S
 
 
 @pytest.mark.parametrize(

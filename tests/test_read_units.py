@@ -7,7 +7,6 @@ import pytest
 
 import trihedron
 from test_read import HEADER, codes, finding, write
-from trihedron.channel_facts.quiet import is_integer
 from trihedron.read import read_recording
 from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
@@ -124,19 +123,6 @@ def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
     noise = np.random.default_rng(6).standard_normal((500, 6))
     recording = read_recording(write(tmp_path / "log.txt", noise, "", separator=" "), rate_hz=RATE_HZ)
     assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.SERIOUS
-
-
-def test_whole_numbers_are_told_wherever_the_one_that_is_none_stands():
-    """In pieces as all at once: an odd number in the last row of a piece or the first of the next is seen."""
-    for n in (1, 2047, 2048, 2049, 5000):
-        counts = np.arange(3.0 * n).reshape(n, 3)
-        assert is_integer(counts)
-        for row in {0, n // 2, n - 1, min(2048, n - 1)}:
-            for odd, whole in ((0.5, False), (np.nan, True), (np.inf, True)):
-                changed = counts.copy()
-                changed[row, 1] = odd
-                assert is_integer(changed) is whole
-    assert not is_integer(np.full((5000, 3), np.nan))
 
 
 # Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two
