@@ -124,6 +124,7 @@ class SilentHandler(SimpleHTTPRequestHandler):
         pass
 
 
+@pytest.mark.slow
 def test_nothing_of_the_site_is_loaded_from_elsewhere(site):
     elsewhere = re.compile(r"""(?:src|href)="(?:https?:)?//[^"]+\.(?:js|css|woff2?)\"""")
     assert not [page for page in site[0].rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]
