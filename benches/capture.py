@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
-from board import Board, counts_recording
+from board import DECLARED, Board, counts_recording
 from trihedron.api.capturing import column_namer
 from trihedron.capture.account import Count
 from trihedron.capture.protocols import decoder_factory
@@ -30,14 +30,6 @@ from trihedron.files.frame_declaration import FrameDeclaration, read_frame_decla
 from trihedron.simulate.device.faults import Sent, parse_faults
 from trihedron.simulate.device.serving import Device, PseudoTerminal, serve
 
-DECLARED = """
-sync = "AA 55"
-[checksum]
-kind = "crc16-ccitt"
-[[field]]
-name = "counter"
-type = "u16"
-""" + "".join(f'[[field]]\nname = "{name}"\ntype = "i16"\n' for name in ("ax", "ay", "az", "gx", "gy", "gz"))
 # What the board speaks, what it is read as, and the rate it pretends to: 115 200 baud and more.
 BOARDS = {
     "xsens-mtdata2": ("xsens-mtdata2", 400.0), "xio": ("xio", 1000.0), "xio-text": ("xio", 400.0),

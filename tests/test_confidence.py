@@ -36,11 +36,7 @@ def test_stated_turns_on_faces_win_over_a_wrong_nominal_scale_and_unstated_ones_
     f, w, rate, truth, motion = table(7, turns=(180.0, -180.0))
     stated = [angle for _, _, angle in motion.turns]
     result = calibrate(
-        recorded(f, w, rate),
-        gravity_m_s2=G,
-        method="faces",
-        turns_deg=stated,
-        gyroscope_nominal=2.0 * truth.S_w[0, 0],
+        recorded(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=stated, gyroscope_nominal=2.0 * truth.S_w[0, 0]
     )
     z, relative = gyro_z(result, truth)
     assert np.abs(z).max() < 4.0

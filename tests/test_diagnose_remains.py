@@ -162,10 +162,7 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree():
     assert 0.5 < found.rate_rad_s * found.tau_s / 0.006 < 2.0
     before, after = (
         {one.domain: one for one in judge_rows(fitted, 0.01)}
-        for fitted in (
-            context.fitted,
-            tune_noise(with_settling(context, found), context.fitted.state, None),
-        )
+        for fitted in (context.fitted, tune_noise(with_settling(context, found), context.fitted.state, None))
     )
     # Of ten sessions χ² of the moves fell to 0.43 to 0.64; in three of them it then agreed with the noise.
     assert before["moves"].disagrees

@@ -14,12 +14,7 @@ import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.api.filter_noising import noticed
 from trihedron.estimate.filter_noise.angle import bias_steps
-from trihedron.estimate.filter_noise.beside_reference import (
-    ANGLE,
-    independent_or_not,
-    informed,
-    parts_of,
-)
+from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
 from trihedron.estimate.filter_noise.strengths import Prior, fit
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text

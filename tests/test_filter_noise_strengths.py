@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 from test_filter_noise import SLOW, TAU, K, N, drawn
-from trihedron.estimate.filter_noise.strengths import (
-    Prior,
-    _slope,
-    height,
-    most_likely,
-)
+from trihedron.estimate.filter_noise.strengths import Prior, _slope, height, most_likely
 from trihedron.estimate.filter_noise.velocity import velocity_stretches
 
 

@@ -12,11 +12,7 @@ from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.kalman.model import shaping_model
 from trihedron.estimate.kalman.norm_invariant import calibrate_without_references
-from trihedron.estimate.kalman.session import (
-    calibrate_session,
-    noise_from_poses,
-    pose_readings,
-)
+from trihedron.estimate.kalman.session import calibrate_session, noise_from_poses, pose_readings
 from trihedron.read import ReadError, read_pose_table
 from trihedron.records import AxisNoise, FindingCode, PoseTable
 from trihedron.segment import segment_recording
@@ -29,11 +25,7 @@ B_TRUE = np.array([0.2, -0.3, 0.1])
 
 
 def head_session(seed):
-    accelerometer = Accelerometer(
-        S=tuple(map(tuple, S_TRUE)),
-        b=tuple(B_TRUE),
-        noise=NoiseTerms(N=(0.005,) * 3),
-    )
+    accelerometer = Accelerometer(S=tuple(map(tuple, S_TRUE)), b=tuple(B_TRUE), noise=NoiseTerms(N=(0.005,) * 3))
     recording = simulate(Scenario(motion=dividing_head(), accelerometer=accelerometer), seed=seed)[0]
     return recording, segment_recording(recording)
 

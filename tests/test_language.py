@@ -61,11 +61,6 @@ RETIRED = {
     r"\bwalking bias(es)?\b|\bbias(es)?( that)? walks?\b": "bias random walk",
     r"(?-i:\b(gyro|accelerometer|about|along|axis|axes) [xyz]\b(?![\w'′_^])|(?<!w, )\bx, y,? (and )?z\b)": "X, Y, Z",
 }
-ALLOWED = {
-    "docs/model.md": r"\binstrument trihedron\b",
-    "docs/tutorials/laboratory.md": r"\binstrument trihedron\b",
-}
-"""Where the word is the subject: the manual's own name beside ours, once."""
 
 
 def retired(text: str, words: dict[str, str] = RETIRED) -> list[str]:
@@ -151,7 +146,7 @@ def pages() -> Said:
         text = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         text = re.sub(r"^ +(trihedron|from|import) .*$", "", text, flags=re.MULTILINE)
         text = re.sub(r"`[^`\n]*`|\]\([^)]*\)|\$[^$\n]*\$", "", text)
-        yield name, re.sub(ALLOWED[name], "", text) if name in ALLOWED else text
+        yield name, text
     for page in (ROOT / "docs").rglob("*.ipynb"):
         cells = json.loads(page.read_text(encoding="utf-8"))["cells"]
         said = "\n".join("".join(cell["source"]) for cell in cells)

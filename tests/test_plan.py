@@ -8,11 +8,7 @@ import pytest
 
 from trihedron.cli import main
 from trihedron.estimate.gyroscope.turn_angles import Turn
-from trihedron.estimate.gyroscope.turn_design import (
-    PlannedMove,
-    design_moves,
-    design_turns,
-)
+from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import Recording
 

@@ -100,11 +100,7 @@ def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_d
 
 
 @pytest.mark.parametrize(
-    ("name", "n", "clipped"),
-    [
-        ("tomi_example_data_calibration", 10245, True),
-        ("tomi_imu_static_test", 9986, False),
-    ],
+    ("name", "n", "clipped"), [("tomi_example_data_calibration", 10245, True), ("tomi_imu_static_test", 9986, False)]
 )
 def test_mpu6050_tomi_preamble_and_clipping(real_data, name, n, clipped):
     recording = read_recording(real_data / "mpu6050_tomi" / f"{name}.csv")

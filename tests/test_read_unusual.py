@@ -17,12 +17,7 @@ def accounts(recording) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("header", "end"),
-    [
-        ("t,ax,ay,az,gx,gy,gz,note,label\n", ",,"),
-        ("t,ax,ay,az,gx,gy,gz,,\n", ",,"),
-        ("", ",,,"),
-    ],
+    ("header", "end"), [("t,ax,ay,az,gx,gy,gz,note,label\n", ",,"), ("t,ax,ay,az,gx,gy,gz,,\n", ",,"), ("", ",,,")]
 )
 def test_columns_that_are_empty_throughout_leave_the_names_of_the_others_alone(tmp_path, header, end):
     table = readings(ROWS)

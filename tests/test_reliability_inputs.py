@@ -24,11 +24,7 @@ from trihedron.read import ReadError, open_chunks, read_recording
 from trihedron.sanitise import escaped, escaped_json
 from trihedron.simulate.scenario_file import read_scenario
 
-READERS = [
-    (read_calibration, CalibrationFileError),
-    (read_noise, NoiseFileError),
-    (read_scenario, ValueError),
-]
+READERS = [(read_calibration, CalibrationFileError), (read_noise, NoiseFileError), (read_scenario, ValueError)]
 
 
 @pytest.mark.parametrize(("reader", "error"), READERS)

@@ -8,14 +8,7 @@ import pytest
 from trihedron.api.reading import read
 from trihedron.cli import main
 from trihedron.files.truth import truth_document, write_truth
-from trihedron.simulate import (
-    Pose,
-    Turn,
-    profile_by_name,
-    read_scenario,
-    scenario_by_name,
-    simulate,
-)
+from trihedron.simulate import Pose, Turn, profile_by_name, read_scenario, scenario_by_name, simulate
 
 EXAMPLE = """
 name = "bench"
