@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import formats.session
 import trihedron
 from test_read import HEADER, codes, finding, write
 from trihedron.read import read_recording
@@ -16,26 +17,9 @@ RATE_HZ = 100.0
 
 
 def session(n_poses=6, turn_s=1.0):
-    """time [s] (n,), specific force [m/s^2] (n, 3), rate [rad/s] (n, 3): 2 s holds joined by random turns."""
-    rng = np.random.default_rng(3)
-    f = np.array([0.0, 0.0, 9.81])
-    force, rate = [], []
-    for _ in range(n_poses):
-        force += [f] * 200
-        rate += [np.zeros(3)] * 200
-        axis = np.cross(f, rng.standard_normal(3))
-        axis /= np.linalg.norm(axis)
-        steps = int(turn_s * RATE_HZ)
-        angles = np.diff(rng.uniform(1.0, 2.0) * 0.5 * (1 - np.cos(np.linspace(0, math.pi, steps + 1))))
-        for angle in angles:
-            # Gravity's direction in the body turns against the body.
-            f = f * math.cos(angle) - np.cross(axis, f) * math.sin(angle)
-            force.append(f)
-            rate.append(axis * angle * RATE_HZ)
-    force, rate = np.array(force), np.array(rate)
-    force = force + 0.01 * rng.standard_normal(force.shape)
-    rate = rate + 0.01 + 0.001 * rng.standard_normal(rate.shape)
-    return np.arange(len(force)) / RATE_HZ, force, rate
+    """time [s] (n,), specific force [m/s^2] (n, 3), rate [rad/s] (n, 3): poses joined by random turns."""
+    made = formats.session.session(np.random.default_rng(3), RATE_HZ, n_poses, turn_s)
+    return made.time_s, made.force, made.rate
 
 
 def saved(path, time_s, force, rate, header=HEADER):
@@ -89,7 +73,7 @@ def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(t
 
 
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
-    time_s, force, rate = session(n_poses=1, turn_s=0.0)
+    time_s, force, rate = (part[:200] for part in session(n_poses=1))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))
     assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))

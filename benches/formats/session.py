@@ -24,14 +24,14 @@ class Session:
         return len(self.time_s)
 
 
-def session(rng: np.random.Generator, rate_hz: float, n_poses: int = 18) -> Session:
+def session(rng: np.random.Generator, rate_hz: float, n_poses: int = 18, turn_s: float = TURN_S) -> Session:
     """Poses of a hand-held part in all directions, turns of 60 to 150 degrees about level-ish axes between."""
-    n = round((n_poses * (POSE_S + TURN_S) + POSE_S) * rate_hz)
+    n = round((n_poses * (POSE_S + turn_s) + POSE_S) * rate_hz)
     time_s = np.arange(n) / rate_hz
-    phase = (time_s / (POSE_S + TURN_S)) % 1.0 * (POSE_S + TURN_S) - POSE_S
-    leg = (time_s // (POSE_S + TURN_S)).astype(int)
-    u = np.clip(phase / TURN_S, 0, 1)
-    angle, speed = u - np.sin(2 * np.pi * u) / (2 * np.pi), (1 - np.cos(2 * np.pi * u)) / TURN_S
+    phase = (time_s / (POSE_S + turn_s)) % 1.0 * (POSE_S + turn_s) - POSE_S
+    leg = (time_s // (POSE_S + turn_s)).astype(int)
+    u = np.clip(phase / turn_s, 0, 1)
+    angle, speed = u - np.sin(2 * np.pi * u) / (2 * np.pi), (1 - np.cos(2 * np.pi * u)) / turn_s
     attitude, force, rate = Rotation.identity(), np.empty((n, 3)), np.empty((n, 3))
     for k in range(leg[-1] + 1):
         rows = leg == k
