@@ -39,35 +39,35 @@ def filled(step):
     return with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
 
 
-def test_a_command_of_the_next_step_names_the_log_its_rate_and_the_calibration():
-    note_file(Path("cal.json"))
-    said = filled("Test it: `trihedron verify FILE OTHER_LOG`; use it: `trihedron apply FILE LOG`.")
-    assert said == (
-        "Test it: `trihedron verify cal.json OTHER_LOG`; use it: `trihedron apply cal.json 'my log.csv' --rate 50`."
-    )
+MY_LOG = "'my log.csv' --rate 50"
 
 
-def test_the_place_goes_to_commands_that_take_it():
-    said = filled("`trihedron diagnose LOG`, `trihedron segment LOG`")
-    assert (
-        said
-        == "`trihedron diagnose 'my log.csv' --rate 50 --latitude 59.9`, `trihedron segment 'my log.csv' --rate 50`"
-    )
-
-
-def test_a_reference_goes_to_commands_that_take_it():
-    note_reference(Path("motion.csv"))
-    said = filled("`trihedron calibrate LOG`, `trihedron segment LOG`")
-    assert "calibrate 'my log.csv' --rate 50 --reference motion.csv --latitude 59.9`" in said
-    assert "segment 'my log.csv' --rate 50`" in said
+@pytest.mark.parametrize(
+    ("notes", "step", "said"),
+    [
+        (
+            [(note_file, "cal.json")],
+            "`trihedron verify FILE OTHER_LOG`; `trihedron apply FILE LOG`.",
+            f"`trihedron verify cal.json OTHER_LOG`; `trihedron apply cal.json {MY_LOG}`.",
+        ),
+        # The place and a reference go to commands that take them.
+        (
+            [(note_reference, "motion.csv")],
+            "`trihedron diagnose LOG`, `trihedron segment LOG`",
+            f"`trihedron diagnose {MY_LOG} --reference motion.csv --latitude 59.9`, `trihedron segment {MY_LOG}`",
+        ),
+    ],
+)
+def test_a_command_of_the_next_step_names_what_was_given_where_it_is_taken(notes, step, said):
+    for note, name in notes:
+        note(Path(name))
+    assert filled(step) == said
 
 
 def test_a_calibration_that_was_not_written_is_stored_first():
     said = filled("Use it: `trihedron apply FILE LOG`.")
-    assert said.startswith(
-        "Store it (`trihedron calibrate 'my log.csv' --rate 50 --latitude 59.9 -o calibration.json`)."
-    )
-    assert "`trihedron apply calibration.json 'my log.csv' --rate 50`" in said
+    assert said.startswith(f"Store it (`trihedron calibrate {MY_LOG} --latitude 59.9 -o calibration.json`).")
+    assert f"`trihedron apply calibration.json {MY_LOG}`" in said
 
 
 def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_them():

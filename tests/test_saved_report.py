@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,14 +11,13 @@ import trihedron
 from trihedron.cli import main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.domains import DOMAINS, DomainTest
+from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel, Points, Scale, Span, Sphere
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.diagnosis_overview_charts import EXPLAINED, strengths_picture
 from trihedron.report.document import Document, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
 from trihedron.report.findings import findings_block
@@ -63,12 +61,6 @@ def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
     again = report_of(json.loads(text))
     assert to_text(again) == to_text(document())
     assert to_html(again) == to_html(document())
-
-
-def test_a_finding_that_warns_and_its_action_stand_below_the_verdict():
-    head = to_html(document()).partition("<nav")[0]
-    told = '<p class="foremost"><b class="warning">warning</b>Seen → Action'
-    assert told in head.replace("seen", "Seen").replace("action", "Action")
 
 
 @pytest.mark.parametrize(
@@ -213,25 +205,3 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
     y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
-
-
-def test_every_domain_is_a_bar_from_the_left_to_its_misfit_beside_the_limit_of_agreement():
-    tests = (
-        DomainTest("static-accel", 0.8, 20.0, 0.6, False, limit=2.0),
-        DomainTest("static-gyro", 40.0, 20.0, 1e-9, True, limit=1.9),
-        DomainTest("timing", 1.1, 20.0, 0.4, False),
-    )
-    found = SimpleNamespace(verdict="unexplained", domains=tests, remaining=(), effects=(), alpha=0.01)
-    (panel,) = strengths_picture(found).chart().panels
-    bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
-    assert set(bars) == {"agrees up to here", "disagrees", "agrees"}
-    np.testing.assert_array_equal(bars["agrees up to here"].x, [2.0, 1.9, np.nan])
-    np.testing.assert_array_equal(bars["disagrees"].x, [np.nan, 40.0, np.nan])
-    np.testing.assert_array_equal(bars["agrees"].x, [0.8, np.nan, 1.1])
-    assert {float(value) for mark in bars.values() for value in mark.base} == {panel.x.limits[0]}
-    # Disturbed poses explain their residual without reducing it.
-    left = (tests[0], replace(tests[1], disagrees=False), tests[2])
-    (panel,) = strengths_picture(SimpleNamespace(**vars(found) | {"remaining": left, "effects": (1,)})).chart().panels
-    bars = {mark.name: mark for mark in panel.marks if isinstance(mark, Bars)}
-    np.testing.assert_array_equal(bars[EXPLAINED].x, [np.nan, 40.0, np.nan])
-    np.testing.assert_array_equal(bars["with the effects"].x, [0.8, np.nan, 1.1])
