@@ -77,6 +77,18 @@ def test_a_faster_gyro_keeps_its_samples_and_that_is_a_warning():
     assert merged.findings[0].code is FindingCode.CLOCKS_MERGED
 
 
+def test_files_of_one_clock_are_laid_side_by_side_with_what_else_they_hold(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    warm = np.round(20.0 + 0.01 * np.arange(len(t)), 2)
+    for name, head, columns in (("acc", "t,ax,ay,az,temp_C", (t, force, warm)), ("gyr", "t,gx,gy,gz", (t, rate))):
+        np.savetxt(tmp_path / name, np.column_stack(columns), "%.17g", ",", header=head, comments="")
+    recording = read_recording(accelerometer_path=tmp_path / "acc", gyroscope_path=tmp_path / "gyr")
+    np.testing.assert_array_equal(recording.accelerometer, force)
+    np.testing.assert_array_equal(recording.gyroscope, rate)
+    np.testing.assert_array_equal(recording.temperature_degc, warm)
+    assert recording.rows_read == recording.rows_in_file == 2 * len(t)
+
+
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
     st.lists(st.floats(0.0, 2.0, allow_nan=False), min_size=2, max_size=40),
