@@ -130,8 +130,8 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
         numbers[k, j] += 8.0 * sizes[j]
         strays = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers)], tmp_path).summary.outliers
         found += (f"u{k}", j) in [(one.serial, PARAMETERS.index(one.parameter)) for one in strays]
-    # One in a hundred sound fleets: three of 15 come once in 2000. Of the strays two in three: by each axis alone one in
-    # fifteen.
+    # One in a hundred sound fleets: three of 15 come once in 2000. Of the strays two in three: by each axis alone, one
+    # in fifteen.
     assert alarms <= 2
     assert found >= 7
     assert sound.outliers or sound.farthest.serial in fleet_report(sound).verdict
