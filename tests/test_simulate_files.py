@@ -104,6 +104,14 @@ def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, 
     assert "\n" not in str(caught.value)[:60]
 
 
+def test_a_unit_of_a_part_without_tolerances_is_the_part():
+    part = profile_by_name("ideal")
+    accelerometer, gyroscope = part.unit(7)
+    for unit, nominal in ((accelerometer, part.accelerometer), (gyroscope, part.gyroscope)):
+        np.testing.assert_array_equal(unit.S, nominal.S)
+        np.testing.assert_array_equal(unit.b, nominal.b)
+
+
 def test_truth_is_written_whole(tmp_path):
     _, truth = simulate(scenario_by_name("imperfect"), seed=3)
     write_truth(truth, tmp_path / "truth.npz")
