@@ -19,10 +19,6 @@ import trihedron
 from trihedron.cli import COMMANDS, build_app
 from trihedron.records.finding import FindingCode
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
-from trihedron.report.effects.catalogue import REASONS
-from trihedron.report.effects.relations import FAMILIES
-from trihedron.report.findings.catalogue import ENTRIES as FINDINGS
-from trihedron.report.findings.phrases import LINES, PHRASES
 from written_session import G, usual
 
 ROOT = Path(__file__).parents[1]
@@ -89,20 +85,6 @@ def helps() -> Said:
         command = group.commands[name] if name else group  # type: ignore[attr-defined]
         words = command.get_help(typer.Context(command, info_name=f"trihedron {name}".strip()))
         yield name, re.sub(r"\s+", " ", words)
-
-
-def catalogues() -> Said:
-    """Every sentence; the names of its places are no words."""
-    for entry in FINDINGS:
-        for text in (entry.seen, entry.cause, entry.action):
-            yield f"finding {entry.code.value} {entry.case}", re.sub(r"\{(\w+)", "{", text or "")
-    for effect_id, effect in EFFECTS.items():
-        for text in (effect.mechanism, effect.experiment, effect.static_experiment, *effect.said.values()):
-            yield f"effect {effect_id}", re.sub(r"\{(\w+)", "{", text or "")
-    for name, text in {**PHRASES, **LINES, **REASONS}.items():
-        yield f"phrase {name}", re.sub(r"\{(\w+)", "{", text or "")
-    for name, family in FAMILIES.items():
-        yield f"family {name}", " ".join([family.experiment, *family.resembles])
 
 
 def modules() -> Said:
@@ -173,7 +155,7 @@ def docstrings() -> Said:
                 yield f"{name}.{one}", without_code(inspect.getdoc(member) or "")
 
 
-@pytest.mark.parametrize("source", [helps, catalogues, modules, schemas, pages, docstrings])
+@pytest.mark.parametrize("source", [helps, modules, schemas, pages, docstrings])
 def test_nothing_that_a_user_reads_uses_a_retired_word(source):
     said = list(source())
     # All at once is ten times as quick; one after the other says where.
