@@ -1,6 +1,7 @@
 """A given model held against a recording: numbers are distinguished from physics, in any frame."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from trihedron.cli import main
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
+from trihedron.records.diagnosis import ParameterDifference
 from trihedron.report import diagnosis_report
+from trihedron.report.diagnosis_numbers import differing_numbers
 from trihedron.report.document import Picture
 from trihedron.simulate import Scenario, hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
@@ -30,6 +33,16 @@ def sensor(rng):
 def fitted(S_a, b_a, S_g, b_g, sigma=1e-6):
     covariance = np.diag(np.r_[np.full(9, sigma), np.full(3, 1e-3), np.full(9, sigma), np.full(3, 1e-5)] ** 2)
     return FittedModel(FittedSensor(S_a, b_a, "counts"), FittedSensor(S_g, b_g, "counts"), covariance)
+
+
+@pytest.mark.parametrize(("sigmas", "named"), [((1.0, 2.5, 2.0), ["Y"]), ((8.0, 1.0, 5.0), ["X", "Z"])])
+def test_of_a_group_that_differs_the_parameters_that_differ_are_named_or_the_one_that_does_most(sigmas, named):
+    group = [
+        ParameterDifference("gyro-bias", "gyroscope", axis, 0.0, s * 1e-4, s * 1e-4, 1e-4, "rad/s", 1e-3, True)
+        for axis, s in zip("xyz", sigmas, strict=True)
+    ]
+    said = differing_numbers(SimpleNamespace(parameters=group))
+    assert [one.split()[2] for one in said] == named
 
 
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
