@@ -1,11 +1,11 @@
 """Our hot paths compared with other libraries, on the same data in one run: medians, ratios, peak memory.
 
-python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
+python benches/rivals.py [--rounds 3] [--rows 1e7] [--only still]
 
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
-ratios. `--write` puts the tables into docs/evidence.md.
-A rival that is not installed is excluded: `pip install numba python-ins bottleneck pandas pyarrow`.
+ratios.
+A rival that is not installed is excluded: `pip install python-ins bottleneck pandas pyarrow`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,8 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import rival_paths  # noqa: F401
-
-ROOT = Path(__file__).parents[1]
-FACTORIES = ("ours", "numba_chain", "sensitivities", "parser")
-"""Functions that make the function to be timed, so that imports and compilation stay outside."""
 
 
 @dataclass(frozen=True)
@@ -42,26 +37,15 @@ class Subject:
     on_both: bool = False
 
 
-# Methods that would take minutes are timed on fewer.
-SLOW = {
-    "SciPy steps, loop of products": 20_000,
-}
+SLOW = {"SciPy steps, loop of products": 20_000}
+"""Methods that would take minutes are timed on fewer."""
 
 
 def subjects(rows: int) -> list[Subject]:
-    million = 10**6
-    step = ("ns/step", 1e-9)
-    sample = ("ns/sample", 1e-9)
-    with_sensitivities = "Rotation with 12 sensitivities and covariance, 10⁶ uneven steps in moves of 2000"
     text = f"Reading {rows:_} × 7 numbers of CSV, two cores".replace("10_000_000", "10⁷")
     return [
-        Subject("last", "Rotation over 10⁶ steps, the last attitude", "attitude", "LAST", million, *step),
-        Subject("trajectory", "Attitude at each of 10⁶ steps", "attitude", "TRAJECTORY", million, *step),
-        Subject("sensitivities", with_sensitivities, "attitude", "SENSITIVITIES", million, *step),
-        Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", 1e-6),
-        Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", 1e-6),
-        Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", 1e-3),
-        Subject("still", "Static detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
+        Subject("trajectory", "Attitude at each of 10⁶ steps", "attitude", "TRAJECTORY", 10**6, "ns/step", 1e-9),
+        Subject("still", "Static detection, 10⁷ × 3", "still", "DETECT", 10**7, "ns/sample", 1e-9),
         Subject("read", text, "reading", "READ", rows, "s", 1.0, True),
     ]
 
@@ -72,8 +56,6 @@ def worker(subject: Subject, method: str) -> None:
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     module = __import__(f"rival_paths.{subject.module}", fromlist=["data"])
     function = getattr(module, subject.methods)[method]
-    if function.__name__ in FACTORIES:
-        function = function()
     n = min(SLOW.get(method, subject.n), subject.n)
     arguments = module.data(n)
     first = arguments if subject.on_both else module.data(min(n, 20_000))
@@ -137,23 +119,15 @@ def digits(value: float, count: int) -> str:
     return f"{value:.0f}" if value >= 10.0 ** (count - 1) else f"{value:.{count}g}"
 
 
-def table(subject: Subject, result: dict[str, Any]) -> str:
+def table(subject: Subject, found: dict[str, dict[str, float]]) -> str:
     """One Markdown table, ours first, with the ratio to it."""
-    found = result["found"]
     clock = "wall" if subject.on_both else "cpu"
     mine = next(iter(found.values()))[clock]
-    lines = [f"| {result['title']} | {subject.unit} | times ours | peak MiB |", "|---|---:|---:|---:|"]
+    lines = [f"| {subject.title} | {subject.unit} | times ours | peak MiB |", "|---|---:|---:|---:|"]
     for name, one in found.items():
         value = one[clock] / subject.per
         lines.append(f"| {name} | {digits(value, 3)} | {digits(one[clock] / mine, 3)} | {one['peak']:.0f} |")
     return "\n".join(lines)
-
-
-def put(path: Path, mark: str, text: str) -> None:
-    """Replace what stands between two marks of a document."""
-    before, rest = path.read_text().split(f"<!-- {mark} -->\n", 1)
-    _, after = rest.split(f"<!-- /{mark} -->", 1)
-    path.write_text(f"{before}<!-- {mark} -->\n{text}\n<!-- /{mark} -->{after}")
 
 
 def main() -> None:
@@ -161,7 +135,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--rows", default="1e7")
     parser.add_argument("--only", default="")
-    parser.add_argument("--write", action="store_true")
     parser.add_argument("--worker")
     parser.add_argument("--method")
     options = parser.parse_args()
@@ -169,21 +142,11 @@ def main() -> None:
     if options.worker:
         worker(next(s for s in subjects(rows) if s.key == options.worker), options.method)
         return
-    # Kept beside the tables, so that `--only` renews one of them and leaves the others as they were measured.
-    kept = ROOT / "docs/figures/rivals.json"
-    results = json.loads(kept.read_text()) if kept.exists() else {}
     for subject in subjects(rows):
         if options.only in subject.key:
-            results[subject.key] = {"title": subject.title, "found": measure(subject, options.rounds)}
-            print(table(subject, results[subject.key]) + "\n", flush=True)
-            if options.write:
-                kept.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n")
-    if options.write:
-        measured = [(subject, results[subject.key]) for subject in subjects(rows) if subject.key in results]
-        # How far a median can be trusted depends on the load.
-        how = f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}."
-        parts = [*(table(*pair) for pair in measured), how]
-        put(ROOT / "docs/evidence.md", "rivals", "\n\n".join(parts))
+            print(table(subject, measure(subject, options.rounds)) + "\n", flush=True)
+    # How far a median can be trusted depends on the load.
+    print(f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}.")
 
 
 if __name__ == "__main__":

@@ -58,14 +58,6 @@ def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
     assert shape.shift_m_s2 == pytest.approx(G * np.abs(found - clean).max(), rel=0.2)
 
 
-def test_few_poses_and_poses_alike_say_nothing():
-    rng = np.random.default_rng(7)
-    up, sigma = drawn(rng, 14)
-    assert bending.shape_of(up, 0.1 * up[:, 0] ** 4, sigma, G, 1.0) is None  # two degrees of freedom beside a shape
-    alike = np.repeat(up[:5], 8, axis=0)
-    assert bending.shape_of(alike, rng.normal(size=40), np.ones(40), G, 1.0) is None
-
-
 def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_one_is():
     scenario = replace(scenario_by_name("hand-session"), motion=hand_session(30, layout=12))
     for sized, is_bent in ((None, False), ((9e-5, -7e-5, 8e-5), True)):
@@ -123,20 +115,3 @@ def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     residual = np.random.default_rng(3).normal(size=12) * 4e-4
     added = covariance_by_bends(up, residual, np.full(12, 4e-4), np.zeros((12, 0)), G)
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3
-
-
-def test_poses_alike_leave_nothing_to_judge_by():
-    rng = np.random.default_rng(9)
-    up, _ = drawn(rng, 9)
-    alike = np.repeat(up[:5], 8, axis=0)
-    assert not np.any(covariance_by_bends(alike, rng.normal(size=40), np.ones(40), np.zeros((40, 0)), G))
-
-
-def test_a_drift_that_is_known_is_no_bend():
-    rng = np.random.default_rng([31, 24])
-    up, sigma = drawn(rng, 24)
-    curve = np.linspace(-1.0, 1.0, 24)[:, None] * up * 0.05
-    residual, _ = linear_fit(up, curve @ rng.normal(size=3) + sigma * rng.normal(size=24), sigma)
-    unknown, known = (covariance_by_bends(up, residual, sigma, of, G) for of in (curve[:, :0], curve))
-    # At least half of the uncertainty goes.
-    assert np.diag(known)[:6].max() < 0.25 * np.diag(unknown)[:6].max()

@@ -221,13 +221,3 @@ def test_intervals_of_the_total_deviation_hold_the_allan_deviation_under_quantis
         inside += (curve.lower**2 <= truth) & (truth <= curve.upper**2)
     # 95 % of 200, four binomial errors of 1.5 % either way; before, 40 % at the longest.
     assert np.all(np.abs(inside / runs - 0.95) < 0.062), inside / runs
-
-
-def test_chunks_give_what_the_whole_array_gives():
-    x = 100.0 + np.random.default_rng(8).normal(size=(400_000, 2)).cumsum(axis=0)
-    whole = allan_deviation(x, 100.0)
-    chunks = (x[i : i + 33_333] for i in range(0, len(x), 33_333))
-    streamed = stream_noise(chunks, 100.0, n_samples=len(x)).curve
-    assert streamed.stride == 1
-    assert streamed.clusters.tolist() == whole.clusters.tolist()
-    assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-11)

@@ -1,6 +1,5 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
-import dataclasses
 import doctest
 import inspect
 import pickle
@@ -15,7 +14,6 @@ from matplotlib.figure import Figure
 
 import trihedron
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
-from trihedron.report.in_python import in_python
 from written_session import usual
 
 
@@ -32,10 +30,6 @@ def result():
 def test_import_loads_neither_numpy_nor_anything_else_heavy():
     code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
-
-
-def test_names_from_a_file_are_escaped_in_html(recording):
-    assert "<script>" not in replace(recording, source="<script>alert(1)</script>.csv")._repr_html_()
 
 
 def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
@@ -123,18 +117,6 @@ def test_results_cross_processes_and_reports_need_no_matplotlib_as_plot_says_tha
     assert np.array_equal(there, trihedron.apply(result, recording).accelerometer)
 
 
-def test_capture_of_a_file_of_bytes_gives_a_recording(tmp_path):
-    rng = np.random.default_rng(6)
-    rows = "\n".join(
-        f"{k * 10},{a[0]:.4f},{a[1]:.4f},{a[2]:.4f}" for k, a in enumerate(rng.normal([0, 0, 9.8], 0.02, (400, 3)))
-    )
-    (tmp_path / "stream.txt").write_text("t_ms,ax,ay,az\n" + rows + "\n")
-    blocks = []
-    taken = trihedron.capture(str(tmp_path / "stream.txt"), tmp_path / "log.csv", on_block=blocks.append)
-    assert taken.n_samples > 380
-    assert sum(len(block.time_s) for block in blocks) == taken.n_samples
-
-
 def test_a_figure_is_drawn_where_it_is_asked_for(result):
     figure = Figure()
     above, below = figure.subplots(2)
@@ -173,19 +155,6 @@ def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run
     assert run.failures == 0
 
 
-def test_every_public_record_says_what_each_of_its_fields_is():
-    unsaid = {}
-    for name in filter(str.isidentifier, trihedron.__all__):
-        public = getattr(trihedron, name)
-        if inspect.isclass(public) and dataclasses.is_dataclass(public):
-            text = inspect.getdoc(public)
-            assert re.search(r"^(Attributes|Parameters)\n-+$", text, re.MULTILINE), name
-            unsaid[name] = {f.name for f in dataclasses.fields(public) if not re.search(rf"\b{f.name}\b", text)}
-    # Results hold what their first class says already.
-    unsaid["DiagnosisResult"] -= {field.name for field in dataclasses.fields(trihedron.Diagnosis)}
-    assert {name: fields for name, fields in unsaid.items() if fields} == {}
-
-
 @pytest.mark.parametrize(
     ("wrong", "meant"), [("gravity", "gravity_m_s2"), ("latitude", "latitude_deg"), ("gravity_ms2", "gravity_m_s2")]
 )
@@ -207,22 +176,3 @@ def test_a_sensor_shows_its_numbers_and_its_bias_is_what_the_reading_is_too_much
 def test_the_public_names_are_those_that_are_imported_on_use():
     """A literal, which editors follow; ``_PUBLIC`` names the modules."""
     assert trihedron.__all__ == sorted([*trihedron._HOME, "__version__"])
-
-
-@pytest.mark.parametrize(
-    ("said", "in_words_of_python"),
-    [
-        ("`trihedron diagnose LOG --reference MOTION`", "`trihedron.diagnose(recording, reference=motion)`"),
-        (
-            "`trihedron allan LOG --json ALLAN.json`) and --rate HZ",
-            "`trihedron.report(trihedron.allan(recording), path)`) and rate_hz",
-        ),
-        (
-            "trihedron calibrate LOG --extended -o FILE.",
-            "trihedron.write_calibration(trihedron.extend(trihedron.calibrate(recording)), path).",
-        ),
-        ("`trihedron diagnose` -- or not", "`trihedron.diagnose` -- or not"),
-    ],
-)
-def test_commands_in_a_sentence_become_calls(said, in_words_of_python):
-    assert in_python(said) == in_words_of_python

@@ -90,18 +90,6 @@ def test_a_long_log_goes_on_from_any_of_its_samples():
     np.testing.assert_allclose(trihedron.integrate_rate(t, w, between="constant")[-1], whole, atol=1e-12)
 
 
-def test_any_memory_layout_and_list_gives_the_same():
-    t = uneven(700, 7.0)
-    w = np.random.default_rng(1).standard_normal((700, 3))
-    expected = trihedron.integrate_rate(t, w)
-    wide = np.zeros((1400, 6))
-    wide[::2, ::2] = w
-    for other in (np.asfortranarray(w), wide[::2, ::2], w.tolist()):
-        np.testing.assert_array_equal(trihedron.integrate_rate(t, other), expected)
-    np.testing.assert_array_equal(trihedron.integrate_rate(np.repeat(t, 2)[::2], w), expected)
-    assert trihedron.integrate_rate([0.0], [[1.0, 2.0, 3.0]]).tolist() == [np.eye(3).tolist()]
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -83,15 +83,6 @@ def test_a_frame_is_a_choice_of_axes_and_changes_no_norm(recording, result):
     np.testing.assert_allclose(norms[0], norms[1], atol=1e-5)
 
 
-def test_applying_gives_si_and_keeps_rows_that_were_lost(recording, result):
-    readings = recording.accelerometer.copy()
-    readings[5] = np.nan
-    corrected = trihedron.apply(result, replace(recording, accelerometer=readings))
-    assert corrected.accelerometer_unit.value == "m/s^2"
-    assert np.isnan(corrected.accelerometer[5]).all()
-    assert np.isfinite(corrected.accelerometer[6]).all()
-
-
 def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_refused(recording):
     alone = trihedron.calibrate(replace(recording, gyroscope=None), gravity_m_s2=9.80665)
     assert alone.gyroscope is None

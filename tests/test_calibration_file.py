@@ -11,12 +11,10 @@ from trihedron.api.applying import apply
 from trihedron.files.calibration import (
     CalibrationFileError,
     calibration_document,
-    calibration_from_document,
     read_calibration,
     schema_of,
     write_calibration,
 )
-from trihedron.records.frozen import thawed
 from written_session import usual
 
 
@@ -112,11 +110,3 @@ def test_a_changed_file_is_refused_with_the_place_named(session, tmp_path, path,
     with pytest.raises(CalibrationFileError, match=r"c\.json") as caught:
         read_calibration(file)
     assert said in str(caught.value)
-
-
-def test_unknown_extensions_survive(session):
-    calibration = replace(
-        session[1].calibration, extensions={"temperature": {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}}
-    )
-    back = calibration_from_document(json.loads(json.dumps(calibration_document(calibration))))
-    assert thawed(back.extensions["temperature"]) == {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}

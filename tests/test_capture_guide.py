@@ -4,27 +4,24 @@ import http.client
 import json
 import re
 import shutil
-from dataclasses import replace
 from itertools import pairwise
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 import trihedron
 from following_hand import FollowingHand
 from trihedron.api.guiding import conclude, examine, part_of
-from trihedron.api.planning_poses import move_rows, shortest_path
-from trihedron.api.replaying import readings_of, replay, steps
+from trihedron.api.replaying import readings_of, steps
 from trihedron.api.simulating import simulate
 from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
 from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
 from trihedron.files.log import write_recording
-from trihedron.records.guiding import Accuracy, Examination, Phase
-from trihedron.simulate import hand_session, scenario_by_name
+from trihedron.records.guiding import Accuracy, Phase
+from trihedron.simulate import scenario_by_name
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
 
@@ -82,21 +79,6 @@ def test_the_guide_waits_holds_moves_checks_and_ends_in_this_order(led):
     assert views[-1].n_events == views[-1].n_poses + 3
 
 
-def test_time_that_a_pose_lacked_is_not_requested_of_the_next():
-    up = np.array([[0.0, 0.0, 1.0]])
-    # Nothing after the first pose counts.
-    seen = Examination(up, (), np.inf, np.array([1.0, 0.0, 0.0]), "+X up", "", pose_s=3.0)
-    guide, rng, now, asked = Guide(ACCURACY, lambda: seen), np.random.default_rng(1), 0.0, []
-    for still_s, towards in ((8.0, [0.0, 0.0, 9.8]), (4.0, [9.8, 0.0, 0.0]), (1.0, [0.0, 9.8, 0.0])):
-        time = now + np.arange(0.0, still_s + 1.0, 0.01)
-        force = towards + 0.01 * rng.normal(size=(len(time), 3))
-        force[time > now + still_s] += rng.normal(size=3) * 5.0 * np.sin(9.0 * time[time > now + still_s])[:, None]
-        asked += [guide.advance(time[i : i + 25], force[i : i + 25]).pose_s for i in range(0, len(time), 25)]
-        now = time[-1] + 0.01
-    assert max(asked) > 4.0
-    assert asked[-1] == seen.pose_s
-
-
 def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
     recording, truth = simulate("six-faces", 0)
     state = examine(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2)
@@ -106,48 +88,6 @@ def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
     assert (state.poses_needed or 0) > 0
     # Six faces leave the angles between axes open: an edge is requested, with both its axes half up.
     assert np.sum(np.abs(state.next_up) > 0.3) >= 2
-
-
-def test_the_next_pose_brings_what_was_promised():
-    """Uncertainties promised for the next pose against those that are there when it is taken."""
-    ratios, before = [], None
-    hand = FollowingHand(scenario_by_name("hand-session"), 40, miss_deg=3.0)
-    while hand.n_poses < 15:
-        recording, truth = hand.session()
-        now = examine(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2, look_ahead=False)
-        if before is not None and hand.n_poses > 11:
-            pairs = zip(before.uncertain, now.uncertain, strict=True)
-            ratios += [new.now / old.after_next for old, new in pairs if new.now and old.now]
-        before = now
-        hand.go(now.next_up, now.pose_s)
-    # The pose is off by degrees, its length differs, and the moves are not the shortest: a third, in the middle.
-    assert 0.75 < np.median(ratios) < 1.33
-    assert np.quantile(ratios, 0.9) < 2.5
-
-
-def test_the_moves_that_are_planned_see_the_gyro_as_numbers_do():
-    """move_rows against a difference: gravity carried by a gyro in error, integrated step by step."""
-    start, stop = (v / np.linalg.norm(v) for v in np.random.default_rng(0).normal(size=(2, 3)))
-    path = shortest_path(start, stop, 200)
-
-    def carried(error):
-        up = start.copy()
-        for step in path:
-            turned = (np.eye(3) + error) @ step
-            angle = np.linalg.norm(turned)
-            axis = turned / angle
-            # The body turns by the step, so that up turns by its inverse in the body (Rodrigues).
-            up = up * np.cos(-angle) + np.cross(axis, up) * np.sin(-angle) + axis * (axis @ up) * (1 - np.cos(-angle))
-        return up
-
-    assert np.allclose(carried(np.zeros((3, 3))), stop, atol=1e-9)
-    rows = move_rows(path, stop)
-    for k in range(9):
-        error = np.zeros(9)
-        error[k] = 1e-6
-        moved = (carried(error.reshape(3, 3)) - stop) / 1e-6
-        # A turn δθ moves up by -δθ × up: the length is that of its two components across up.
-        assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(rows[:, k]), abs=2e-2)
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 400.0])
@@ -198,16 +138,6 @@ def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, cap
     assert trihedron.read_calibration(calibration).is_trustworthy
 
 
-def test_poses_of_a_log_that_was_not_guided_count_where_the_segmentation_finds_them():
-    # Every pose is shorter than the six seconds that the guide requests for the first.
-    motion = hand_session(n_poses=8, pose_s=3.0, first_pose_s=3.0)
-    recording, truth = trihedron.simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)
-    done = replay(recording, ACCURACY, gravity_m_s2=truth.gravity_m_s2)
-    assert done.view.n_poses == trihedron.segment(recording).n_poses
-    assert done.view.n_poses >= 8
-    assert done.view.target_up is not None
-
-
 def get(page, path, cookie="", host=None):
     """(status, headers, first line of the body) of one request."""
     address = urlsplit(page.address)
@@ -251,37 +181,22 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium or Chrome on this machine to look at the page with")
-def test_a_real_browser_shows_the_guide(led, tmp_path):
-
+def test_a_real_browser_shows_the_guide(led):
     sync_playwright = pytest.importorskip("playwright.sync_api").sync_playwright
-    _, views, _, _ = led
-    view = next(v for v in views if v.phase is Phase.MOVE and v.n_poses > 9)
+    view = next(v for v in led[1] if v.phase is Phase.MOVE and v.n_poses > 9)
     page = Page()
     page.show(view, lost=3)
-    shot = tmp_path / "page.png"
     try:
         with sync_playwright() as tool:
             browser = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            screen = browser.new_page(viewport={"width": 1280, "height": 800})
+            screen, faults = browser.new_page(viewport={"width": 390, "height": 844}), []
+            screen.on("pageerror", lambda error: faults.append(str(error)))
             screen.goto(page.address)
             # The view comes by the stream of events, after the page.
             screen.wait_for_function(f"document.getElementById('big').textContent.startsWith('{view.n_poses}')")
-            screen.wait_for_timeout(500)
-            screen.screenshot(path=shot)
-            screen.set_viewport_size({"width": 390, "height": 844})
+            assert faults == []
             table, foot = (screen.query_selector(part).bounding_box() for part in ("table", "footer"))
             assert foot["y"] >= table["y"] + table["height"] - 1.0, "on a phone nothing covers the table"
             browser.close()
     finally:
         page.close()
-    image = imread(shot)[..., :3]
-    paper = image[2, 2]
-    inked = np.abs(image - paper).max(axis=2) > 0.2
-    assert inked[:200].mean() > 0.02, "the instruction in large letters"
-    canvas = image[280:740, 40:740]
-    # The board and the poses are greens of their own: more green than red and blue by a good part.
-    green = (canvas[..., 1] > canvas[..., 0] + 0.1) & (canvas[..., 1] > canvas[..., 2] + 0.02)
-    assert 0.03 < green.mean() < 0.6, "the board turning in the middle of the sphere"
-    orange = (canvas[..., 0] > canvas[..., 2] + 0.15) & (canvas[..., 0] > canvas[..., 1] + 0.08)
-    assert orange.sum() > 100, "the ring of the next pose"
-    assert inked[250:740, 780:].mean() > 0.03, "the error bars"

@@ -124,10 +124,3 @@ def test_a_stream_that_is_not_decoded_is_refused_by_its_name_with_the_way_in(kin
     said = capsys.readouterr().err
     assert re.search(rf"this is {words}", said), said
     assert not (tmp_path / "log.csv").exists()
-
-
-def test_noise_is_given_no_name():
-    from trihedron.capture.detection import foreign
-
-    rng = np.random.default_rng(7)
-    assert foreign(rng.bytes(n) for n in (200, 3000, 200_000) * 20) is None

@@ -52,29 +52,6 @@ def test_readings_on_no_grid_have_no_step_and_resampled_ones_none_that_matters(s
     assert adc_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
 
 
-def test_codes_that_were_not_visited_leave_the_step_as_it_is():
-    rng = np.random.default_rng(3)
-    assert adc_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
-    codes = np.round(session(4, sigma=2.0))
-    assert adc_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
-    few = np.round(0.2 * rng.normal(size=3000))  # static: two or three codes
-    assert adc_step(0.02 * few) == pytest.approx(0.02)
-    assert adc_step(np.zeros(1000)) == 0.0
-    assert adc_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
-    # One code in two spellings is one code.
-    single = codes.astype(np.float32) * np.float32(SCALE)
-    assert adc_step(np.where(rng.random(8000) < 0.5, single.astype(float), codes * SCALE)) == pytest.approx(SCALE, 1e-3)
-
-
-def test_of_two_steps_in_one_log_the_one_of_most_parts_is_told_and_of_multiples_the_finer():
-    x = session(5, sigma=0.3)
-    fine, coarse = 0.0061, np.sqrt(5.0) / 230.0
-    switched = np.where(np.arange(8000) < 3000, fine * np.round(x), coarse * np.round(x * fine / coarse))
-    assert adc_step(switched) == pytest.approx(coarse, rel=1e-3)
-    codes = np.round(x)
-    assert adc_step(np.where(np.arange(8000) < 3000, codes, 4.0 * np.round(codes / 4.0))) == 1.0
-
-
 def test_a_recording_carries_its_facts_and_another_has_its_own():
     counts = np.round(np.column_stack([session(k, sigma=2.0) for k in range(3)]))
     recording = Recording(np.arange(8000) / 100.0, counts, None, 100.0)
@@ -138,43 +115,6 @@ def test_swings_of_one_height_end_on_no_limit(sigma):
         phase = 2 * np.pi * rng.uniform(0.05, 2.0, 3) * t[:, None] + rng.uniform(0.0, 6.0, 3)
         swings = np.round(rng.uniform(5.0, 3000.0, 3) * np.sin(phase) + sigma * rng.normal(size=(6000, 3)))
         assert Recording(t, None, swings, 100.0).facts.of("gyroscope").limits == (), seed
-
-
-@pytest.mark.parametrize("step", [0.1, 1.499, 4.0])
-def test_a_table_that_turns_at_one_rate_both_ways_ends_on_no_limit(step):
-    # About Y at 160 deg/s and about Z at -160: two channels end at one code, on which everything stands still.
-    rng = np.random.default_rng(16)
-    ramp = np.linspace(0.0, 1.0, 50)
-    course = np.concatenate([np.zeros(200), ramp, np.ones(400), ramp[::-1]])
-    axes = [(40.0, 0), (-40.0, 1), (80.0, 2), (-80.0, 0), (160.0, 1), (-160.0, 2)]
-    rates = np.vstack([np.outer(rate * course, np.eye(3)[axis]) for rate, axis in axes])
-    read = step * np.round((rates + 0.08 * rng.normal(size=rates.shape)) / step)
-    assert Recording(np.arange(len(read)) / 100.0, None, read, 100.0).facts.of("gyroscope").limits == ()
-
-
-@pytest.mark.parametrize("sigma", [1.0, 5.0])
-def test_noise_that_ends_abruptly_ends_on_a_limit(sigma):
-    # A wall at half to one and a half sigma; with noise of one step half of these looked like tails to older rules.
-    for seed in range(6):
-        rng = np.random.default_rng([12, seed])
-        at_rest = np.round(rng.normal(rng.uniform(-100.0, 100.0, 3), sigma, (6000, 3)))
-        wall = np.round(np.mean(at_rest, axis=0) + sigma * rng.uniform(0.5, 1.5, 3))
-        limits = Recording(np.arange(6000) / 100.0, None, np.minimum(at_rest, wall), 100.0).facts.of("gyroscope").limits
-        assert {(one.axis, one.value) for one in limits} <= set(enumerate(wall.tolist())), seed
-        assert Recording(np.arange(6000) / 100.0, None, at_rest, 100.0).facts.of("gyroscope").limits == (), seed
-        if sigma > 1.0:
-            assert len(limits) == 3, seed
-
-
-def test_a_limit_carries_every_reading_on_it_and_moves_with_samples_that_are_put_in():
-    codes = cut(3, 2000.0)
-    facts = Recording(np.arange(6000) / 100.0, None, codes, 100.0).facts
-    at = facts.of("gyroscope").at_limits(6000)
-    np.testing.assert_array_equal(at, np.abs(codes) == 2000.0)
-    places = np.arange(6000) + (np.arange(6000) >= 50)
-    moved = facts.moved(places).of("gyroscope").at_limits(6001)
-    np.testing.assert_array_equal(moved[places], at)
-    assert not moved[50].any()
 
 
 @pytest.mark.parametrize("are_still", [False, True])
@@ -255,11 +195,6 @@ def test_a_log_that_never_rests_for_long_enough_says_nothing():
     gaps = rng.normal(size=(4000, 3))
     gaps[::16] = np.nan  # no 32 readings in a row
     assert Recording.from_arrays(np.arange(4000) / 100.0, gaps).low_passes == {}
-
-
-def test_a_long_log_is_looked_at_in_stretches_spread_over_it():
-    found = log(7, (0.2, 0.0), seconds=3000.0).low_passes
-    assert found["accelerometer"][0].corner_hz.value == pytest.approx(20.0, rel=0.1)
 
 
 def test_check_says_what_the_channels_are():

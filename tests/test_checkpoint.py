@@ -11,7 +11,6 @@ from test_streaming import COLUMNS, opened, path, whole
 from trihedron import _core
 from trihedron.api import identifying, streaming
 from trihedron.cli import main
-from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.files import checkpoint as kept_file
 from trihedron.files.checkpoint import Checkpoint
 
@@ -39,45 +38,6 @@ def stop_after(monkeypatch, times):
             raise Stopped
 
     monkeypatch.setattr(Checkpoint, "keep", counted)
-
-
-def test_blocks_of_a_stopped_run_are_those_of_one_run(path, tmp_path, monkeypatch):
-    times = 3
-    monkeypatch.setattr(streaming, "PIECE_ROWS", 700)
-    kept = tmp_path / "pass"
-    with monkeypatch.context() as patch:
-        stop_after(patch, times)
-        with pytest.raises(Stopped):
-            streaming.segment_file(opened(path), checkpoint=kept)
-    read = []
-    chunks = streaming.ChunkedLog.chunks
-
-    def counted(self, rows=1 << 18, first=0):
-        read.append(first)
-        return chunks(self, rows, first)
-
-    monkeypatch.setattr(streaming.ChunkedLog, "chunks", counted)
-    found, wanted = streaming.segment_file(opened(path), checkpoint=kept), streaming.segment_file(opened(path))
-    assert read == [times * 700, 0]
-    assert found.poses == wanted.poses
-    np.testing.assert_array_equal(found.accelerometer_mean, wanted.accelerometer_mean)
-    np.testing.assert_array_equal(found.gyroscope_sigma_mean, wanted.gyroscope_sigma_mean)
-    assert not kept.exists()
-
-
-def test_an_allan_stream_goes_on_to_the_same_bits():
-    clusters, cut = [1, 7, 100, 65536, 70000, 300000], 5
-    rng = np.random.default_rng(4)
-    chunks = [0.1 + rng.standard_normal((k, 2)) for k in (200_000, 3, 262_144, 1, 150_000, 99_999)]
-    states = []
-    budget = 2 * 8 * _core.AllanStream.LEAST_BUDGET
-    options = {"clusters": clusters, "budget_bytes": budget}
-    wanted = stream_noise(iter(chunks), 100.0, **options, keep=lambda n, state: states.append((n, state())))
-    n, state = states[cut - 1]
-    assert n == sum(len(c) for c in chunks[:cut])
-    found = stream_noise(iter(chunks[cut:]), 100.0, **options, state=state)
-    np.testing.assert_array_equal(found.curve.deviation, wanted.curve.deviation)
-    assert [axis.terms for axis in found.axes] == [axis.terms for axis in wanted.axes]
 
 
 def test_the_state_of_another_stream_is_refused():

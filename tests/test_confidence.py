@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from confidence.machine import robot
+import trihedron
+import trihedron.estimate.session.solved as solved_session
 from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand, manual, table
-from trihedron import calibrate
-from trihedron.records import FindingCode
-
-
-def with_losses(f, w, seed, share=0.03):
-    """Readings of a link that drops packets, numbered anew."""
-    kept = np.random.default_rng([14, seed]).random(len(f)) >= share
-    return f[kept], w[kept]
+from trihedron import calibrate, diagnose
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT
+from trihedron.estimate.session.solved import calibrate_joint
+from trihedron.records import FindingCode, Recording
+from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
+from true_segments import segments_from_truth
 
 
 def gyro_z(result, truth):
@@ -36,11 +36,7 @@ def test_stated_turns_on_faces_win_over_a_wrong_nominal_scale_and_unstated_ones_
     f, w, rate, truth, motion = table(7, turns=(180.0, -180.0))
     stated = [angle for _, _, angle in motion.turns]
     result = calibrate(
-        recorded(f, w, rate),
-        gravity_m_s2=G,
-        method="faces",
-        turns_deg=stated,
-        gyroscope_nominal=2.0 * truth.S_w[0, 0],
+        recorded(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=stated, gyroscope_nominal=2.0 * truth.S_w[0, 0]
     )
     z, relative = gyro_z(result, truth)
     assert np.abs(z).max() < 4.0
@@ -66,29 +62,6 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
         calibrate(recorded(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
 
 
-def test_lost_samples_with_stamps_remade_are_seen_through_ringing():
-    seed = 41
-    f, w, rate, _, _ = robot(seed, n_poses=12)
-    result = calibrate(recorded(*with_losses(f, w, seed), rate), gravity_m_s2=G)
-    lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
-    assert lost
-    assert not result.is_trustworthy
-    # 3 % were lost; a ringing arm shows some of them only: within four of the share's own standard errors.
-    seen = lost[0].numbers
-    assert abs(seen["lost_share"] - 0.03) < 4.0 * seen["sigma_lost_share"]
-    assert seen["sigma_lost_share"] < 0.04
-
-
-def test_moves_through_hundreds_of_degrees_need_no_nominal_scale():
-    # Turns of up to 360° one after another between two poses.
-    f, w, rate, truth, _ = robot(43, n_poses=14, speed_deg_s=300.0)
-    result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
-    assert result.is_trustworthy
-    z, relative = gyro_z(result, lower(truth))
-    assert np.abs(z).max() < 4.0
-    assert relative < 0.01
-
-
 def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
     f, w, rate, truth, motion = table(610080, turns=(360.0, -360.0))
     turns = [angle for _, _, angle in motion.turns]
@@ -99,23 +72,151 @@ def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
     assert np.mean(np.square(z)) > 0.1, "bars that say nothing would pass as well"
 
 
-def test_losses_that_no_step_shows_are_in_the_error_bars_and_said():
-    # At 1000 Hz a lost sample is below the noise of a reading, and each move lost two of its 2000: 0.1 % of the scale,
-    # ten standard errors of the bars without them.
-    f, w, rate, truth, _ = hand(400, rate_hz=1000.0)
-    result = calibrate(recorded(*with_losses(f, w, 400, 0.001), rate), gravity_m_s2=G)
-    z, _ = gyro_z(result, lower(truth))
-    assert np.abs(z).max() < 4.5
-    assert FindingCode.LOSSES_POSSIBLE in {finding.code for finding in result.findings}
-    assert not result.is_trustworthy
+@pytest.fixture
+def solved(monkeypatch):
+    """The session solutions that calibrations came from, in turn."""
+    kept, plain = [], solved_session.solve_session
+
+    def kept_too(*given):
+        kept.append(plain(*given))
+        return kept[-1]
+
+    monkeypatch.setattr(solved_session, "solve_session", kept_too)
+    return kept
 
 
-def test_a_machine_that_always_turns_at_one_speed_is_not_at_its_gyros_limit():
-    # Half a degree per second a step: its top speed is one code. Bridged as if cut, scales were wrong by a fifth.
-    f, w, rate, truth, _ = robot(3000, gyro_bits=12)
+@pytest.mark.parametrize("seed", [820058, pytest.param(820032, marks=pytest.mark.slow)])
+def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, solved):
+    # Ten readings a second of a hand that trembles: moves and velocities miss by tens of standard errors.
+    f, w, rate, truth, _ = hand(seed, rate_hz=10.0)
     result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
-    assert FindingCode.CLIPPING not in {finding.code for finding in result.findings}
-    if result.gyroscope is not None and result.is_trustworthy:
-        z, relative = gyro_z(result, lower(truth))
-        assert np.abs(z).max() < 4.0
-        assert relative < 5e-3
+    solution = solved[-1]
+    assert solution.inflation[0] > 10.0
+    assert solution.inflation[1] == pytest.approx(NO_WEIGHT)
+    domain, leverage = solution.core.labels[:, 0], solution.core.leverage()
+    # Widened along with gravity, as one error common to both, velocities showed six of the gyro's nine parameters.
+    assert leverage[domain == DYNAMICS].sum() < 0.1
+    assert leverage[domain == MOVES].sum() > 8.9
+    # Moves count as uncertain as they miss, not a third less; a likeliest excess counts rows, χ² degrees of freedom.
+    assert solution.moves_chi2 / solution.inflation[0] ** 2 / solution.moves_dof < 1.2
+    z = (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
+    # 5.1 and 3.8 before; nine parameters of one session are within 3.5 in all but one of two hundred sessions.
+    assert np.abs(z).max() < 3.5
+
+
+def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
+    wider, scores = [], []
+    for seed in range(2):
+        f, w, rate, truth, _ = hand(seed + 840100)
+        t = np.arange(len(f)) / rate
+        kept = np.random.default_rng([14, seed]).random(len(t)) >= 0.03
+        whole = calibrate(recorded(f, w, rate), gravity_m_s2=G)
+        part = calibrate(recorded(f[kept], w[kept], rate, t[kept]), gravity_m_s2=G)
+        wider.append(np.median(part.gyroscope.sigma_S / whole.gyroscope.sigma_S))
+        scores.append((part.gyroscope.S - lower(truth).S_w) / part.gyroscope.sigma_S)
+    # A cubic through four samples crosses one of a smooth move nearly without error: a rate that might be anywhere
+    # between its neighbours made the bars 1.8 to 2.4 times as wide (1.02 to 1.04 now).
+    assert max(wider) < 1.2
+    # 18 numbers of two sessions: rms 1 ± 0.17, each session's nine being weakly correlated.
+    assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.4
+
+
+def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
+    """Nine lengths of gravity separate no spread of the bias from none: moves that are not bent do."""
+    scores = []
+    for seed in range(3):
+        f, w, rate, truth, _ = hand(850100 + seed, n_poses=9)
+        result = calibrate(recorded(f, w, rate), gravity_m_s2=G)
+        low = np.tril_indices(3)
+        of_S = (result.accelerometer.S - lower(truth).S_f)[low] / result.accelerometer.sigma_S[low]
+        scores.append([*of_S, *((result.accelerometer.b - lower(truth).b_f) / result.accelerometer.sigma_b)])
+    rms = np.sqrt(np.mean(np.square(scores)))
+    # 27 numbers, correlated within a session: 1 +- 0.3. It was 0.36 to 0.40 over 40 and 60 sessions.
+    assert 0.55 < rms < 1.4
+
+
+def test_the_zero_of_a_session_is_that_of_its_middle():
+    # A bias that drifts by 60 mm/s² over the session: the first pose's is 30 mm/s² from that of the middle.
+    drift = 0.06
+    away = []
+    for seed in range(3):
+        recording, truth = simulate(
+            Scenario(
+                motion=hand_session(20, pose_s=2.0, first_pose_s=3.0),
+                accelerometer=Accelerometer(noise=NoiseTerms(N=(2e-3,) * 3)),
+                gyroscope=Gyroscope(noise=NoiseTerms(N=(2e-4,) * 3)),
+            ),
+            seed,
+        )
+        part = np.linspace(-0.5, 0.5, recording.n_samples)[:, np.newaxis]
+        drifting = Recording(
+            recording.time_s, recording.accelerometer + drift * part, recording.gyroscope, recording.rate_hz,
+            accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
+        )  # fmt: skip
+        segments = segments_from_truth(drifting, truth)
+        alone, _ = calibrate_norm(
+            segments.accelerometer_mean, segments.accelerometer_sigma_mean, truth.gravity_m_s2, raw_unit="m/s^2"
+        )
+        found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given")
+        middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
+        # f = S a' + b, so that b is minus the bias.
+        away.append(found.accelerometer.b + drift * middle)
+    # A third of what the bias of the first pose is away.
+    assert np.sqrt(np.mean(np.square(away))) < drift / 2 / 3
+
+
+def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
+    f, w, rate, _, _ = hand(9002, move_s=1.5, gyro_flicker=np.radians(20.0 / 3600.0), accel_flicker=0.3e-3 * G)
+    assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"
+
+
+RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
+NOISE = 0.02
+
+
+def log(seed, size=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):
+    """Accelerometer (n, 3) of poses in random directions: a bias ``size`` that decays after moves, a ``drift`` [m/s²]
+    over the log, and supports that give way by ``tilt_rad``."""
+    rng = np.random.default_rng(seed)
+    up = rng.normal(size=(N_POSES, 3))
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    parts = []
+    for before, here in zip(np.vstack([up[:1], up[:-1]]), up, strict=True):
+        x = np.linspace(0.0, 1.0, int(MOVE_S * RATE_HZ))[:, None]
+        path = before * (1.0 - x) + here * x + 0.3 * np.sin(np.pi * x) * rng.normal(size=3)
+        t = np.arange(POSE_S * RATE_HZ)[:, None] / RATE_HZ
+        across = np.cross(here, rng.normal(size=3))
+        across /= np.linalg.norm(across)
+        lean = tilt_rad * rng.choice([-1.0, 1.0]) * np.exp(-t / 1.5)
+        rest = here * np.cos(lean) + across * np.sin(lean)
+        parts += [
+            9.81 * path / np.linalg.norm(path, axis=1)[:, None],
+            9.81 * rest + np.array(size) * np.exp(-t / tau_s),
+        ]
+    force = np.concatenate(parts[1:])
+    force = force + drift * np.linspace(0.0, 1.0, len(force))[:, None] + NOISE * rng.normal(size=force.shape)
+    time_s = np.arange(len(force)) / RATE_HZ
+    return trihedron.Recording(time_s, force, None, RATE_HZ, accelerometer_unit="m/s^2")
+
+
+def found(recording):
+    """The finding, if any."""
+    findings = trihedron.segment(recording).findings
+    return next((one for one in findings if one.code is FindingCode.BIAS_SETTLING), None)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bias_that_settles_has_its_size_and_marks_the_calibration(seed):
+    recording = log(seed, size=(0.05, 0.0, -0.03))
+    one = found(recording)
+    assert one is not None
+    size = np.array([one.numbers[f"{axis}_mg"] for axis in "xyz"]) * 9.81e-3
+    # The time constants tried are a factor of two apart: the size at the start is known to about a quarter.
+    assert np.abs(size - [0.05, 0.0, -0.03]).max() < 0.025
+    assert not trihedron.calibrate(recording, gravity_m_s2=9.81).is_trustworthy
+
+
+def test_drift_noise_and_yielding_supports_are_no_settling_bias():
+    logs = [log(seed, drift=0.05, tilt_rad=2e-3 * (seed % 2)) for seed in range(100, 120)]
+    # Each is a false alarm once in a thousand.
+    assert sum(found(one) is not None for one in logs) == 0

@@ -11,7 +11,6 @@ from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import table
 from trihedron import calibrate
-from trihedron.session.averaging import sharpened
 from trihedron.simulate import scenario_by_name, simulate, table_turns
 
 
@@ -55,44 +54,24 @@ WEAKNESSES = {
     ),
     # Stops of two seconds that still turned by a degree were poses, and S_w was off by six standard errors.
     "pauses of slow moves": Weakness(710, AXIS_BY_AXIS | {"move_s": 25.0, "poses": 12}, {"S_w": 4.0}, (12, 12)),
-    # What a pause turned before and after its middle was no part of the moves beside it: S_w was off by 4.1.
-    "pauses that turn throughout": Weakness(
-        1, {"path": "axis by axis", "move_s": 25.0, "pose_s": 2.0, "poses": 14, "support": "settling"}, {"S_w": 3.0}
-    ),
     # The last seconds before it was set down were a pose that settles: three of eight were trusted, of 20 poses for 12.
     "onto a support that settles": Weakness(
         800, {"move_s": 30.0, "support": "settling", "poses": 12}, {"S_w": 4.0}, (1, 14), True
     ),
-    # As a factor on rounding, it left the moves right that rounding reaches least: b_w was off by up to 5.7.
-    "a support turns inside a step": Weakness(7003, QUICK | {"support": "settling"}, {"S_w": 4.0, "b_w": 4.0}),
     # Free between the moves, the bias followed the jitter of the timestamps by many of its steps.
     "late timestamps": Weakness(7200, AXIS_BY_AXIS | QUICK | {"bits": 16, "timestamps": "late"}, {"b_w": 4.0}),
     # At its steady top speed it was a pose that shakes, and b_w followed by up to ten standard errors.
     "middle of a slow turn about the vertical": Weakness(
         7002, AXIS_BY_AXIS | {"move_s": 25.0, "bits": 14, "tremor_deg_s": 0.0}, {"b_w": 4.0}, (18, 18)
     ),
-    # Half an LSB of its ADC represented the scatter of its mean readings, and pauses that turned lost 1.3 % of S_w.
-    "coarse gyro that its noise dithers": Weakness(510002, drawn(510002), {"S_w": 4.0}),
-    # A pose whose readings toggle between two codes was one that moves, and S_w followed its ends by up to 7.8.
-    "poses between two codes": Weakness(764860, drawn(764860), {"S_w": 4.0}, is_slow=True),
-    # A bias that drifts by less than an LSB was taken as constant, and moves that showed the drift were left out.
-    "bias that drifts inside its LSB": Weakness(1010238, drawn(1010238), {"S_w": 4.0, "b_w": 4.0}),
     # A blow that no code of the gyro showed was a move without rotation, and b_w was off by 13.6 standard errors.
     "move without a change of code": Weakness(764410, drawn(764410), {"b_w": 4.0}),
-    # One reading in five was of the other code, and the axis was never at rest: b_w was off by 6.7.
-    "bias near the edge of a code": Weakness(720303, drawn(720303), {"b_w": 4.0}),
     # Velocities over moves of 0.6 s were believed to 1e-4 of gravity: S_f was off by 5.4 and 4.4 standard errors.
     "rounding at the ends of quick moves": Weakness(900012, drawn(720498), {"S_f": 3.5}, is_trusted=True),
     # Twelve poses leave three degrees of freedom, which do not show a drift: b_f was off by 8.0 standard errors.
     "drift behind few poses": Weakness(993049, drawn(993049), {"S_f": 4.0, "b_f": 4.0}),
-    # Two warm-ups fit twelve poses alike, and both were off by ten standard errors.
-    "drift along one of several curves": Weakness(994107, drawn(994107), {"S_f": 4.0}),
     # The noise of the gyro hid that a pause of a slow move goes on turning: S_w was off by 6.3.
     "pause that turns below the noise": Weakness(997867, drawn(997867), {"S_w": 5.0}),
-    # What a pause turned inside an LSB was a change of its bias: S_w was off by 5.7.
-    "pause that turns inside an LSB": Weakness(1050660, drawn(1050660), {"S_w": 4.0}),
-    # Lost samples, which its clock excludes, were to explain what a support turned inside an LSB: b_w was off by 6.4.
-    "support that turns inside a large LSB": Weakness(1050419, drawn(1050419), {"S_w": 3.0, "b_w": 4.0}),
 }
 
 
@@ -129,14 +108,6 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
         assert np.abs(scores).max() < 4.0
 
 
-def test_a_mean_over_the_interval_gives_the_value_in_its_middle_back():
-    t = np.arange(200) * 0.01
-    value, mean = np.sin(9.0 * t), np.sin(9.0 * t) * np.sin(0.045) / 0.045
-    back = sharpened(np.repeat(mean[:, None], 3, axis=1), t, 1.0)
-    # Ninth of a radian a sample: the second difference leaves h⁴/1920 of the value.
-    assert np.abs(back[1:-1, 0] - value[1:-1]).max() < 1e-2 * np.abs(mean - value).max()
-
-
 def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
     f, w, rate, _, motion = table(6, turns=(180.0, -180.0))
     log = recorded(f, w, rate)
@@ -171,16 +142,6 @@ def test_a_delay_between_the_sensors_that_hides_in_the_noise_of_velocities_moves
     # 27 numbers; S_w followed the delay by four to eight standard errors, X one way and Z the other.
     assert np.abs(scores).max() < 4.0
     assert np.sqrt(np.mean(np.square(scores))) < 1.5
-
-
-@pytest.mark.parametrize(("rate_hz", "sessions"), [pytest.param(25.0, 6, marks=pytest.mark.slow), (100.0, 2)])
-def test_what_misalignment_turns_inside_a_step_is_an_error_that_all_moves_share(rate_hz, sessions):
-    # Added as if it scattered from move to move, S_w was off by up to 7, b_w by up to 10 standard errors.
-    found = [calibrated(7000 + k, path="axis by axis", rate_hz=rate_hz, **QUICK)[1] for k in range(sessions)]
-    scores = np.array([[*z["S_w"], *z["b_w"]] for z in found])
-    # 24 or 72 numbers, of which those of a session share its readings.
-    assert np.abs(scores).max() < 4.0
-    assert np.sqrt(np.mean(np.square(scores))) < 1.45
 
 
 def test_an_accelerometer_that_warms_up_is_as_certain_as_its_errors_are_small():

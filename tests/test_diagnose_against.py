@@ -1,18 +1,24 @@
 """A given model held against a recording: numbers are distinguished from physics, in any frame."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from small_session import SCENARIO
+from small_session import SCENARIO, G, made_once
+from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
-from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.records.diagnosis import ParameterDifference
+from trihedron.report import diagnosis_report
+from trihedron.report.diagnosis_numbers import differing_numbers
+from trihedron.report.document import Picture
+from trihedron.simulate import Scenario, hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
 
@@ -27,6 +33,16 @@ def sensor(rng):
 def fitted(S_a, b_a, S_g, b_g, sigma=1e-6):
     covariance = np.diag(np.r_[np.full(9, sigma), np.full(3, 1e-3), np.full(9, sigma), np.full(3, 1e-5)] ** 2)
     return FittedModel(FittedSensor(S_a, b_a, "counts"), FittedSensor(S_g, b_g, "counts"), covariance)
+
+
+@pytest.mark.parametrize(("sigmas", "named"), [((1.0, 2.5, 2.0), ["Y"]), ((8.0, 1.0, 5.0), ["X", "Z"])])
+def test_of_a_group_that_differs_the_parameters_that_differ_are_named_or_the_one_that_does_most(sigmas, named):
+    group = [
+        ParameterDifference("gyro-bias", "gyroscope", axis, 0.0, s * 1e-4, s * 1e-4, 1e-4, "rad/s", 1e-3, True)
+        for axis, s in zip("xyz", sigmas, strict=True)
+    ]
+    said = differing_numbers(SimpleNamespace(parameters=group))
+    assert [one.split()[2] for one in said] == named
 
 
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
@@ -126,23 +142,51 @@ def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve
     assert ".toml" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):
-    profile, accel, gyro = unit
-    logs = []
-    for layout, seed, start in ((31, 61, 25.0), (32, 62, 34.0)):
-        scenario = with_effect(
-            Scenario(hand_session(24, layout=layout), "unit", accel, gyro, profile.clock),
-            "accel-thermal-scale", per_k=(6e-4, -5e-4, 7e-4),
-        )  # fmt: skip
-        temperature = replace(
-            scenario.environment.temperature, start_degc=start, warm_up_k=8.0, warm_up_tau_s=60.0, logged=True
-        )
-        logs.append(
-            simulate(replace(scenario, environment=replace(scenario.environment, temperature=temperature)), seed)[0]
-        )
-    found = trihedron.diagnose(logs[1], against=logs[0], gravity_m_s2=9.80665)
-    scale = max(abs(p.difference) for p in found.parameters if p.id == "accel-scale")
-    # Nine kelvins of 6e-4 are there, and belong to the effect that both have.
-    assert scale > 3e-3
-    assert not any(p.significant for p in found.parameters), [p.id for p in found.parameters if p.significant]
+def rejected(given, capsys):
+    """The one sentence on stderr."""
+    log = made_once() / "log.csv"
+    assert main(["diagnose", str(log), "--gravity", G, "--against", str(given)]) == 1
+    said = capsys.readouterr().err.strip()
+    assert "Traceback" not in said
+    return " ".join(said.split())
+
+
+def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):
+    assert "no such file" in rejected(tmp_path / "absent.csv", capsys)
+    belongs = "this is a trihedron calibration, no log; name it with --calibration"
+    assert belongs in rejected(made_once() / "c.json", capsys)
+    empty = tmp_path / "words.csv"
+    empty.write_text("nothing,here\n")
+    assert "words.csv" in rejected(empty, capsys)
+    rng = np.random.default_rng(3)
+    rows = np.column_stack([np.arange(2000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (2000, 6))])
+    still = tmp_path / "still.csv"
+    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
+    still.write_text(head + "\n".join(",".join(f"{v:.6g}" for v in row) for row in rows) + "\n")
+    said = rejected(still, capsys)
+    assert "the simulated recording cannot be calibrated" in said
+    assert "pose" in said
+
+
+def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, capsys):
+    log, bare = made_once() / "log.csv", tmp_path / "bare.csv"
+    bare.write_text("\n".join(",".join(line.split(",")[:4]) for line in log.read_text().splitlines()) + "\n")
+    for recording, model, lacks in ((log, bare, "the simulated log has none"), (bare, log, "the recording has none")):
+        assert main(["diagnose", str(recording), "--gravity", G, "--against", str(model), "--full"]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert "the gyro was not compared." in said
+        assert lacks in said
+
+
+def test_gravity_is_that_of_the_scenario_unless_given():
+    """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
+    at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=12, pose_s=2.0, move_s=1.0))
+    at_the_pole = replace(at_the_pole, environment=replace(at_the_pole.environment, gravity_m_s2=9.832))
+    found = trihedron.diagnose(simulate(at_the_pole, 5)[0], against=at_the_pole)
+    assert found.calibration.gravity_m_s2 == 9.832
+    assert found.gravity_source == "that of the scenario"
+    assert not [p for p in found.parameters if p.significant and p.id in ("accel-scale", "gravity")]
+    assert gravity_of_scenario(scenario_by_name("hand-session")) is None
+    # Its readings are drawn over those of the log, which a reader looks for first.
+    pictures = [b.name for s in diagnosis_report(found).sections for b in s.blocks if isinstance(b, Picture)]
+    assert "traces" in pictures

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -18,10 +18,7 @@ from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
-from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.domains import not_explained
-from trihedron.report.document import Picture
-from trihedron.report.extended import calibration_result_report
+from trihedron.records import FindingCode
 from trihedron.simulate import (
     Accelerometer,
     Gyroscope,
@@ -141,7 +138,7 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     effect = {"id": effect_id, "model": {"variant": "linear" if key == "per_k" else "", "values": list(values)}}
     identity = (np.eye(3), np.zeros(3))
     done = compensate(recording, [effect], {"temperature_degc": 25.0}, identity, identity)
-    assert not done.left_out
+    assert done.applied == (effect_id,)
     sensor, true = (
         ("gyroscope", truth.angular_rate_rad_s) if "gyro" in effect_id else ("accelerometer", truth.specific_force_m_s2)
     )
@@ -200,35 +197,3 @@ def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign():
         rtol=0.1,
         atol=0.01 * np.max(np.abs(size)),
     )
-
-
-def test_a_bent_accelerometer_is_bent_no_more_once_its_effect_is_found():
-    recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
-    bent = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    extended = trihedron.extend(bent)
-    said = [{one.code for one in result.calibration.findings} for result in (bent, extended)]
-    assert [FindingCode.NONLINEAR_RESIDUAL in codes for codes in said] == [True, False]
-    assert extended.is_trustworthy
-
-
-def test_a_warning_of_the_linear_fit_is_gone_once_the_effects_explain_the_domain_it_is_about():
-    codes = (FindingCode.GYRO_G_SENSITIVITY, FindingCode.NONLINEAR_RESIDUAL, FindingCode.POSE_SETTLING)
-    findings = tuple(Finding(code, Severity.WARNING, "Seen.", "", "") for code in codes)
-    for left, gone in {"dynamics": codes[:2], "static-gyro": codes[1:2], "static-accel": codes[:1]}.items():
-        remaining = (SimpleNamespace(domain=left, disagrees=True),)
-        kept = {one.code for one in not_explained(findings, remaining)}
-        assert kept == set(codes) - set(gone)
-
-
-def test_an_extended_calibration_shows_what_its_effects_change():
-    recording, _ = simulate(with_effect(scenario(layout=8, n_poses=18), "accel-quadratic", k2=K2), 8)
-    document = calibration_result_report(trihedron.extend(trihedron.calibrate(recording, gravity_m_s2=9.80665)))
-    linear, extended = document.lead.chart().panels[:2]
-    assert linear.title.startswith("linear model, in sample: ")
-    before, after = (float(panel.title.split()[-3]) for panel in (linear, extended))
-    # What S and b leave of the quadratic is several times the noise.
-    assert after < 0.5 * before
-    assert document.headlines[0].beside.startswith("rms, cross-validated, with the effects")
-    assert "accelerometer quadratic" in document.verdict
-    drawn = [b.name for section in document.sections for b in section.blocks if isinstance(b, Picture)]
-    assert {"effect-accel-quadratic", "orientation"} <= set(drawn)

@@ -150,23 +150,3 @@ def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not()
     assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
     # A recording whose biases are as good as none refutes nothing.
     assert not any(p.remark for p in compare_numbers(numbers(), numbers(), alpha=0.01).parameters)
-
-
-def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_file_are_none():
-    def counts(seed, step, offset=0.0):
-        rng = np.random.default_rng(seed)
-        readings = step * np.round(60.0 * rng.standard_normal((EVERY * N_POSES, 3)) / step) + offset
-        time = np.arange(len(readings)) / RATE_HZ
-        fit = FittedModel(
-            FittedSensor(1e-3 * np.eye(3), np.zeros(3), "counts"),
-            FittedSensor(1e-5 * np.eye(3), np.zeros(3), "counts"), np.eye(24),
-        )  # fmt: skip
-        made = Recording.from_arrays(time, readings, readings, accelerometer_unit="counts", gyroscope_unit="counts")
-        return sampled(made, POSES, fit)
-
-    fine = counts(1, 1.0)
-    found = said(counts(2, 16.0), fine)
-    assert "16 times the recording's" in found["accelerometer", "resolution"]
-    assert said(counts(3, 1.0), fine) == {}
-    # Readings that somebody corrected lie on no codes.
-    assert said(counts(4, 1e-4, 0.1234), fine) == {}

@@ -24,8 +24,8 @@ def recording(t, accelerometer, gyroscope, **more):
 
 
 def chamber(seed, hysteresis=0.0):
-    """Up from -10 to 60 °C and back, at 2 Hz in 80 min: the gyro's bias follows, lagging if there is hysteresis."""
-    n, rate_hz = 9600, 2.0
+    """Up from -10 to 60 °C and back, at 1 Hz in 80 min: the gyro's bias follows, lagging if there is hysteresis."""
+    n, rate_hz = 4800, 1.0
     t, accelerometer, gyroscope = still(n, rate_hz, seed)
     u = t / t[-1]
     heat = 25.0 - 35.0 * np.cos(2.0 * np.pi * u)

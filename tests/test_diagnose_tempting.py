@@ -134,8 +134,3 @@ def designed(seed, **levels):
 def test_the_curvature_of_quick_motion_is_not_jitter():
     # Both sensors saw a common time error of 0.4 ms, 7 of its standard errors.
     assert "timing-jitter" not in designed(0, rate_hz=50.0, move_s=1.2, path="axis by axis", tremor_deg_s=0.0)
-
-
-def test_readings_that_change_in_few_poses_have_no_line():
-    # The poses whose bias is near the edge of an LSB determined the spectrum: a line with p = 1e-9.
-    assert "periodic-interference" not in designed(1, rate_hz=20.0, move_s=8.0, bits=10, poses=20, pose_s=3.0)

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -20,7 +19,7 @@ except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
 import trihedron
-from documented import DOCS, blocks
+from documented import DOCS
 
 ROOT = DOCS.parent
 PAGES = sorted(DOCS.rglob("*.md"))
@@ -28,7 +27,6 @@ PAGES = sorted(DOCS.rglob("*.md"))
 MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
     "tutorials/notebook.md"
 }
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 # What a fence may say behind its backticks: a language, and nothing else.
 FENCE = re.compile(r"^ *```(.*)$", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -126,68 +124,7 @@ class SilentHandler(SimpleHTTPRequestHandler):
         pass
 
 
+@pytest.mark.slow
 def test_nothing_of_the_site_is_loaded_from_elsewhere(site):
     elsewhere = re.compile(r"""(?:src|href)="(?:https?:)?//[^"]+\.(?:js|css|woff2?)\"""")
     assert not [page for page in site[0].rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]
-
-
-# What is looked at in a page: its text outside code, its blocks of code, where its links go, what they may point at.
-LOOK = """() => {
-  const article = document.querySelector("article");
-  const prose = article.cloneNode(true);
-  prose.querySelectorAll("code, math").forEach((part) => part.remove());
-  return {
-    prose: prose.textContent,
-    code: [...article.querySelectorAll("pre > code")].map((part) => part.textContent),
-    links: [...document.querySelectorAll("a[href]")].map((part) => part.href),
-    names: [...document.querySelectorAll("[id]")].map((part) => part.id),
-    pictures: [...article.querySelectorAll("img")].filter((part) => !part.naturalWidth).map((part) => part.src),
-    spills: document.documentElement.scrollWidth > window.innerWidth,
-  };
-}"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
-@pytest.mark.skipif(find_spec("playwright") is None, reason="playwright is not installed (extra test)")
-@pytest.mark.filterwarnings("default")
-def test_every_page_in_a_browser_is_whole(site):
-    """No raw fence, no cut code, no picture missing, nothing beyond a phone's edge, every link holds."""
-    from playwright.sync_api import sync_playwright
-
-    made, home = site
-    seen, faults = {}, []
-    with sync_playwright() as tool:
-        browser = tool.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        tab = browser.new_page(viewport={"width": 390, "height": 800})
-        # The theme's search reads its whole index anew on every page: nothing that is looked at here.
-        tab.route("**/workers/*", lambda route: route.abort())
-        tab.on("pageerror", lambda error: faults.append(f"{tab.url}: {error}"))
-        for path in sorted(made.rglob("index.html")):
-            address = home + path.parent.relative_to(made).as_posix().removeprefix(".").rstrip("/")
-            address = address if address.endswith("/") else address + "/"
-            tab.goto(address, wait_until="load")
-            seen[address] = tab.evaluate(LOOK)
-        browser.close()
-    for page in PAGES:
-        relative = page.relative_to(DOCS).with_suffix("").as_posix()
-        shown = seen[home if relative == "index" else f"{home}{relative}/"]["code"]
-        faults += [
-            f"{page.name}: cut or missing: {b.text}"
-            for b in blocks(page)
-            if b.text.rstrip() not in map(str.rstrip, shown)
-        ]
-    names = {address: set(of["names"]) | {"", "__comments"} for address, of in seen.items()}
-    for address, of in seen.items():
-        faults += [f"{address}: raw Markdown" for raw in ("```", "](", "$$") if raw in of["prose"]]
-        faults += [f"{address}: picture {picture}" for picture in of["pictures"]]
-        faults += [f"{address}: wider than a phone"] * of["spills"]
-        for link in of["links"]:
-            page, _, name = link.partition("#")
-            if not link.startswith(home):
-                continue
-            if page not in names:
-                faults += [] if (made / page.removeprefix(home)).is_file() else [f"{address}: {link}"]
-            elif name not in names[page]:
-                faults.append(f"{address}: {link}")
-    assert faults == []

@@ -1,16 +1,32 @@
-"""Effects as curves over the variable that drives them, found from their columns, with what poses show beside them."""
+"""Effects as curves over what drives them, in words that the catalogue holds, and as empirical relations."""
 
-from types import SimpleNamespace
+import ast
+import inspect
+import re
+import textwrap
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from diagnosed_session import diagnosed
-from trihedron.diagnose.effects.contract import Variant
+from trihedron.api.diagnosing import diagnose
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
-from trihedron.diagnose.effects.thermal import GyroThermalBias
 from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.effects.catalogue import CATALOGUE, REASONS
+from trihedron.report.effects.page import page
+from trihedron.report.findings.wording import places
+from trihedron.report.text import to_text
+from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.simulate.profiles import profile_by_name
 
 G = 9.80665
 
@@ -52,38 +68,6 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         assert effect.held_out[0].chi2_per_dof_after < 1.3 < effect.held_out[0].chi2_per_dof_before
 
 
-def variants(temperature, rate, n_poses=10):
-    obs = SimpleNamespace(n_poses=n_poses)
-    log = SimpleNamespace(temperature=temperature, temperature_rate=rate, obs=obs, on_gyros=on_axes)
-    return GyroThermalBias().variants(log)
-
-
-def on_axes(values):
-    return np.eye(3)[None] * values[:, None, :]
-
-
-@pytest.mark.parametrize(
-    ("rate", "n_poses", "labels"),
-    [
-        (np.full(50, 0.01), 10, ["linear", "quadratic"]),
-        (np.linspace(0.02, 0.001, 50), 10, ["linear", "quadratic", "rate"]),
-        (np.repeat([0.04, -0.04], 25), 10, ["linear", "quadratic", "rate", "hysteresis"]),
-        # Subtracted from another log, every shape exists.
-        (np.full(50, 0.01), 0, ["linear", "quadratic", "rate", "hysteresis"]),
-    ],
-)
-def test_a_rate_or_a_branch_is_offered_only_where_temperature_shows_one(rate, n_poses, labels):
-    assert [one.label for one in variants(np.linspace(-10.0, 10.0, 50), rate, n_poses)] == labels
-
-
-def test_the_gap_between_branches_is_twice_the_parameter():
-    t = np.r_[np.linspace(0, 20, 40), np.linspace(20, 0, 40)] - 10.0
-    made = variants(t, np.repeat([0.04, -0.04], 40))[3]
-    values = made.distortion.rate @ np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0])
-    np.testing.assert_allclose(values[0], [1.0, 2.0, 3.0])
-    np.testing.assert_allclose(values[0] - values[-1], [2.0, 4.0, 6.0])
-
-
 def turning(latitude, azimuth):
     level = np.cos(latitude)
     return EARTH_RATE_RAD_S * np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(latitude)])
@@ -120,3 +104,129 @@ def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_
     near = nearest_turning(value, np.diag(np.square([5e-6, 5e-6, 8e-4])))
     assert abs(np.degrees(near.latitude)) == pytest.approx(35.0, abs=3.0 * np.degrees(near.latitude_std))
     assert np.degrees(near.latitude_std) < 15.0
+
+
+ROOT = Path(__file__).parents[1]
+DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
+STATIC = {"static", "static-counts"}
+
+
+def ours():
+    """Effects of the package: other tests may have added their own."""
+    return [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
+
+
+def cases_of(effect):
+    """(case or None where only the run decides, names of the values) of every sentence that an effect can request."""
+    for kind in type(effect).__mro__:
+        if kind in (Effect, object) or not kind.__module__.startswith("trihedron.diagnose.effects"):
+            continue
+        for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(kind)))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "reported":
+                case = node.args[0].value if isinstance(node.args[0], ast.Constant) else None
+                yield case, {keyword.arg for keyword in node.keywords}
+
+
+def test_every_effect_has_its_words_and_every_word_its_effect():
+    assert set(CATALOGUE) == {effect.id for effect in ours()}
+    assert all(entry.mechanism and entry.experiment for entry in CATALOGUE.values())
+    assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == set(CATALOGUE)
+
+
+def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
+    asked = 0
+    for effect in ours():
+        said, seen = dict(CATALOGUE[effect.id].said), set()
+        for case, given in cases_of(effect):
+            # A case that the run chooses: each that nothing else requests takes these values.
+            for one in [case] if case else set(said) - STATIC:
+                assert places(said[one]) == given, f"{effect.id} '{one}'"
+                seen.add(one)
+        assert seen == set(said) - STATIC, effect.id
+        asked += len(seen)
+    assert asked > 15
+
+
+def test_every_reason_is_given_somewhere_and_with_its_places():
+    given = {}
+    for path in DIAGNOSE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "why_not":
+                name = node.args[0].value
+                given[name] = {keyword.arg for keyword in node.keywords}
+                assert places(REASONS[name]) == given[name], f"{path.name}: {name}"
+    assert set(given) == set(REASONS)
+
+
+class Own(Effect):
+    """As a user's file adds one, but without an id of its own: it stays out of the catalogue."""
+
+    mechanism = "the readings follow the moon"
+    experiment = "wait a fortnight"
+
+    def variants(self, context):  # noqa: ARG002
+        return []
+
+
+def test_an_effect_of_a_users_own_file_brings_its_own_words():
+    own = Own()
+    own.id = "moon"
+    strongest = (EffectParameter("m_x", 1.0, 0.5, "1"), EffectParameter("m_y", 2.0, 0.1, "m/s^2"))
+    assert own.statement(strongest) == "the readings follow the moon (strongest term m_y: 2 ± 0.1 m/s²)."
+    assert own.separating_experiment() == "wait a fortnight"
+    with pytest.raises(KeyError):
+        own.reported("no such case")
+
+
+DEG = np.pi / 180.0
+
+
+def session(seed, n_poses=30):
+    """A healthy session: log, truth, (n,) number of the pose that a sample is nearest to, and how many there are."""
+    profile = profile_by_name("adis")
+    accelerometer, gyroscope = profile.unit(seed)
+    log, truth = simulate(
+        Scenario(hand_session(n_poses, layout=seed), "", accelerometer, gyroscope, profile.clock), seed
+    )
+    poses = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
+    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(poses)]
+    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(poses)
+
+
+def added(log, truth, of_rate):
+    """The log with ``of_rate`` (n, 3) rad/s in the gyro's readings."""
+    return replace(log, gyroscope=log.gyroscope + of_rate @ np.linalg.inv(truth.gyroscope_S).T)
+
+
+def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter():
+    log, truth, _, _ = session(4, 22)
+    vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply([0.8, 0.3, -0.5])
+    log = added(log, truth, 0.05 * DEG * vector @ np.array([[1.0, 0.2, 0], [0, -0.8, 0.5], [0.3, 0, 0.9]]))
+    result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert "gyro-bias-repeatability" not in [effect.id for effect in result.effects]
+    assert result.verdict == "unexplained"
+    assert result.relations[0].depends_on == ("vector fixed in the world frame",)
+    angle = next(p for p in result.relations[0].coefficients if p.unit == "deg")
+    # The vector may as well point the other way, its coupling being reversed.
+    true = np.degrees(np.arccos(-0.5 / np.sqrt(0.98)))
+    assert min(abs(angle.value - true), abs(180.0 - angle.value - true)) < 4.0 * angle.std
+    assert "fixed in the world frame" in to_text(diagnosis_report(result))
+
+
+def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():
+    log, truth, pose, n_poses = session(3)
+    sign = np.random.default_rng(5).choice([-1.0, 1.0], n_poses)
+    turn = np.zeros(n_poses)
+    for part, nearest in ((p, pose[p.stop - 1]) for p in truth.segments if p.kind == "move"):
+        turn[nearest] = np.sign(truth.angular_rate_rad_s[part.start : part.stop, 1].sum())
+    of_rate = np.zeros((log.n_samples, 3))
+    of_rate[:, 1] = 0.03 * DEG * np.where(turn == 0.0, sign, turn)[pose]
+    result = diagnose(added(log, truth, of_rate), gravity_m_s2=truth.gravity_m_s2)
+    assert result.verdict == "unexplained"
+    (relation,) = result.relations
+    assert relation.depends_on == ("sign of the last rotation about y",)
+    assert relation.share > 0.1  # one axis of three follows it
+    said = " ".join(to_text(diagnosis_report(result)).split())
+    assert "the misfit follows sign of the last rotation about Y." in said
+    (size,) = (c for c in relation.coefficients if c.name.startswith("y"))
+    assert abs(size.value - 0.03 * DEG) < 4.0 * size.std

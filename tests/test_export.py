@@ -12,13 +12,7 @@ import yaml
 
 from trihedron.cli import main
 from trihedron.files.calibration import write_calibration
-from trihedron.files.formats import (
-    ExportOptions,
-    NoiseFigure,
-    SensorNoise,
-    export_files,
-    targets,
-)
+from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, export_files, targets
 from trihedron.files.formats.imu_tk import upper_frame
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame

@@ -11,7 +11,6 @@ import trihedron
 from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
 from trihedron.cli import main
 from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
-from trihedron.files.formats.parsing import yaml_of
 
 READ = [name for name, one in formats().items() if one.read is not None]
 BOARDS = ("ardupilot", "px4")
@@ -92,23 +91,6 @@ def test_results_of_kalibr_as_its_writer_dumps_them_with_a_second_imu_and_no_bia
         assert back.extensions["without_bias"] == ("accelerometer", "gyroscope")
 
 
-def test_a_basalt_file_with_cameras_around_the_imu(tmp_path):
-    known = calibration("si")
-    document = json.loads(export_files(known, "basalt", NOISE)[""])
-    document["value0"] |= {
-        "T_imu_cam": [{"px": 0.1, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}],
-        "intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 500.0, "xi": -0.2, "alpha": 0.5}}],
-        "resolution": [[640, 480]],
-        "vignette": [],
-        "cam_time_offset_ns": 0,
-    }
-    (tmp_path / "calib.json").write_text(json.dumps(document))
-    back = any_calibration(tmp_path / "calib.json")
-    np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, atol=1e-12)
-    np.testing.assert_allclose(READINGS @ back.gyroscope.S.T + back.gyroscope.b,
-                               READINGS @ known.gyroscope.S.T + known.gyroscope.b, atol=1e-12)  # fmt: skip
-
-
 CAMCHAIN = {
     "cam0": {
         "T_cam_imu": np.eye(4).tolist(),
@@ -179,35 +161,6 @@ def test_the_result_of_imucal_on_a_recording_is_read(real_data):
     p = {k: np.array(v) for k, v in json.loads(file.read_text()).items() if isinstance(v, list)}
     acc = (READINGS - p["b_a"]) @ (np.linalg.inv(p["R_a"]) @ np.linalg.inv(p["K_a"])).T
     np.testing.assert_allclose(READINGS @ back.accelerometer.S.T + back.accelerometer.b, acc, **ROUNDING)
-
-
-def test_small_yaml_is_read_as_the_library_reads_it():
-    text = """imu0:
-  T_i_b:
-  - [1.0, 0.0]
-  - - 0.5
-    - -1.0e-3
-  model: scale-misalignment  # a comment
-  rostopic: "/imu0"
-  update_rate: 200.0
-"""
-    whole = yaml.safe_load(text)["imu0"]
-    small = yaml_of(text)["imu0"]
-    assert small["T_i_b"] == [v for r in whole["T_i_b"] for v in r]
-    assert {k: small[k] for k in ("model", "rostopic", "update_rate")} == {
-        k: whole[k] for k in ("model", "rostopic", "update_rate")
-    }
-
-
-def test_a_foreign_calibration_is_exported_to_another_program(tmp_path):
-    known = calibration("si")
-    (tmp_path / "camera.json").write_text(export_files(known, "realsense")[""])
-    made = trihedron.export(tmp_path / "camera.json", "python")[""]
-    scope: dict = {}
-    exec(made, scope)
-    np.testing.assert_allclose(
-        READINGS @ scope["S_ACCELEROMETER"].T + scope["B_ACCELEROMETER"], corrected(known.accelerometer), **ROUNDING
-    )
 
 
 def test_the_list_of_targets_says_what_each_needs_and_files_out_of_order_are_refused(tmp_path, capsys):

@@ -9,19 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from scipy.spatial.transform import Rotation
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.api.filter_noising import noticed
-from trihedron.estimate.filter_noise.beside_reference import (
-    ANGLE,
-    independent_or_not,
-    informed,
-    parts_of,
-)
-from trihedron.estimate.filter_noise.strengths import Fitted, Prior, _of_axes, _without_noise, fit, unlike_axes_beside
-from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, matern, walked
+from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
+from trihedron.estimate.filter_noise.strengths import Prior, fit
+from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
 from trihedron.estimate.filter_noise.stretches import bias_steps
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording
@@ -53,16 +47,6 @@ def drawn(seed, m=60):
     return replace(stretch, observed=L @ np.random.default_rng(seed).normal(size=3 * m))
 
 
-def test_covariances_are_those_of_the_processes():
-    # Written out: a walk's block mean has a variance of t_start + h/3, a later one t_mid in common with it.
-    noise = still(4).alike[0]
-    assert noise[2, 2] == pytest.approx(2.0 + 1.0 / 3.0)
-    assert noise[1, 3] == pytest.approx(1.5)
-    # A bias that steps by one at each of three blocks' starts (the first begins at its middle): 2 s, 1.5 s, 0.5 s.
-    assert still(3).bias_walk[::3, ::3][2, 2] == pytest.approx(2.0**2 + 1.5**2 + 0.5**2)
-    assert matern(np.array([0.0, 1e-9, 50.0]), 1.0) == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
-
-
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
     nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(20)]
     # 20 runs of about five stretches apart: 3 with a standard error of sqrt(6/100) = 0.25.
@@ -84,29 +68,6 @@ def test_strengths_lie_within_their_intervals():
     assert np.all(found.draws[:, 1] == 0.0)
     assert found.is_settled
     assert not replace(found, n_effective=1.0).is_settled
-
-
-def turning(m, ratios, seed):
-    """A body that turns by a radian in a second about all axes, its gyro's axes unlike by ``ratios``."""
-    attitude = Rotation.from_rotvec(np.cumsum(np.random.default_rng(seed).normal(size=(m, 3)), axis=0)).as_matrix()
-    plain = replace(still(m), attitude=attitude)
-    strengths = np.array([N, 0.0, 0.0, 1e-5, 0.0, 0.0, 1.0])
-    V = sum(r**2 * basis for r, basis in zip(ratios, _of_axes(plain, strengths), strict=True))
-    V = V + _without_noise(plain, strengths) + plain.columns @ plain.columns.T
-    seen = np.linalg.cholesky(V) @ np.random.default_rng(seed).normal(size=3 * m)
-    return replace(plain, observed=seen), Fitted(strengths, 0.0, strengths[None], 1.0)
-
-
-@pytest.mark.slow
-def test_axes_that_differ_in_motion_have_an_n_of_their_own():
-    known = Bounded(N, N / 1.1, N * 1.1)
-    found = unlike_axes_beside([turning(150, (0.6, 1.0, 2.0), 4)[0]], turning(150, (0.6, 1.0, 2.0), 4)[1], known)
-    for one, ratio in zip(found, (0.6, 1.0, 2.0), strict=True):
-        assert one.lower < ratio * N < one.upper
-    stretch, alike = turning(150, (1.0, 1.0, 1.0), 4)
-    assert unlike_axes_beside([stretch], alike, known) == ()
-    # All axes together are the noise that is the same along every one.
-    assert np.sum(_of_axes(stretch, alike.mode), axis=0) == pytest.approx(N**2 * np.kron(stretch.alike[0], np.eye(3)))
 
 
 def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():
@@ -212,18 +173,6 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
         assert yaml.safe_load(text.replace("%YAML:1.0", ""))
     if target == "basalt":
         assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
-
-
-def test_axes_that_differ_are_written_where_a_consumer_has_one_for_each(found):
-    whole = both(found)
-    axes = tuple(Bounded(n, 0.9 * n, 1.1 * n) for n in (1e-3, 2e-3, 3e-3))
-    unlike = replace(whole, sensors=(whole.sensors[0], replace(whole.sensors[1], axes_N=axes)))
-    assert json.loads(filter_noise_text(unlike, "basalt"))["value0"]["accel_noise_std"] == [1e-3, 2e-3, 3e-3]
-    assert "setAccelerometerCovariance(np.diag([1.0e-06, 4.0e-06, 9.0e-06]))" in filter_noise_text(unlike, "gtsam")
-    assert yaml.safe_load(filter_noise_text(unlike, "robot_localization"))["linear_acceleration_covariance"][4] == (
-        pytest.approx(4e-6 * unlike.rate_hz)
-    )
-    assert "accelerometer N of X, Y, Z" in filter_noise_text(unlike, "kalibr")
 
 
 def resting(seed=1, seconds=120, n=N):

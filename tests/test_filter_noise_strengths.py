@@ -6,34 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from test_filter_noise import SLOW, STRENGTHS, TAU, K, N, drawn
-from trihedron.estimate.filter_noise.beside_reference import VELOCITY
-from trihedron.estimate.filter_noise.strengths import (
-    COORDINATES,
-    Prior,
-    _slope,
-    height,
-    most_likely,
-    whole,
-    with_slow_error_of,
-)
+from test_filter_noise import SLOW, TAU, K, N, drawn
+from trihedron.estimate.filter_noise.strengths import Prior, _slope, height, most_likely
 from trihedron.estimate.filter_noise.stretches import velocity_stretches
-
-
-def test_an_accelerometers_reference_is_as_wrong_as_the_gyro_found_it():
-    draws = np.tile(STRENGTHS, (50, 1))
-    draws[:, 4] = 0.6 * SLOW * np.geomspace(0.5, 2.0, 50)
-    draws[:, 5] = 0.8 * SLOW * np.geomspace(0.5, 2.0, 50)
-    told = with_slow_error_of(VELOCITY, draws)
-    assert whole(told, told.mean)[4:] == pytest.approx([0.6 * SLOW, 0.8 * SLOW, TAU], rel=1e-6)
-    slow, others = COORDINATES.index("slow"), [COORDINATES.index(name) for name in ("noise", "bias_walk", "white")]
-    assert told.sigma[slow] == pytest.approx(2.0 * np.std(np.log(draws[:, 4])))
-    assert not told.may_be_nothing[slow]
-    assert np.all(told.mean[others] == VELOCITY.mean[others])
-    # The prior's height is the normal's there, and the search's slope its derivative.
-    x = told.mean + 0.3 * told.sigma
-    both = [height([drawn(3)], told, x + sign * 1e-3 * np.eye(7)[slow]) for sign in (1.0, -1.0)]
-    assert _slope([drawn(3)], told, x)[0][slow] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
 
 
 @pytest.mark.parametrize("far", [0.1, 10.0])
@@ -50,20 +25,6 @@ def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
     for k, e in enumerate(np.eye(len(other))):
         both = [height([drawn(3)], off, other + sign * 1e-3 * e) for sign in (1.0, -1.0)]
         assert slope[k] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
-
-
-def test_a_strength_that_may_be_nothing_has_a_usual_size_and_a_mean_square():
-    only = Prior(np.array([0.0, 0.0, np.log(K), 0.0, 0.0, 0.0, 0.0]), np.full(7, np.log(30.0)), np.eye(7)[2])
-    x = np.log(K) + np.linspace(-12.0, 12.0, 4001)
-    density = np.exp([height([], only, np.array([one])) for one in x])
-    step = x[1] - x[0]
-    assert np.sum(density) * step == pytest.approx(1.0, abs=1e-3)
-    # To half a step of the grid, which ends beside the median.
-    assert np.sum(density[x < np.log(K)]) * step == pytest.approx(0.5, abs=0.5 * step)
-    # Half a Student's distribution of three degrees of freedom: three times the square of its scale. The tail beyond
-    # e^12 holds 1e-4 of it.
-    scale = K / 0.7649
-    assert np.sum(density * np.exp(2.0 * x)) * step == pytest.approx(3.0 * scale**2, rel=1e-2)
 
 
 G, HZ = 9.81, 100.0

@@ -12,10 +12,10 @@ import pytest
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.fleet import find_jobs, running, summarise
+from trihedron.fleet.summary import _spread_of_axes
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
-from trihedron.sanitise import escaped
 
 
 @pytest.fixture(scope="module")
@@ -116,19 +116,6 @@ def row(serial, name, numbers, sigma=1e-4):
     }
 
 
-def test_a_log_of_too_few_poses_is_no_usable_calibration_and_its_device_is_named_first(tmp_path):
-    """Its diagnosis begins from nominal values, which are no calibration."""
-    for unit, n_poses in (("sound", 14), ("short", 2)):
-        path = tmp_path / "logs" / unit / "log.csv"
-        path.parent.mkdir(parents=True)
-        trihedron.convert(recorded(Instrument(), 3, n_poses=n_poses), path)
-    found = trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, gravity_m_s2=G)
-    assert [(log.serial, log.status) for log in found.summary.logs] == [("short", "rejected"), ("sound", "done")]
-    document = fleet_report(found.summary)
-    assert "(short)" in document.verdict
-    assert document.level == "usable"
-
-
 def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path):
     rng = np.random.default_rng(8)
     found, alarms = 0, 0
@@ -140,17 +127,27 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
         sound = summarise(rows, tmp_path).summary
         alarms += bool(sound.outliers)
         assert sound.farthest.p_adjusted >= 0.01
-        assert sound.outliers or sound.farthest.serial in fleet_report(sound).verdict
         k, j = rng.integers(6), rng.integers(21)
         numbers[k, j] += 8.0 * sizes[j]
         strays = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers)], tmp_path).summary.outliers
         found += (f"u{k}", j) in [(one.serial, PARAMETERS.index(one.parameter)) for one in strays]
-    # One in a hundred sound fleets: three of 15 come once in 2000. Of the strays three in four: by each axis alone one
+    # One in a hundred sound fleets: three of 15 come once in 2000. Of the strays two in three: by each axis alone, one
     # in fifteen.
     assert alarms <= 2
     assert found >= 7
+    assert sound.outliers or sound.farthest.serial in fleet_report(sound).verdict
     few = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers[:3])], tmp_path).summary
     assert (few.farthest, "No device stands out" in fleet_report(few).verdict) == (None, False)
+
+
+def test_the_spread_that_is_expected_of_an_axis_is_that_of_its_triad():
+    rng = np.random.default_rng(3)
+    ratio = []
+    for _ in range(100):
+        sd = np.exp(rng.normal(size=7)).repeat(3)
+        ratio.append(_spread_of_axes(rng.normal(size=(6, 21)) * sd)[0] / sd**2)
+    # Two other axes of six devices know a variance to a half: 2100 of them, related by threes, their mean to 2 %.
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.12)
 
 
 def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
@@ -181,19 +178,6 @@ def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
         assert said["log_2.csv"][0] == "rejected"
         assert "pipe" in said["log_2.csv"][1]
         assert "a folder without logs" in said["log_1.csv"][1]
-
-
-def test_what_a_log_is_called_sends_nothing_to_a_terminal_from_the_table(tmp_path):
-    (tmp_path / "logs").mkdir()
-    (tmp_path / "logs" / "a\x1b[2J\x9b\u202eb.csv").write_text("no log\n")
-    Path(os.fsdecode(os.fsencode(tmp_path) + b"/logs/c\xff.csv")).write_text("no log\n")
-    trihedron.fleet(tmp_path / "logs", tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G)
-    for name in ("fleet.csv", "fleet.html"):
-        text = (tmp_path / "out" / name).read_text()
-        assert "a\\x1b[2J\\x9b\\u202eb.csv" in text
-        assert escaped(text) == text
-    names = [Path(path).name for path in polars.read_parquet(tmp_path / "out" / "fleet.parquet")["path"]]
-    assert names == ["a\\x1b[2J\\x9b\\u202eb.csv", "c\\udcff.csv"]
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -113,7 +113,7 @@ def test_a_disturbed_hold_costs_its_two_moves_and_is_named(quiet):
 def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
     recording, truth, segments = quiet
     speed = np.abs(recording.gyroscope[:, 0])
-    limit = np.sort(speed)[-12]
+    limit = np.sort(speed)[-6]
     clipped = replace(recording, gyroscope=np.clip(recording.gyroscope, [-limit, -9, -9], [limit, 9, 9]))
     found, findings = calibrated(clipped, segments, truth)
     assert FindingCode.CLIPPING in codes(findings)

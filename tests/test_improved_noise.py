@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
+from trihedron.api.driving import MovedAlike, bias_in_moves
 from trihedron.channel_facts.low_pass import gain_of
-from trihedron.comparison.noise import _are_even
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
-from trihedron.records.pose_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,
@@ -47,21 +45,6 @@ def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low
     assert (np.mean(noise.B) == pytest.approx(B, rel=0.3)) if B else np.mean(noise.B) < 0.5 * N
     # Corners are tried a fifth apart.
     assert found.corner_hz == pytest.approx(low_pass.corner_hz, rel=0.25)
-
-
-def test_what_rounding_leaves_above_a_corner_is_no_flicker():
-    low_pass = Smoother(10.0, 2)
-    bands = np.array([(2.0**k, min(2.0 ** (k + 1), 50.0)) for k in range(-1, 6)])
-    frequency_hz = np.linspace(0.01, 49.99, 4999)
-    a = low_pass.feedback(1.0 / RATE)
-    gain = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-2j * np.pi * frequency_hz / RATE))) ** 2
-    # Half of the white density stays where the filter lets a hundredth through; the uppermost octaves are known best.
-    density = [1e-6 * (gain + 0.25)[(low <= frequency_hz) & (frequency_hz < high)].mean() for low, high in bands]
-    relative = np.repeat([[0.5], [0.4], [0.4], [0.3], [0.3], [0.15], [0.07]], 3, axis=1)
-    known = [(1.1e-3, 0.1)] * 3
-    noise, _ = noise_of_octaves(bands, np.repeat(np.c_[density], 3, axis=1), relative, 1.0 / RATE, low_pass, known)
-    assert noise.B == (0.0, 0.0, 0.0)
-    assert pytest.approx((1.1e-3,) * 3, rel=0.1) == noise.N
 
 
 @pytest.mark.parametrize(
@@ -101,13 +84,6 @@ def session(seed, strays=0.0):
     return scenario, simulate(scenario, seed)[0]
 
 
-def at_rest(pose_s):
-    """A unit and its session without flaws."""
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    return accel, Scenario(hand_session(24, pose_s=pose_s, layout=8), "unit", accel, gyro, profile.clock)
-
-
 def beside(made, seed=0):
     """What a scenario is held against: a calibrated recording, or one that is simulated."""
     log = made if isinstance(made, Recording) else simulate(made, seed)[0]
@@ -130,58 +106,3 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
     little = bias_in_moves(clean, beside(other))
     assert little is None or max(little) < 0.4 * 2e-3
-
-
-@pytest.mark.slow
-def test_flicker_that_no_pose_shows_is_taken_out():
-    accel, clean = at_rest(2.0)
-    own = beside(clean, 7)
-
-    def with_flicker(size):
-        return replace(clean, accelerometer=replace(accel, noise=replace(accel.noise, B=(0.0, 0.0, size))))
-
-    # Twenty times what the poses miss: a quarter of it, as a root, would still be five times.
-    assert max(flicker_of_poses(with_flicker(0.05), own)) < 0.25 * 0.05
-    assert flicker_of_poses(clean, own) is None
-    # What the recording has itself is left as it is, but for the chance of one recording (a root known to a fifth).
-    left = flicker_of_poses(with_flicker(0.05), beside(with_flicker(0.05), 8))
-    assert left is None or left[2] > 0.5 * 0.05
-
-
-@pytest.mark.slow
-def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
-    accel, clean = at_rest(3.0)
-    electronics = replace(accel.electronics, bias_repeatability=(0.02,) * 3)
-    scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
-    own = beside(scattered, 6)
-    found = bias_of_poses(clean, own)
-    # 24 poses less nine parameters and the worst: a root known to a fifth; two of those, and the pose that is excluded.
-    assert found == pytest.approx((0.02,) * 3, rel=0.5)
-    better = replace(accel, electronics=replace(accel.electronics, bias_repeatability=found))
-    again = bias_of_poses(replace(clean, accelerometer=better), own)
-    assert again is None or again == pytest.approx(found, rel=0.15)
-    healthy = beside(clean, 7)
-    little = bias_of_poses(clean, healthy)
-    assert little is None or max(little) < 0.15 * 0.02
-    # What the scenario has too much is taken out.
-    assert max(bias_of_poses(scattered, healthy)) < 0.4 * 0.02
-
-
-@pytest.mark.slow
-def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
-    _, clean = at_rest(3.0)
-    recording, _ = simulate(clean, 8)
-    readings = np.array(recording.accelerometer)
-    readings[trihedron.segment(recording).poses[7].samples()] *= 1.003
-    strays = bias_of_poses(clean, beside(replace(recording, accelerometer=readings)))
-    # 30 mm/s² in one pose of 24: all of it shared out would be 6 mm/s², what the others take up in the fit is less.
-    assert strays is None or max(strays) < 4e-3
-
-
-@pytest.mark.parametrize(
-    ("values", "sigma", "even"),
-    [((1.0, 1.03, 0.99), 0.001, True), ((1.0, 1.08, 1.0), 0.03, True), ((1.0, 1.08, 1.0), 0.005, False),
-     ((1.0, 1.3, 1.1), 0.2, False)],
-)  # fmt: skip
-def test_axes_are_of_one_density_within_five_per_cent_or_within_what_they_are_known_to(values, sigma, even):
-    assert _are_even([Measured(v, v, v, sigma) for v in values]) is even

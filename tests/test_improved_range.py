@@ -10,12 +10,9 @@ import tomllib
 import trihedron
 from trihedron.api import driving
 from trihedron.api.improving import improve
-from trihedron.comparison.ranges import stated_ranges
 from trihedron.records.channel_facts import ChannelFacts, Limit
-from trihedron.records.diagnosis import EffectParameter
 from trihedron.simulate import Scenario, diagnosed_sizes, hand_session, read_scenario, simulate
 from trihedron.simulate.profiles import profile_by_name
-from trihedron.simulate.readout import Adc
 from trihedron.simulate.twin import unclipped
 
 G = 9.80665
@@ -75,15 +72,6 @@ def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipp
     assert not any(p.remark for p in found.parameters if p.id.endswith("bias"))
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("few_simulations")
-def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
-    _, recording = clipped
-    again = trihedron.diagnose(recording, against=improved[1], gravity_m_s2=G)
-    assert "gyro-saturation" not in {e.id for e in again.effects}
-    assert not [p for p in again.parameters if p.id == "gyro-saturation" and p.significant]
-
-
 def test_a_scenario_without_noise_takes_the_recordings(improved):
     # Three axes of the part's data sheet; 12 poses of 2.5 s know a density to some per cent.
     part = profile_by_name("mpu").unit(5)
@@ -120,22 +108,6 @@ def test_a_cut_peak_is_drawn_beyond_the_limit_and_nothing_else_is_touched():
     # A peak that the log begins in has no slope to be drawn with.
     begun = replace(facts, limits=(replace(limit, runs=limit.runs - limit.runs[0, 0]),))
     assert np.array_equal(unclipped(cut[limit.runs[0, 0] :], begun), cut[limit.runs[0, 0] :])
-
-
-@pytest.mark.parametrize(("share", "is_stated"), [(1.0, True), (1.02, True), (1.1, False), (0.9, False)])
-def test_a_range_is_stated_where_it_ends_within_what_axes_differ_by(clipped, improved, share, is_stated):
-    code, recording = clipped
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    scenario = Scenario(
-        hand_session(4), "unit", accel, replace(gyro, adc=Adc(1.0, -share * code, share * code)), profile.clock
-    )
-    found = [e for e in improved[0].effects if e.id == "gyro-saturation"]
-    assert bool(stated_ranges(scenario, found, recording)) == is_stated
-    assert not stated_ranges(replace(scenario, gyroscope=replace(gyro, adc=Adc())), found, recording)
-    # An effect without a limit states nothing.
-    bare = replace(found[0], parameters=(EffectParameter("samples", 3.0, 0.0, "1"),))
-    assert not stated_ranges(scenario, [bare], recording)
 
 
 def test_a_straight_drift_of_a_session_whose_length_nobody_says_is_left_out():

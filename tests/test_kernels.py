@@ -1,4 +1,4 @@
-"""Kernels against slow counterparts: sums over ranges, lines, slopes, moves, and distributions."""
+"""Kernels against slow counterparts: sums, lines, slopes, moves, distributions, processes of a bias."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,6 @@ from scipy.ndimage import gaussian_filter1d
 from trihedron import _core, probability
 from trihedron.diagnose.context import smoothed_slope
 from trihedron.ranges import edges_of, ranges_of
-from trihedron.segment.noise import MeanNoise
-
-NOISE = MeanNoise(np.array([0.1, 0.2, 0.0]), np.array([1e-3, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0]))
 
 
 def test_means_over_ranges_pass_over_what_is_no_number():
@@ -66,11 +63,6 @@ def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     assert np.abs(found - plain).max() < 1e-8 * (x @ x)
 
 
-def test_readings_need_as_many_times():
-    with pytest.raises(ValueError, match="5 readings need as many times"):
-        _core.sinusoid_power(np.zeros(4), np.zeros(5), start_hz=1.0, step_hz=0.1, count=3)
-
-
 def exact(values, time_s, width):
     return np.gradient(gaussian_filter1d(values, max(width, 1.0), mode="nearest"), time_s)
 
@@ -87,17 +79,6 @@ def test_inside_it_is_the_slope_of_the_smoothed_signal(width):
     inside = slice(int(4 * width), len(time) - int(4 * width))
     # Blocks of a tenth of the width: the width is wrong by 1/2400, the line between their middles by (1/10)²/8.
     assert np.abs(slope - asked)[inside].max() < 0.02 * np.abs(asked).max()
-
-
-def test_a_straight_line_keeps_its_slope_between_uneven_stamps_across_pauses_and_to_the_ends():
-    width = 300.0
-    rng = np.random.default_rng(3)
-    step = rng.uniform(0.005, 0.015, 8000)
-    step[[700, 5000]] = 12.0
-    time = np.cumsum(step)
-    assert smoothed_slope(0.25 * time + 4.0, time, width) == pytest.approx(0.25, rel=1e-6)
-    # A signal shorter than a block has none.
-    assert not smoothed_slope(np.arange(5.0), np.arange(5) / 10.0, 100.0).any()
 
 
 def walked(mask):
@@ -213,3 +194,47 @@ def test_no_number_is_made_of_what_is_none():
     assert probability.chdtrc(3, -1.0) == 1.0
     assert probability.fdtrc(3, 5, 0.0) == 1.0
     assert probability.chdtri(3, 0.0) == np.inf
+
+
+def dense_covariance(t, length, pose, variance, direction, strengths):
+    """The process integrated on a fine grid: averages of a walk and an integrated walk, scatter, noise."""
+    scatter, walk, drift, slope, noise = strengths
+    fine = [a + b * ((np.arange(201) + 0.5) / 201 - 0.5) for a, b in zip(t, length, strict=True)]
+    origin = t[0] - length[0] / 2
+    n = len(t)
+    V = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            low = np.minimum.outer(fine[i], fine[j]) - origin
+            middle = sorted((t[i] - origin, t[j] - origin))
+            # Of the integrated walk the middle represents the interval.
+            bent = middle[0] ** 2 * (3 * middle[1] - middle[0]) / 6 * drift + slope * middle[0] * middle[1]
+            V[i, j] = (walk * low.mean() + bent) * (direction[i] @ direction[j]) + scatter * (pose[i] == pose[j])
+    return V + np.diag(noise * variance)
+
+
+@pytest.mark.parametrize("directions", [1, 3])
+def test_the_filter_whitens_as_the_dense_covariance_does(directions):
+    rng = np.random.default_rng(4)
+    length = rng.uniform(0.01, 0.03, 14)
+    t = np.cumsum(length + rng.uniform(0, 0.05, 14)) - length / 2
+    pose = np.repeat(np.arange(7), 2)
+    direction = np.ones((14, 1)) if directions == 1 else rng.normal(size=(14, 3))
+    columns, variance = rng.normal(size=(14, 4)), rng.uniform(0.5, 2.0, 14) * 1e-2
+    strengths = np.array([[0.02, 0.3, 0.5, 2.0, 1.5], [0.0, 0.0, 0.0, 0.0, 1.0], [0.1, 0.0, 0.3, 0.0, 0.5]])
+    log_det, gram = _core.bias_process_grams(columns, variance, t, length, pose, direction, strengths)
+    for k, row in enumerate(strengths):
+        V = dense_covariance(t, length, pose, variance, direction, row)
+        # The drift within a stretch is read in its middle: good to 1e-3 of the noise of these long stretches.
+        assert log_det[k] == pytest.approx(np.linalg.slogdet(V)[1], abs=5e-3)
+        dense = columns.T @ np.linalg.solve(V, columns)
+        size = np.sqrt(np.outer(np.diag(dense), np.diag(dense)))
+        np.testing.assert_allclose(gram[k] / size, dense / size, atol=1e-3)
+
+
+def test_a_question_out_of_order_is_refused():
+    one = np.ones(3)
+    with pytest.raises(ValueError, match="order of time"):
+        _core.bias_process_grams(
+            np.ones((3, 1)), one, one[::-1] * [3, 2, 1], 0 * one, np.arange(3), np.ones((3, 1)), np.ones((1, 5))
+        )

@@ -1,18 +1,14 @@
 """Noise terms from Allan curves alone, and the covariance of a curve's points."""
 
-import itertools
-
 import numpy as np
 import pytest
 
-import trihedron
 from noise_series import series
 from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
-from trihedron.report.noise_charts import NAME_DECADES, parts_of
 
 RATE = 2.0
 N_READINGS = 4096
@@ -60,19 +56,3 @@ def test_a_filtered_curve_is_quoted_from_above_the_filter():
     assert FindingCode.SPECTRUM_LOW_PASS in {f.code for f in axis.findings}
     # What the filter still takes where a point is believed to 1 %.
     assert axis.value("N") == pytest.approx(1e-2, rel=0.03)
-
-
-def test_no_name_of_a_part_stands_on_another():
-    rng = np.random.default_rng(5)
-    n = 60_000
-    crowded = 0
-    for walk in (0.003, 0.03):
-        readings = rng.normal(size=(n, 3)) + np.cumsum(rng.normal(0.0, walk, (n, 3)), axis=0)
-        found = trihedron.allan({"t": np.arange(n) / 100.0, "gyr": np.deg2rad(readings)}, gyroscope_lsb=None)
-        for axis in found.axes:
-            parts = parts_of(axis, np.geomspace(0.01, n / 300.0, 400))
-            crowded += len(parts) > 1
-            for a, b in itertools.combinations(parts, 2):
-                apart = np.abs(np.log10([a.x / b.x, a.y / b.y])) / NAME_DECADES
-                assert apart.max() > 1.0, (walk, axis.name, a.name, b.name)
-    assert crowded >= 4

@@ -1,12 +1,12 @@
-"""Noise terms from simulated logs of known truth; what disturbs a log is found and named."""
+"""Noise terms from simulated logs of known truth: names, intervals; what disturbs a log is found and named."""
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from noise_series import fractional, series
+from noise_coverage import in_time
+from noise_series import series
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName
 
@@ -145,27 +145,6 @@ def test_a_coarse_converter_clipping_and_a_channel_that_never_changes_are_seriou
     assert not any(noise.is_trustworthy for noise in (coarse, clipped, dead))
 
 
-def test_ordinates_have_the_expectations_of_the_basis():
-    rng = np.random.default_rng(28)
-    n, runs = 4096, 200
-    for k, make in enumerate(
-        (
-            lambda: np.diff(rng.normal(size=n + 1)) * RATE,
-            lambda: rng.normal(size=n) * np.sqrt(RATE),
-            lambda: fractional(rng, n),
-            lambda: np.cumsum(rng.normal(size=n)) / np.sqrt(RATE),
-        )
-    ):
-        band = ordinates(make(), RATE, [(0, n)])[0]
-        mean = np.mean([ordinates(make(), RATE, [(0, n)])[0].power for _ in range(runs)], axis=0)
-        ratio = mean / band.basis[k]
-        # Chi-square with one degree of freedom: 4.5 standard errors for the first ten orders, and in octaves beyond.
-        assert np.all(np.abs(ratio[:10] - 1.0) < 4.5 * np.sqrt(2.0 / runs)), (k, ratio[:10])
-        for start in (16, 128, 1024):
-            group = ratio[start : 2 * start]
-            assert abs(group.mean() - 1.0) < 4.5 * np.sqrt(2.0 / runs / start), (k, start, group.mean())
-
-
 @pytest.mark.parametrize(
     ("question", "words"),
     [
@@ -180,3 +159,34 @@ def test_ordinates_have_the_expectations_of_the_basis():
 def test_a_malformed_question_is_refused_in_words(quiet, question, words):
     with pytest.raises(ValueError, match=words):
         question(quiet)
+
+
+def test_intervals_hold_whatever_is_named():
+    rng = np.random.default_rng(62)
+    truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
+    inside = dict.fromkeys("QNBKR", 0)
+    for _ in range(20):
+        axis = identify_noise(in_time(rng, 1 << 15, 100.0, **truth), 100.0).axes[0]
+        for s in inside:
+            term = axis.terms[TermName(s)]
+            assert term.limit == term.upper
+            inside[s] += term.lower <= truth.get(s, 0.0) <= term.upper
+    # Of 20 intervals of 95 % 16 or more hold, with a probability of 0.997.
+    assert min(inside.values()) >= 16, inside
+
+
+@pytest.mark.parametrize(
+    "truth", [{"N": 1e-2, "K": 6e-4}, pytest.param({"N": 1e-3, "B": 2e-2}, marks=pytest.mark.slow)]
+)
+def test_scattered_loss_leaves_the_terms_where_they_are(truth):
+    rng = np.random.default_rng(65)
+    inside = 0
+    for _ in range(6):
+        x = series(rng, 60_000, 100.0, **truth)
+        x[rng.random(len(x)) < 0.3] = np.nan
+        noise = identify_noise(x, 100.0)
+        assert noise.breaks_s == ()
+        terms = noise.axes[0].terms
+        inside += sum(terms[TermName(s)].lower <= v <= terms[TermName(s)].upper for s, v in truth.items())
+    # Twelve intervals of 95 %: nine or more with a probability of 0.998.
+    assert inside >= 9

@@ -8,7 +8,6 @@ import pytest
 from trihedron import _core
 from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 from trihedron.quantiles import median, medians, quantile, quantiles
-from trihedron.segment.floor import TAILS
 
 N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
 
@@ -66,43 +65,11 @@ def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
     assert first.p_value == pytest.approx(second.p_value, rel=1e-6)
 
 
-def test_few_poses_or_poses_of_one_axis_are_not_compared():
-    assert compare_slow(session(1, 1e-3, poses=18), session(2, 1e-3)) is None
-
-
-LENGTH, STEP_S = 10, 0.1
-
-
 def rolling_twin(values, width):
     n = len(values)
     width = min(width, n)
     first = np.clip(np.arange(n) - width // 2, 0, n - width)
     return np.array([values[a : a + width].mean(axis=0) for a in first]).reshape(values.shape)
-
-
-def blocks(seed):
-    """A third of the time moving, blocks missing, one dead channel, one at its end for a while."""
-    rng = np.random.default_rng(seed)
-    m, c = 900, 6
-    power = np.where((np.arange(m) // 75) % 3 == 2, 300.0, 1.0)[:, None] * np.geomspace(1e-4, 10.0, c)
-    variance = power * rng.chisquare(LENGTH - 1, (m, c)) / (LENGTH - 1)
-    mean = 50.0 + rng.normal(size=(m, c)) * np.sqrt(power / LENGTH)
-    is_valid = rng.random(m) > 0.004
-    mean[~is_valid], variance[~is_valid] = np.nan, np.nan
-    mean[:, 4], variance[:, 4] = 3.0, 0.0
-    tells = np.ones((m, c), dtype=bool)
-    tells[300:400, 1] = False
-    return mean, variance, is_valid, tells, np.array([1e-9, 0.0, 1e-7, 0.0, 0.0, 1e-4])
-
-
-def test_a_log_without_any_noise_has_no_floor_but_its_rounding():
-    still = np.full((40, 3), 7.0), np.zeros((40, 3)), np.ones(40, dtype=bool), np.ones((40, 3), dtype=bool)
-    fast, _slow, limits, quiet, white, drift = _core.noise_floor(*still, np.zeros(3), LENGTH, (5, 10, 0.8), TAILS)
-    assert quiet.all()
-    assert not fast.any()
-    assert limits == [0.0, 0.0]
-    assert not white.any()
-    assert not drift.any()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (4, 6), (5, 1), (137, 6)])

@@ -1,15 +1,11 @@
 """Noise inside poses: simulated sessions of known figures, and one held against another."""
 
-import math
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.estimate.noise.poses import noise_of_poses
-from trihedron.estimate.noise.slow import correlation_time
 
 RATE = 100.0
 
@@ -101,55 +97,3 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
     # Left in, half its square would be 2 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01
     assert corners == [None] * 3
-
-
-@pytest.mark.parametrize(("quality", "size"), [(8.0, 1.0), (4.0, 0.5)])
-def test_a_stand_that_rings_on_one_axis_is_no_filter_and_no_white_noise(quality, size):
-    rng = np.random.default_rng(0)
-    x = 1e-2 * rng.standard_normal((12_000, 3))
-    # A resonance at 6.4 Hz, as large as the noise or half of it: a line, and a hump about it.
-    radius = np.exp(-np.pi * 0.064 / quality)
-    hump = lfilter([1.0], [1.0, -2.0 * radius * np.cos(2.0 * np.pi * 0.064), radius**2], rng.standard_normal(12_000))
-    x[:, 1] += 1e-2 * size * hump / hump.std()
-    axes = noise_of_poses(x, 100.0, [(k * 400, k * 400 + 300) for k in range(30)])
-    assert axes[1].lines
-    assert [axis.corner_hz for axis in axes] == [None] * 3
-    # 9000 readings: a density to 1 %; what the hump leaves elsewhere adds some.
-    assert axes[1].white.value == pytest.approx(1e-3, rel=0.05)
-
-
-def test_holds_that_a_hand_shakes_lift_white_noise_below_a_corner_no_more_than_they_lift_octaves():
-    """Tremor below the corner hardly shows in differences of readings, which rounding fills."""
-    from scipy.signal import butter, sosfilt
-
-    rng, rate_hz, length = np.random.default_rng(20), 100.0, 512
-    low_pass = butter(2, 12.0, fs=rate_hz, output="sos")
-    tremor = butter(2, (1.0, 8.0), btype="band", fs=rate_hz, output="sos")
-    parts = []
-    for k in range(20):
-        x = sosfilt(low_pass, rng.normal(size=(length + 64, 3)), axis=0)
-        if k % 3 == 0:
-            x += 4.0 * sosfilt(tremor, rng.normal(size=(length + 64, 3)), axis=0)
-        parts.append(np.round(x[64:] / 1.5) * 1.5)
-    poses = [(k * length, (k + 1) * length) for k in range(20)]
-    for axis in noise_of_poses(np.concatenate(parts), rate_hz, poses):
-        assert axis.corner_hz is not None
-        assert axis.white is not None
-        below = [o.density.value for o in axis.octaves if o.low_hz >= 1.0 and o.high_hz <= 8.0]
-        # The mean over all poses is six times the octaves' typical pose, its root 2.4; a filter's shape is worth 10 %.
-        assert axis.white.value < 1.3 * math.sqrt(float(np.mean(below)))
-
-
-@pytest.mark.parametrize("corner_hz", [0.5, 3.0, 19.0])
-def test_a_correlation_time_is_found_wherever_its_corner_lies_between_the_octaves(corner_hz):
-    edges = 0.0625 * 2.0 ** np.arange(10)  # up to 32 Hz
-    angle = np.arctan(edges / corner_hz)
-    density = 1.0 + corner_hz * np.diff(angle) / np.diff(edges)
-    octaves = [
-        SimpleNamespace(low_hz=low, high_hz=high, density=SimpleNamespace(value=value, sigma_log=0.01))
-        for low, high, value in zip(edges[:-1], edges[1:], density, strict=True)
-    ]
-    found = correlation_time([SimpleNamespace(white=1.0, octaves=octaves)])
-    # Eight are tried to the octave.
-    assert found.value == pytest.approx(1.0 / (2.0 * np.pi * corner_hz), rel=0.06)
-    assert found.lower < found.value < found.upper

@@ -141,47 +141,6 @@ def test_a_report_has_result_and_remedy_on_its_first_screen_and_is_read_in_the_d
     page.close()
 
 
-def test_the_first_screen_says_the_verdict_once_findings_in_words_and_to_six_faces_their_method(tmp_path, browser):
-    few = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=5, pose_s=2.0, move_s=1.5))
-    remedies = {"few": (few, "→ Add poses"), "six": (scenario_by_name("six-faces"), "--method faces")}
-    for name, (scenario, remedy) in remedies.items():
-        log, report = tmp_path / f"{name}.csv", tmp_path / f"{name}.html"
-        write_recording(simulate(scenario, 1)[0], log)
-        assert main(["calibrate", str(log), "--gravity", "9.8", "--report", str(report)]) == 2
-        page = Visit(browser, report, 1280, "light").page
-        assert remedy in page.inner_text(".next")
-        seen = page.inner_text(".verdict").removeprefix("NOT TO BE TRUSTED: ")
-        assert seen.partition(".")[0] not in page.inner_text(".foremost")
-        also = page.locator(".foremost a").all_inner_texts()[:2]
-        assert all(len(words.split()) > 3 and "-" not in words.split()[0] for words in also)
-        page.close()
-
-
-def test_one_cursor_runs_over_all_axes_of_time_and_tools_are_seen_and_named_apart(folder, browser):
-    page = Visit(browser, folder / "calibrate.html", 1280, "dark").page
-    names = [button.get_attribute("aria-label") for button in page.query_selector_all(".tools button")]
-    assert len(set(names)) == len(names)
-    assert page.evaluate("getComputedStyle(document.querySelector('.tools')).opacity") == "1"
-    signals = page.query_selector("#signals .plot")
-    signals.scroll_into_view_if_needed()
-    box = signals.bounding_box()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-    time = "(p) => p.querySelector('.xlabel').textContent === 'time [s]'"
-    panels = page.query_selector_all(".panel")
-    of_time = [panel for panel in panels if page.evaluate(time, panel)]
-    # Residuals of poses and of moves, and the signals of both sensors.
-    assert len(of_time) == 4
-    for panel in panels:
-        cursor = panel.query_selector(".cursor")
-        assert (cursor is not None) == (panel in of_time)
-    shares = [float(re.search(r"left: ([\d.]+)%", panel.query_selector(".cursor").get_attribute("style"))[1])
-              for panel in of_time if panel.query_selector(".cursor").is_visible()]  # fmt: skip
-    # All run over the same seconds; the panel that is pointed at shows no second cursor.
-    assert len(shares) == 3
-    assert all(abs(share - 50.0) < 0.5 for share in shares)
-    page.close()
-
-
 def test_a_hundred_poses_fit_two_hundred_kilobytes(tmp_path):
     motion = hand_session(n_poses=100, pose_s=2.0, move_s=1.5, first_pose_s=5.0)
     write_recording(simulate(replace(scenario_by_name("hand-session"), motion=motion), 5)[0], tmp_path / "log.csv")
@@ -207,12 +166,6 @@ def test_marks_tell_their_value_a_figure_zooms_and_a_table_is_sorted_and_all_ret
     assert page.inner_text(ticks) != before
     page.click("#residuals .tools button[aria-label^='Whole figure']")
     assert page.get_attribute(svg, "viewBox") == whole
-    page.query_selector("#moves").scroll_into_view_if_needed()
-    box = page.query_selector("#moves .plot").bounding_box()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.9 * box["height"])
-    assert re.search(r"move \d+ .*°", page.inner_text("#tip"))
-    page.locator(".cell").first.hover()
-    assert re.fullmatch(r"[aw] \S+ and [aw] \S+: [+−][01]\.\d\d", page.inner_text("#tip"))
     page.query_selector("summary:has-text('of every pose')").click()
     table = page.query_selector("details[open] table")
     cells = "(t) => [...t.tBodies[0].rows].map((r) => r.cells[4].textContent)"
@@ -226,13 +179,3 @@ def test_marks_tell_their_value_a_figure_zooms_and_a_table_is_sorted_and_all_ret
     sort.click()
     assert page.evaluate(cells, table) == before
     page.close()
-
-
-def test_what_several_recordings_share_is_drawn_and_says_what_to_do(folder, browser, tmp_path):
-    page = tmp_path / "shared.html"
-    assert main(["diagnose", str(folder / "log.csv"), str(folder / "other.csv"), "--gravity", "9.80665",
-                 "--report", str(page)]) == 0  # fmt: skip
-    visit = Visit(browser, page, 1280, "light")
-    assert "→" in visit.page.inner_text(".next")
-    assert visit.page.locator(".number .value").count() == 2
-    visit.page.close()

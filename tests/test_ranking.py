@@ -9,11 +9,9 @@ import pytest
 import trihedron
 from test_export import export_calibration
 from trihedron.cli import main
-from trihedron.files.formats.boards import as_logged
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
-from trihedron.records import FindingCode, Onboard, Severity
-from trihedron.report.ranking import ranking_report, said_of
-from trihedron.report.verification import verification_report
+from trihedron.records import FindingCode, Severity
+from trihedron.report.ranking import said_of
 
 DRIFT = FindingCode.GYRO_BIAS_DRIFT
 SWAPPED = np.eye(3)[[1, 0, 2]]
@@ -94,21 +92,6 @@ def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
     assert "has no bias" in said_of(one)
 
 
-def test_parameters_of_a_board_are_judged_behind_what_it_had_done_to_the_log():
-    """A board that logged with offset 0.5 and scale 1.02: other parameters act on what it had corrected."""
-    held = {f"INS_ACCOFFS_{a}": 0.5 for a in "XYZ"} | {f"INS_ACCSCAL_{a}": 1.02 for a in "XYZ"}
-    known = Onboard("ardupilot", 0, 0, "body", {**held, "AHRS_ORIENTATION": 2.0})
-    from trihedron.files.formats.ardupilot import from_ardupilot
-
-    text = "\n".join(f"INS_ACCOFFS_{a},0.2\nINS_ACCSCAL_{a},0.98" for a in "XYZ")
-    made = as_logged(from_ardupilot(text), known)
-    R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    raw = np.random.default_rng(0).normal(0, 5, (20, 3))
-    logged = ((raw - 0.5) * 1.02) @ R.T
-    wanted = ((raw - 0.2) * 0.98) @ R.T
-    np.testing.assert_allclose(logged @ made.accelerometer.S.T + made.accelerometer.b, wanted, atol=1e-12)
-
-
 def wide(sensor):
     return replace(sensor, S=1.05 * sensor.S, b=1.05 * sensor.b, covariance=1e4 * sensor.covariance)
 
@@ -171,36 +154,6 @@ def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(ses
     assert ranking.best.behind == 0.0
 
 
-def test_a_ranking_shows_its_order_and_says_which_to_use(session):
-    log, known = session
-    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
-    document = ranking_report(trihedron.rank([wrong, known], log, gravity_m_s2=9.81))
-    assert document.next_step.startswith("Use calibration 2: `trihedron apply FILE LOG")
-    assert document.verdict.startswith("calibration 2 fits this log best; calibration 1 is rejected. Verified")
-    again = trihedron.calibrate(trihedron.simulate("hand-session", 7)[0], gravity_m_s2=9.81).calibration
-    alike = ranking_report(trihedron.rank([again, known], log, gravity_m_s2=9.81)).verdict
-    assert "calibration 1 fit this log equally well" in alike or "calibration 2 fit this log equally well" in alike
-    gravity, tilt = document.lead.chart().panels
-    assert gravity.y.names == tilt.y.names == ("calibration 2", "calibration 1")
-    interval, right, rejected = gravity.marks
-    assert (right.colour, rejected.colour) == ("c1", "accent")
-    assert interval.x[0] <= right.x[0] <= interval.x[1] < rejected.x[0]
-
-
-def test_the_best_of_several_has_the_verdict_that_it_has_alone(session):
-    """Also where it is doubtful: another gyro scale by 0.2 %."""
-    log, known = session
-    off = replace(known, gyroscope=replace(known.gyroscope, S=1.002 * known.gyroscope.S))
-    alone = trihedron.verify(off, log, gravity_m_s2=9.81)
-    single = verification_report(alone.verification)
-    wrong = replace(known, accelerometer=replace(known.accelerometer, b=-known.accelerometer.b))
-    document = ranking_report(trihedron.rank([wrong, off], log, gravity_m_s2=9.81))
-    assert "Doubtful" in single.verdict
-    assert document.verdict.endswith(single.verdict)
-    assert (document.level, document.foremost, document.what_next) == (single.level, single.foremost, single.what_next)
-    assert document.headlines == single.headlines
-
-
 def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification(session):
     """No bias of such a log is the next one's, whatever the file states; a log without drift has no such warning."""
     log, known = session
@@ -210,27 +163,3 @@ def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
     ]
     assert found == [[], [Severity.WARNING]]
-
-
-def test_only_an_error_of_one_pose_is_blamed_on_that_pose(session):
-    """Another gravity is a common offset; a bias on one axis has either sign, and stands in all poses too."""
-    log, known = session
-    elsewhere = trihedron.verify(known, log, gravity_m_s2=9.83).verification
-    b = known.accelerometer.b + np.array([0.05, 0.0, 0.0])
-    biased = replace(known, accelerometer=replace(known.accelerometer, b=b))
-    segments = trihedron.segment(log)
-    touched = segments.accelerometer_mean.copy()
-    touched[3] *= 1.01
-    of_one = replace(segments, accelerometer_mean=touched)
-    judged = (
-        elsewhere,
-        trihedron.verify(biased, log, gravity_m_s2=9.81).verification,
-        trihedron.verify(known, log, gravity_m_s2=9.81, segments=of_one).verification,
-    )
-    offset, everywhere, single = (
-        next(f for f in v.findings if f.code is FindingCode.RESIDUAL_ABOVE_NOISE) for v in judged
-    )
-    assert offset.numbers["n_same"] == len(elsewhere.norm_error)
-    assert [" pose " in found.action for found in (offset, everywhere, single)] == [False, False, True]
-    assert offset.numbers["mean_m_s2"] == pytest.approx(9.81 - 9.83, abs=5e-3)
-    assert "pose 4;" in single.action

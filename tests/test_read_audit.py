@@ -6,7 +6,6 @@ import pytest
 from test_read import HEADER, codes, finding, readings, write
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.read import ReadError, read_recording
-from trihedron.read.audit.readings import Repeats
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
@@ -136,11 +135,6 @@ def test_a_packet_counter_tells_lost_samples_and_may_wrap(modulus):
     assert found.numbers["sample"] == 300
 
 
-@pytest.mark.parametrize("n", [2, 30, 64, 65, 200])
-def test_neighbours_that_are_always_equal_are_equal_by_chance_of_one_however_few(n):
-    assert [Repeats(np.ones((n, 3))).chance(k) for k in range(4)] == [1.0] * 4
-
-
 def rows_of(table, separator=",") -> list[str]:
     return [separator.join(map(repr, map(float, row))) for row in table]
 
@@ -195,14 +189,6 @@ def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     assert found.numbers["scale_ratio"] == pytest.approx(0.01, rel=0.01)
     assert list(scale_findings(100.0 * S, RateUnit.DEG_S)) == []
     assert list(scale_findings(S, RateUnit.COUNTS)) == []
-
-
-def test_two_files_account_for_the_rows_of_both(tmp_path):
-    table = readings(200)
-    acc = write(tmp_path / "acc.csv", table[:150, :4], "t,x,y,z\n")
-    gyr = write(tmp_path / "gyr.csv", table[20:, [0, 4, 5, 6]], "t,x,y,z\n")
-    recording = read_recording(accelerometer_path=acc, gyroscope_path=gyr)
-    assert recording.rows_in_file == recording.rows_read + recording.rows_reported == 330
 
 
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):

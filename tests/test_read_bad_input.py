@@ -15,7 +15,6 @@ from test_read import HEADER, readings, text_module, write
 from trihedron.read import ReadError, read_recording
 from trihedron.read.errors import panics_unprinted
 from trihedron.read.memory import check_memory
-from trihedron.read.names import parse_name
 from trihedron.records import Recording
 
 ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
@@ -226,15 +225,6 @@ def test_what_was_written_is_what_is_read(tmp_path, rows, kind):
     assert recording is not None
     np.testing.assert_array_equal(recording.accelerometer, table[:, :3])
     np.testing.assert_array_equal(recording.gyroscope, table[:, 3:])
-
-
-ROLES = ("", "accelerometer", "gyroscope", "translation", "bare", "time", "temperature", "supply", "counter")
-
-
-@FEW
-@given(st.text(max_size=40))
-def test_any_column_name_has_a_meaning_or_none(name):
-    assert parse_name(name).role in ROLES
 
 
 @FEW

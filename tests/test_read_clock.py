@@ -9,6 +9,7 @@ from trihedron.read.clock.even import find_even_clock
 from trihedron.read.clock.settle import sample_numbers
 from trihedron.read.clock.unit import parse_time_unit, seconds_of
 from trihedron.records import FindingCode, Severity, TimestampKind
+from trihedron.records.recording import spread_timestamps
 
 N = 6000
 T = 0.0100237
@@ -100,6 +101,16 @@ def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path):
     recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(np.zeros(N))]), HEADER))
     assert recording.sampling.is_even
     np.testing.assert_allclose(np.diff(recording.time_s), T, rtol=1e-4)
+
+
+@pytest.mark.parametrize("is_before", [True, False])
+def test_timestamps_that_a_batch_shares_are_spread_over_the_longer_steps(is_before):
+    # Batches of five and single samples in turn: a batch fills the 50 ms before its timestamp, or behind it.
+    size = np.tile([5, 1] if is_before else [1, 5], 20)
+    step = np.tile([0.05, 0.01], 20)
+    spread = spread_timestamps(np.repeat(np.cumsum(step), size), 0.01)
+    assert spread[0] == 0.0
+    np.testing.assert_allclose(np.diff(spread), 0.01, atol=1e-9)
 
 
 def test_a_counter_settles_what_late_stamps_leave_open(tmp_path):

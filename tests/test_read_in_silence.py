@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from formats.layout import G
-from formats.written import session
+from formats.session import G, session
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
@@ -207,27 +206,8 @@ def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tm
         rate[half:] /= 1.25
     recording = read_recording(written(tmp_path / "log.csv", *table(timestamps, force, rate)))
     assert (FindingCode.CLOCK_JUMPED in serious(recording)) is not is_true
-
-
-@pytest.mark.parametrize("start", [250, 65530])
-@pytest.mark.parametrize("names", [None, ("t", "ax", "ay", "az", "gx", "gy", "gz")])
-def test_a_counter_in_front_of_a_streams_lines_is_no_clock(start, names):
-    from trihedron.api.capturing import column_namer
-
-    wrap = 256 if start == 250 else 65536
-    rows = [[str((start + k) % wrap), *(f"{0.1 * j + k:.1f}" for j in range(6))] for k in range(12)]
-    found = column_namer()(names, rows)
-    assert (found.time, found.counter) == (None, 0)
-    clock = column_namer()(names, [[str(10 * k), *row[1:]] for k, row in enumerate(rows)])
-    assert (clock.time, clock.counter, clock.time_unit_s) == (0, None, 1e-3)
-    stated = column_namer(time_unit="ms")(names, [[str(k), *row[1:]] for k, row in enumerate(rows)])
-    assert (stated.time, stated.counter) == (0, None)
-
-
-def test_the_size_of_a_count_is_refused_where_readings_are_in_a_unit(tmp_path):
-    log = written(tmp_path / "log.csv", *table(*motion(n_poses=3)), header=header_of(" [m/s^2]", " [rad/s]"))
-    with pytest.raises(ValueError, match=r"gyro are in rad/s, not in counts"):
-        trihedron.allan(log, gyroscope_lsb="0.05 deg/s")
+    # The scale by gravity changed by the ratio of the rates: that decides it.
+    assert is_true or any("turns as if it had not" in found.seen for found in recording.findings)
 
 
 @pytest.mark.parametrize(("name", "per_s"), [("dt_us", 1e6), ("Delta time [ms]", 1e3), ("dt", 1.0)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import fft, ndimage
+from scipy import fft
 
 from trihedron import _core
 from trihedron.read import read_recording
@@ -35,50 +35,6 @@ def test_steps_are_counted_and_their_median_found_as_by_sorting(n):
         assert count == len(inside)
         # Sums of so many steps in another order: their rounding.
         np.testing.assert_allclose(numbers, [inside.sum(), inside.std(), inside.min(), inside.max()], rtol=1e-11)
-
-
-@pytest.mark.parametrize(("n", "width"), [(3, 8), (8, 8), (100, 7), (100_000, 38), (1003, 100)])
-def test_the_earliest_of_every_block_takes_in_what_is_left_over(n, width):
-    late = np.random.default_rng(n).standard_normal(n).round(1)  # ties: the first counts
-    blocks = max(n // width, 1)
-    expected = [k * width + int(late[k * width : (k + 1) * width].argmin()) for k in range(blocks)]
-    rest = late[blocks * width :]
-    if len(rest) and rest.min() < late[expected[-1]]:
-        expected[-1] = blocks * width + int(rest.argmin())
-    if n - expected[-1] > width:
-        expected.append(n - width // 2 + int(late[-(width // 2) :].argmin()))
-    np.testing.assert_array_equal(_core.earliest_timestamps(late, width), expected)
-
-
-@pytest.mark.parametrize("kind", [np.int32, np.int64])
-def test_an_even_clock_is_laid_and_left_as_its_formula_says(kind):
-    rng = np.random.default_rng(3)
-    n, period = 150_001, 0.0051
-    tick = np.cumsum(rng.integers(1, 3, n)).astype(kind)
-    time = period * tick + 1e-4 * rng.standard_normal(n)
-    late = np.empty(n)
-    _core.timestamp_lateness(time, tick, period, late)
-    np.testing.assert_array_equal(late, tick * -period + time)
-    _core.timestamp_lateness(time, None, period, late)
-    np.testing.assert_array_equal(late, np.arange(n) * -period + time)
-    late = time - period * tick
-    cut = n // 38 * 38
-    np.testing.assert_array_equal(_core.block_medians(late[:cut], 38), np.median(late[:cut].reshape(-1, 38), axis=1))
-    np.testing.assert_array_equal(_core.block_mean_ticks(tick[:cut], 38), tick[:cut].reshape(-1, 38).mean(axis=1))
-    even = np.empty(n)
-    _core.lay_even_clock(tick, (2.0, -1.0), 10.0, 7.0, period, even)
-    np.testing.assert_allclose(even, 2.0 * ((tick - 10.0) / 7.0) - 1.0 + period * tick, rtol=1e-15)
-
-
-def test_a_line_passes_over_points_that_are_far_off():
-    rng = np.random.default_rng(8)
-    u = np.sort(rng.uniform(-1, 1, 5000))
-    y = 3.0 * u - 2.0 + 1e-3 * rng.standard_normal(5000)
-    clean = np.polyfit(u, y, 1)
-    far = rng.random(5000) < 0.1
-    y[far] += rng.uniform(1.0, 5.0, far.sum())
-    # 4500 points of 1e-3 leave 1e-3 / √4500 · √3 of slope: five of that.
-    np.testing.assert_allclose(_core.robust_line(u, y), clean, atol=1.3e-4)
 
 
 def triad(n: int, seed: int) -> np.ndarray:
@@ -114,52 +70,6 @@ def test_repeated_and_missing_readings_are_found_as_row_by_row(n):
     np.testing.assert_array_equal(windows[: cut // 64], same[:cut].reshape(-1, 64, 4).sum(axis=1))
 
 
-def test_numbers_short_and_long_stand_where_they_belong():
-    cells = [
-        ["-0.5", "12345678", "+7.", ".25", "1234567.1234567"],
-        ["1e3", "-123456789.5", "0.12345678", "00", "9"],
-    ] * 50
-    text = "\n".join(",".join(row) for row in cells).encode()
-    blocks = [np.full((120, 2), np.nan), np.full((120, 3), np.nan)]
-    places = [(1, 2), (0, 0), (1, 0), (0, 1), (1, 1)]
-    found = _core.plain_table_into(np.frombuffer(text, np.uint8), ord(","), places, blocks)
-    assert found == (100, True)
-    expected = np.array(cells, dtype=float)
-    for column, (block, place) in enumerate(places):
-        np.testing.assert_array_equal(blocks[block][:100, place], expected[:, column])
-        assert np.isnan(blocks[block][100:, place]).all()
-
-
-WITH_GAPS = [np.nan, np.inf, -0.0, 0.0]
-
-
-@pytest.mark.parametrize("kind", ["codes", "scaled codes", "all different", "none", "many, then few"])
-def test_levels_are_the_sorted_different_numbers(kind):
-    rng = np.random.default_rng(3)
-    readings = {
-        "codes": rng.integers(-300, 300, 20_000).astype(float),
-        "scaled codes": rng.integers(0, 65_536, 20_000) * 1.221e-4 - 3.0,
-        "all different": rng.normal(size=150_000),
-        "none": np.zeros(0),
-        "many, then few": np.concatenate([rng.normal(size=70_000), np.zeros(50_000)]),
-    }[kind]
-    readings = np.concatenate([readings, WITH_GAPS])
-    triad = np.stack([readings, readings + 1.0, readings], axis=1)
-    finite = readings[np.isfinite(readings)]
-    for column in (readings, triad[:, 0], readings[::-1]):
-        levels, n = _core.levels_of(column)
-        assert n == len(finite)
-        np.testing.assert_array_equal(levels, np.unique(finite))
-
-
-@pytest.mark.parametrize("size", [1, 5, 65, 401])
-@pytest.mark.parametrize("n", [1, 7, 500])
-def test_a_running_median_is_that_of_scipy(size, n):
-    values = np.random.default_rng(size + n).normal(size=n).round(1)
-    twin = ndimage.median_filter(values, size, mode="nearest")
-    np.testing.assert_array_equal(_core.running_median(values, size), twin)
-
-
 def phase_power_twin(windows, cell, length):
     power = []
     for timestamps in windows:
@@ -180,43 +90,6 @@ def test_phase_power_is_the_transform_of_shared_stamps():
     assert length == fft.next_fast_len(290_001, real=True)
     # Both transforms are good to some 1e-16 of their largest value, which is one.
     np.testing.assert_allclose(power, phase_power_twin(windows, 0.01 / 32, length), rtol=0.0, atol=1e-14)
-
-
-def test_direct_power_is_the_squared_mean_of_exponentials():
-    timestamps = np.sort(np.random.default_rng(2).uniform(0.0, 5.0, 512))
-    frequency = 3.0 + 0.01 * np.arange(41)
-    twin = np.abs(np.exp(2j * np.pi * np.outer(frequency, timestamps)).mean(axis=1)) ** 2
-    # Forty turns one after the other gather forty roundings.
-    np.testing.assert_allclose(_core.direct_power(timestamps, 3.0, 0.01, 41), twin, rtol=0.0, atol=1e-13)
-
-
-def test_statistics_of_windows_are_those_of_numpy():
-    readings = np.random.default_rng(4).normal(9.8, 0.1, (1000, 3))
-    starts = np.array([0, 100, 950])
-    block = readings[starts[:, None] + np.arange(50)]
-    mean, noise, spread = _core.window_statistics(readings, starts, 50)
-    np.testing.assert_allclose(mean, block.mean(axis=1), rtol=1e-14)
-    np.testing.assert_allclose(noise, np.diff(block, axis=1).std(axis=1) / np.sqrt(2.0), rtol=1e-12)
-    np.testing.assert_allclose(spread, np.linalg.norm(block.std(axis=1), axis=1), rtol=1e-12)
-    readings[120, 1] = np.nan
-    assert _core.window_statistics(readings, starts, 50) is None
-    assert _core.window_statistics(readings, np.array([980]), 50) is None
-
-
-def test_lengths_in_windows_and_means_of_blocks_are_those_of_numpy():
-    readings = np.random.default_rng(5).normal(3.0, 2.0, (1000, 3))
-    np.testing.assert_array_equal(
-        _core.block_mean_readings(readings, 7, 140), readings[:980].reshape(140, 7, 3).mean(axis=1)
-    )
-    starts = np.array([0, 100, 950])
-    readings[120, 1] = np.nan
-    lengths = np.linalg.norm(readings[starts[:, None] + np.arange(50)], axis=2)
-    assert _core.median_length(readings, starts, 50) == np.nanmedian(lengths)
-    assert np.isnan(_core.median_length(np.full((9, 3), np.nan), np.array([0]), 9))
-    with pytest.raises(ValueError, match="windows must lie"):
-        _core.median_length(readings, np.array([980]), 50)
-    with pytest.raises(ValueError, match="blocks must hold rows"):
-        _core.block_mean_readings(readings, 7, 143)
 
 
 def written(rng: np.random.Generator) -> str:

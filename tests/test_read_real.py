@@ -15,27 +15,6 @@ def static_norm(recording, samples=slice(0, 100)) -> float:
     return float(np.linalg.norm(recording.accelerometer[samples].mean(axis=0)))
 
 
-def pair(real_data, stem):
-    return read_recording(
-        accelerometer_path=real_data / "phone" / f"{stem}__Acceleration.csv",
-        gyroscope_path=real_data / "phone" / f"{stem}__AngularVelocity.csv",
-    )
-
-
-def test_xsens_two_files_read_alike(real_data):
-    folder = real_data / "xsens_mti"
-    recording = read_recording(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
-    expected = np.loadtxt(folder / "xsens_acc.txt")
-    np.testing.assert_array_equal(recording.accelerometer, expected[:, 1:])
-    np.testing.assert_array_equal(recording.gyroscope, np.loadtxt(folder / "xsens_gyro.txt")[:, 1:])
-    np.testing.assert_allclose(recording.time_s, expected[:, 0] - expected[0, 0], atol=1e-12)
-    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
-    assert recording.gyroscope_unit is RateUnit.COUNTS
-    assert recording.rate_hz == pytest.approx(100, rel=1e-3)
-    # A good log: nothing but statements.
-    assert codes(recording) <= QUIET | {FindingCode.CLOCKS_MERGED}
-
-
 def test_mimu4444_one_of_eight_devices(real_data):
     path = real_data / "mimu4444" / "exp_3.npz"
     with pytest.raises(ReadError, match="8 devices"):
@@ -53,18 +32,6 @@ def test_mimu4444_one_of_eight_devices(real_data):
     assert {clipped.numbers[f"{axis}_high_value"] for axis in "xyz"} == {32767.0}
     assert {clipped.numbers[f"{axis}_low_value"] for axis in "xyz"} == {-32768.0}
     assert "gyro" in clipped.seen
-
-
-def test_phone_two_clocks_are_merged(real_data):
-    recording = pair(real_data, "rec_3_gyro_dynamic")
-    merged = finding(recording, FindingCode.CLOCKS_MERGED)
-    assert merged.numbers["accelerometer_rate_hz"] == pytest.approx(99.75, abs=0.01)
-    assert merged.numbers["lost_rows"] == 0
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    assert recording.gyroscope_unit is RateUnit.RAD_S
-    # The unit is recognised by the turns, not guessed.
-    assert FindingCode.UNIT_ASSUMED not in codes(recording)
-    assert np.isfinite(recording.gyroscope).all()
 
 
 def test_mpu9150_without_header_or_time(real_data):
@@ -132,25 +99,8 @@ def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_d
         assert stuck == []
 
 
-def test_imucal_ferraris_units_and_missing_rate(real_data):
-    path = real_data / "imucal_ferraris" / "example_ferraris_session.csv"
-    recording = read_recording(path)
-    written = np.loadtxt(path, delimiter=",", skiprows=1)
-    np.testing.assert_array_equal(recording.gyroscope, written[:, 1:4])
-    np.testing.assert_array_equal(recording.accelerometer, written[:, 4:])
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    assert recording.gyroscope_unit is RateUnit.DEG_S
-    assert list(recording.auxiliary) == ["n_samples"]
-    assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
-    assert read_recording(path, rate_hz=102.4).gyroscope_unit is RateUnit.DEG_S
-
-
 @pytest.mark.parametrize(
-    ("name", "n", "clipped"),
-    [
-        ("tomi_example_data_calibration", 10245, True),
-        ("tomi_imu_static_test", 9986, False),
-    ],
+    ("name", "n", "clipped"), [("tomi_example_data_calibration", 10245, True), ("tomi_imu_static_test", 9986, False)]
 )
 def test_mpu6050_tomi_preamble_and_clipping(real_data, name, n, clipped):
     recording = read_recording(real_data / "mpu6050_tomi" / f"{name}.csv")

@@ -11,7 +11,7 @@ from trihedron.read import ReadError, read_recording
 from trihedron.read.devices import _devices
 from trihedron.read.names import clock_said, known_unit, parse_name
 from trihedron.records import FindingCode, Severity
-from trihedron.units import AccelerationUnit, RateUnit
+from trihedron.units import AccelerationUnit
 
 T, FORCE, RATE = texts.motion(50.0, 7)
 NAMES = "ax,ay,az,gx,gy,gz"
@@ -100,11 +100,6 @@ def test_a_column_t_that_falls_is_no_clock(tmp_path):
     np.testing.assert_allclose(recording.temperature_degc, warm)
 
 
-def test_a_count_that_starts_like_a_date_and_runs_off_is_none(tmp_path):
-    log = written(tmp_path / "log.csv", np.rint((T + 3.217) * 1e9).astype(int), f"t,{NAMES}")
-    assert read_recording(log).rate_hz == pytest.approx(50.0)
-
-
 def test_a_column_that_changes_where_the_clock_goes_back_identifies_devices(tmp_path):
     one = [f"left,{t:.4f}" for t in T]
     force, rate = np.concatenate([FORCE, 1.01 * FORCE]), np.concatenate([RATE, RATE])
@@ -124,39 +119,10 @@ def test_mg_and_gal_that_nothing_states_are_a_warning_where_both_are_near(tmp_pa
         assert (FindingCode.UNIT_ASSUMED in doubts(recording)) == (unit is AccelerationUnit.CM_S2)
 
 
-def test_labels_that_end_in_a_digit_and_remarks_above_prints_are_understood(tmp_path):
-    rows = [
-        f"q0: {t:.3f}\nq1: 0.1\nq2: 0.2\nAccel: {a[0]:.6f}, {a[1]:.6f}, {a[2]:.6f}\n"
-        f"Gyro: {w[0]:.6f}, {w[1]:.6f}, {w[2]:.6f}\n"
-        for t, a, w in zip(np.sin(T), FORCE, RATE, strict=True)
-    ]
-    (tmp_path / "log.txt").write_text("% board 3\n% fs=50 Hz\n" + "".join(rows))
-    recording = read_recording(tmp_path / "log.txt")
-    assert recording.rate_hz == pytest.approx(50.0)
-    np.testing.assert_allclose(recording.gyroscope, RATE, atol=1e-6)
-
-
 def test_an_array_with_its_own_clock_is_a_clock_and_three_readings():
     recording = trihedron.read({"acce": np.c_[1e3 + T, FORCE], "gyro": np.c_[1e3 + T, RATE]})
     assert recording.rate_hz == pytest.approx(50.0)
     np.testing.assert_allclose(recording.accelerometer, FORCE)
-
-
-GOPRO = [",".join(f"Accelerometer ({a}) [m/s²]" for a in "zxy"), "Accelerometer [m/s2],1,2"]
-
-
-@pytest.mark.parametrize("names", GOPRO)
-def test_gopros_telemetry_is_read_as_its_extractor_writes_it(tmp_path, names):
-    rows = "".join(f"{1e3 * t:.3f},{a[0]:.6f},{a[1]:.6f},{a[2]:.6f},31.5\n" for t, a in zip(T, FORCE, strict=True))
-    (tmp_path / "accl.csv").write_text(f"cts,{names},temperature [°C]\n{rows}")
-    recording = read_recording(tmp_path / "accl.csv")
-    assert (recording.rate_hz, recording.accelerometer_unit) == (pytest.approx(50.0), AccelerationUnit.M_S2)
-    assert np.sort(recording.accelerometer[0]) == pytest.approx(np.sort(FORCE[0]), abs=1e-6)
-
-
-def test_load_factors_beside_p_q_r_are_the_accelerometer(tmp_path):
-    recording = read_recording(written(tmp_path / "log.csv", T, "time,Nx,Ny,Nz,p,q,r", "", FORCE / 9.80665))
-    assert (recording.accelerometer_unit, recording.gyroscope_unit) == (AccelerationUnit.G, RateUnit.RAD_S)
 
 
 @pytest.mark.parametrize(

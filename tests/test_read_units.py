@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+import formats.session
 import trihedron
 from test_read import HEADER, codes, finding, write
-from trihedron.channel_facts.quiet import is_integer
 from trihedron.read import read_recording
 from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
@@ -17,26 +17,9 @@ RATE_HZ = 100.0
 
 
 def session(n_poses=6, turn_s=1.0):
-    """time [s] (n,), specific force [m/s^2] (n, 3), rate [rad/s] (n, 3): 2 s holds joined by random turns."""
-    rng = np.random.default_rng(3)
-    f = np.array([0.0, 0.0, 9.81])
-    force, rate = [], []
-    for _ in range(n_poses):
-        force += [f] * 200
-        rate += [np.zeros(3)] * 200
-        axis = np.cross(f, rng.standard_normal(3))
-        axis /= np.linalg.norm(axis)
-        steps = int(turn_s * RATE_HZ)
-        angles = np.diff(rng.uniform(1.0, 2.0) * 0.5 * (1 - np.cos(np.linspace(0, math.pi, steps + 1))))
-        for angle in angles:
-            # Gravity's direction in the body turns against the body.
-            f = f * math.cos(angle) - np.cross(axis, f) * math.sin(angle)
-            force.append(f)
-            rate.append(axis * angle * RATE_HZ)
-    force, rate = np.array(force), np.array(rate)
-    force = force + 0.01 * rng.standard_normal(force.shape)
-    rate = rate + 0.01 + 0.001 * rng.standard_normal(rate.shape)
-    return np.arange(len(force)) / RATE_HZ, force, rate
+    """time [s] (n,), specific force [m/s^2] (n, 3), rate [rad/s] (n, 3): poses joined by random turns."""
+    made = formats.session.session(np.random.default_rng(3), RATE_HZ, n_poses, turn_s)
+    return made.time_s, made.force, made.rate
 
 
 def saved(path, time_s, force, rate, header=HEADER):
@@ -90,7 +73,7 @@ def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(t
 
 
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
-    time_s, force, rate = session(n_poses=1, turn_s=0.0)
+    time_s, force, rate = (part[:200] for part in session(n_poses=1))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))
     assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
@@ -124,19 +107,6 @@ def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
     noise = np.random.default_rng(6).standard_normal((500, 6))
     recording = read_recording(write(tmp_path / "log.txt", noise, "", separator=" "), rate_hz=RATE_HZ)
     assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.SERIOUS
-
-
-def test_whole_numbers_are_told_wherever_the_one_that_is_none_stands():
-    """In pieces as all at once: an odd number in the last row of a piece or the first of the next is seen."""
-    for n in (1, 2047, 2048, 2049, 5000):
-        counts = np.arange(3.0 * n).reshape(n, 3)
-        assert is_integer(counts)
-        for row in {0, n // 2, n - 1, min(2048, n - 1)}:
-            for odd, whole in ((0.5, False), (np.nan, True), (np.inf, True)):
-                changed = counts.copy()
-                changed[row, 1] = odd
-                assert is_integer(changed) is whole
-    assert not is_integer(np.full((5000, 3), np.nan))
 
 
 # Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two

@@ -5,7 +5,6 @@ import pytest
 
 import trihedron
 from test_read import HEADER, assert_same, codes, readings, text_module, write
-from test_read_in_silence import motion
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode
 
@@ -18,12 +17,7 @@ def accounts(recording) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("header", "end"),
-    [
-        ("t,ax,ay,az,gx,gy,gz,note,label\n", ",,"),
-        ("t,ax,ay,az,gx,gy,gz,,\n", ",,"),
-        ("", ",,,"),
-    ],
+    ("header", "end"), [("t,ax,ay,az,gx,gy,gz,note,label\n", ",,"), ("t,ax,ay,az,gx,gy,gz,,\n", ",,"), ("", ",,,")]
 )
 def test_columns_that_are_empty_throughout_leave_the_names_of_the_others_alone(tmp_path, header, end):
     table = readings(ROWS)
@@ -136,28 +130,6 @@ def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp
     lost[np.random.default_rng(3).random(ROWS) < 0.3, 4:] = np.nan
     recording = read_recording(write(tmp_path / "lost.csv", lost))
     np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
-
-
-@pytest.mark.parametrize(("names", "scale"), [("rx,ry,rz", 1.0), ("вращ_x,вращ_y,вращ_z", 180.0 / np.pi)])
-def test_columns_that_turn_as_gravity_does_are_named_and_others_are_not(tmp_path, names, scale):
-    t, acc, rates = motion(50.0, n_poses=14)
-    rng = np.random.default_rng(100)
-    others = {
-        "gyro": scale * rates,
-        "angles": scale * np.cumsum(rates, axis=0) / 50.0,
-        "field": 4.0 * acc + 0.3 * rng.standard_normal(acc.shape),
-        "noise": scale * rng.standard_normal(acc.shape),
-        "velocity": np.cumsum(acc - acc.mean(axis=0), axis=0) / 50.0,
-    }
-    for kind, values in others.items():
-        path = write(tmp_path / "log.csv", np.column_stack([t, acc, values]), header=f"t,ax,ay,az,{names}\n")
-        recording = read_recording(path)
-        assert recording.gyroscope is None
-        said = [f.action for f in recording.findings if "turn as gravity turns" in f.seen]
-        assert len(said) == (kind == "gyro"), kind
-        if said:
-            mapping = said[0].split("--columns ")[1].rstrip(".")
-            np.testing.assert_allclose(read_recording(path, columns=mapping).gyroscope, values)
 
 
 def overtaken(n, seed=0):

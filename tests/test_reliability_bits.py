@@ -2,64 +2,14 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from small_session import SCENARIO, G, run
-from trihedron.simulate import hand_session, scenario_by_name, simulate
-
-THREADED_ROWS = 20_000
-
-WORDS = {
-    "calibrate": ["calibrate", "log.csv", "--gravity", G, "--json", "OUT"],
-    "diagnose": ["diagnose", "log.csv", "--gravity", G, "--json", "OUT"],
-    "allan": ["allan", "static.csv", "--json", "OUT"],
-    "simulate": ["simulate", "s.toml", "--seed", "7", "-o", "OUT"],
-}
 LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS", "POLARS_MAX_THREADS")
-
-
-def without_its_day(text):
-    """A result without the one thing that is of its day, in its fields and in its report."""
-    return re.sub(r'"(made_at|created)": "[^"]*"|\d{4}-\d\d-\d\d \d\d:\d\d UTC', "", text)
-
-
-@pytest.fixture(scope="module")
-def long_logs(tmp_path_factory):
-    """A session and a static log of more than 20 000 readings, beyond which sums are shared between threads."""
-    folder = tmp_path_factory.mktemp("long")
-    rng = np.random.default_rng(2)
-    motion = hand_session(n_poses=26, pose_s=8.0, move_s=2.0, first_pose_s=10.0)
-    recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
-    assert recording.n_samples > THREADED_ROWS
-    rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
-    static = np.column_stack([np.arange(30_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (30_000, 6))])
-    (folder / "s.toml").write_text(SCENARIO)
-    for name, table in (("log", rows), ("static", static)):
-        np.savetxt(folder / f"{name}.csv", table, "%.10g", ",", header="time_s,ax,ay,az,gx,gy,gz", comments="")
-    return folder
-
-
-# Kernels of the slow ones are below.
-@pytest.mark.parametrize(
-    "name", ["calibrate", "simulate", *(pytest.param(name, marks=pytest.mark.slow) for name in ("allan", "diagnose"))]
-)
-def test_outputs_of_long_logs_do_not_depend_on_threads(long_logs, name):
-    made = []
-    for threads in ("1", "3"):
-        out = long_logs / f"{name}.{'csv' if name == 'simulate' else 'json'}"
-        words = [str(out) if word == "OUT" else word for word in WORDS[name]]
-        status, _, err = run(*words, cwd=long_logs, env=dict.fromkeys(LIBRARIES, threads))
-        assert status in (0, 2), err
-        made.append(without_its_day(out.read_text()))
-        out.unlink()
-    assert made[0] == made[1]
 
 
 FIT = """

@@ -104,45 +104,6 @@ def test_a_long_kernel_ends_between_blocks_when_python_is_interrupted():
     assert _core.simulate_noise(5, 0.01, [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3).shape == (5, 3)
 
 
-def test_a_thread_that_works_alone_looks_for_signals_itself():
-    # With one thread for kernels the caller's own does the work, from the second kernel on.
-    code = (
-        "import os, signal, threading, time\n"
-        "from trihedron import _core\n"
-        "terms, seeds = [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3\n"
-        "_core.simulate_noise(5, 0.01, terms, seeds)\n"
-        "threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
-        "start = time.monotonic()\n"
-        "try:\n"
-        "    for _ in range(40): _core.simulate_noise(20_000_000, 0.01, terms, seeds)\n"
-        "except KeyboardInterrupt:\n"
-        "    print(time.monotonic() - start)\n"
-        "assert _core.simulate_noise(5, 0.01, terms, seeds).shape == (5, 3)\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "RAYON_NUM_THREADS": "1"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment)
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.4 + LOADED
-
-
-def test_threads_with_one_thread_for_kernels_get_the_same_answers_side_by_side():
-    code = (
-        "import threading\n"
-        "import numpy as np, trihedron\n"
-        "x = np.random.default_rng(1).normal(size=100_000)\n"
-        "found = {}\n"
-        "def work(k): found[k] = trihedron.allan_deviation(x, 100.0).deviation.tobytes()\n"
-        # More threads one after the other than keep rayon's only thread for themselves.
-        "for first in range(0, 300, 4):\n"
-        "    threads = [threading.Thread(target=work, args=(first + k,)) for k in range(4)]\n"
-        "    [t.start() for t in threads]; [t.join() for t in threads]\n"
-        "assert len(found) == 300 and len(set(found.values())) == 1\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "RAYON_NUM_THREADS": "1"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment)
-    assert done.returncode == 0, done.stderr
-
-
 def test_nothing_is_said_about_an_interruption_that_was_told_to_be_ignored():
     # nohup and background jobs of a shell start commands with SIGINT ignored.
     with started(
@@ -153,31 +114,3 @@ def test_nothing_is_said_about_an_interruption_that_was_told_to_be_ignored():
         out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert out
-
-
-def test_an_interruption_inside_a_callback_of_the_interpreter_prints_no_traceback():
-    script = (
-        "import os, signal, time, weakref\n"
-        "from trihedron import interruption\n"
-        "interruption.install()\n"
-        "class Lock: pass\n"
-        "lock = Lock()\n"
-        "kept = weakref.ref(lock, lambda _: (os.kill(os.getpid(), signal.SIGINT), time.sleep(0.05)))\n"
-        "del lock\n"
-        "time.sleep(5)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=10)
-    assert done.returncode == 130
-    assert done.stderr == "trihedron: interrupted; what was not finished was not written.\n"
-
-
-def test_an_interrupt_without_standard_error_says_nothing_on_standard_output():
-    code = (
-        "import sys, trihedron.__main__ as m\n"
-        "def stop(): raise KeyboardInterrupt\n"
-        "m.install = stop\n"
-        "assert sys.stderr is None\n"
-        "sys.exit(m.main())\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, preexec_fn=lambda: os.close(2))
-    assert (done.returncode, done.stdout) == (130, b"")

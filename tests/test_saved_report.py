@@ -1,20 +1,36 @@
-"""A saved result is laid out again: the same report from its JSON, and nothing that a file may smuggle into a page."""
+"""A saved result is laid out again: the same report from its JSON, as text, as a page and in pictures."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import trihedron
 from trihedron.cli import main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.domains import DOMAINS
 from trihedron.report import to_text
+from trihedron.report.axes import axes_of
+from trihedron.report.calibration import axes_table, calibration_report
+from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel, Points, Scale, Span, Sphere
+from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawn import _path
 from trihedron.report.findings import findings_block
+from trihedron.report.findings.grouping import combined
+from trihedron.report.findings.wording import filled
+from trihedron.report.layout import ticks
 from trihedron.report.machine import json_text
+from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.page import to_html
 from trihedron.report.saved import report_of, with_report
+from trihedron.report.verification import verification_report
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+from written_session import G, simulated, usual
 
 
 def chart():
@@ -45,12 +61,6 @@ def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
     again = report_of(json.loads(text))
     assert to_text(again) == to_text(document())
     assert to_html(again) == to_html(document())
-
-
-def test_a_finding_that_warns_and_its_action_stand_below_the_verdict():
-    head = to_html(document()).partition("<nav")[0]
-    told = '<p class="foremost"><b class="warning">warning</b>Seen → Action'
-    assert told in head.replace("seen", "Seen").replace("action", "Action")
 
 
 @pytest.mark.parametrize(
@@ -91,3 +101,107 @@ def test_the_command_lays_out_what_another_one_saved(tmp_path, capsys):
     assert "trihedron plan" in page.read_text(encoding="utf-8"), "how it was made is how it was made first"
     assert main(["report", str(page)]) == 1
     assert "not a saved result" in capsys.readouterr().err
+
+
+GRAVITY = float(G)
+
+
+def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
+    recording, result, _ = usual()
+    checked = trihedron.verify(result, recording, gravity_m_s2=GRAVITY)
+    document = verification_report(checked.verification, checked.segments)
+    moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
+    assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
+
+
+def test_a_domain_agrees_exactly_up_to_the_limit_of_its_figure_and_is_never_named_by_its_id():
+    _, _, found = usual()
+    judged = [one for one in found.domains if one.limit is not None]
+    assert {one.domain for one in judged} >= {"static-accel", "moves", "dynamics"}
+    assert not re.search("|".join(name for name in DOMAINS if "-" in name), to_text(diagnosis_report(found)))
+    assert all(one.disagrees == (one.chi2_per_dof > one.limit) for one in judged)
+
+
+def test_a_bias_has_one_sign_and_one_value_in_every_report():
+    recording, result, _ = usual()
+    text = trihedron.report(result)
+    expected = -np.linalg.solve(result.accelerometer.S, result.accelerometer.b)
+    expected /= np.linalg.norm(np.linalg.inv(result.accelerometer.S), axis=1)
+    # The error before the calibration stands beside the one after it as the figure has it.
+    error = uncalibrated_error(result.calibration, result.segments.accelerometer_mean)
+    before = re.search(r"^ *before calibration +(\S+) mm/s²", text, re.MULTILINE)
+    assert float(before[1]) == pytest.approx(1e3 * np.sqrt(np.mean(error**2)), rel=5e-3)
+    line = re.search(r"^bias +X (\S+) ± (\S+?), Y", text, re.MULTILINE)
+    # The figure is printed to two digits of its uncertainty, in mm/s².
+    assert abs(float(line[1].replace("−", "-")) - 1000.0 * expected[0]) < float(line[2])
+    other = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0), seed=4)
+    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=GRAVITY)
+    common = next(
+        one for one in several.model.repeated if (one.parameter.id, one.parameter.name) == ("accel-bias", "x")
+    )
+    # Two sessions of one simulated unit: their common bias is that of the first within both uncertainties.
+    assert abs(common.value - expected[0]) < 5.0 * common.std
+    again = trihedron.diagnose(recording, calibration=result)
+    given = next(one for one in again.parameters if (one.id, one.name) == ("accel-bias", "x"))
+    assert given.model == pytest.approx(expected[0], abs=1e-9)
+    for one in (result, several, again):
+        assert "the reading without input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
+
+
+def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
+    _, result, _ = usual()
+    document = calibration_report(result.calibration)
+    axes = next(s for s in document.sections if s.heading == "Axes").blocks
+    for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):
+        worst = max((row[2] for row in table.rows), key=float)
+        headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
+        assert (table.head[2], headline.unit, headline.value) == ("relative σ [%]", "%", worst)
+        # A bias stands once, in SI, over the sensitivity; the raw reading without input has another name.
+        assert table.head[-1].startswith("reading without input, −S⁻¹ b [count")
+    one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
+    assert "without input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
+
+
+@pytest.mark.parametrize("shift_deg_s", [0.0, 0.1])
+def test_verify_and_diagnose_judge_the_bias_of_another_session_alike(shift_deg_s):
+    # The bias of this unit changes by 6 σ of both calibrations between these sessions: 1/f noise, and no fault.
+    motions = (hand_session(n_poses=n, pose_s=3.0, move_s=2.5, first_pose_s=5.0) for n in (24, 18))
+    scenarios = (replace(scenario_by_name("hand-session"), motion=motion) for motion in motions)
+    first, second = (simulate(scenario, seed)[0] for scenario, seed in zip(scenarios, (3, 9), strict=True))
+    own = trihedron.calibrate(first, gravity_m_s2=9.80665).calibration
+    known = replace(own, gyroscope=replace(own.gyroscope, b=own.gyroscope.b + np.radians(shift_deg_s)))
+    shifts = [one for one in trihedron.verify(known, second).findings if one.code is FindingCode.CALIBRATION_SHIFT]
+    against = trihedron.diagnose(second, calibration=known)
+    assert bool(shifts) == any(one.significant for one in against.parameters if one.id == "gyro-bias")
+    assert bool(shifts) == (shift_deg_s > 0.0)
+    assert all("°/s" in one.seen for one in shifts)
+
+
+@pytest.mark.parametrize("low", [0.0031, 0.31, 5.1])
+@pytest.mark.parametrize("factor", [2.1, 3.0, 30.0])
+def test_a_logarithmic_axis_has_two_figures_to_read_a_scale_from(low, factor):
+    named = [word for _, word in ticks(low, factor * low, is_log=True) if word]
+    assert 2 <= len(named) <= 8
+
+
+def test_small_numbers_have_one_notation_in_tables_and_sentences():
+    assert with_sigma_and_power(8.804e-5, 1.3e-7) == "(8.804 ± 0.013)e−5"
+    seen = filled("K is below {limit:.2g} {unit:unit}/√s.", {"limit": 7.3e-5, "unit": "m/s^2"}, {})
+    assert seen == "K is below 7.3e−5 m/s²/√s."
+    one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
+    (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
+    assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
+
+
+@pytest.mark.parametrize(
+    ("exponent", "unit", "printed"),
+    [(-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s"), (-3, "", "10⁻³")],
+)
+def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, printed):
+    assert unit_with_power(exponent, unit) == printed
+
+
+def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_a_gap():
+    x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
+    y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
+    assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"

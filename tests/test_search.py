@@ -17,11 +17,7 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import contiguous, core_state
-from trihedron.session.noise import ANYTHING, coloured_variance
-from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.effects import with_effect
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
+from trihedron.session.noise import ANYTHING
 
 
 @cache
@@ -90,16 +86,6 @@ def test_every_candidate_says_why_it_was_not_taken():
             assert row["limit95"] > 0.0, row["id"]
 
 
-# Of a gyro: tests/test_diagnose_pairs.py.
-@pytest.mark.slow
-def test_a_drift_among_biases_that_scatter_is_named():
-    scenario = _of(profile_by_name("mpu"), hand_session(32, layout=7), "session", 7)
-    scenario = with_effect(scenario, "accel-bias-drift", amplitude=(0.15, -0.12, 0.13), tau_s=80.0)
-    recording, truth = simulate(with_effect(scenario, "accel-bias-repeatability", sigma=(0.003,) * 3), 7)
-    found = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
-    assert found.effects[0].id == "accel-bias-drift"
-
-
 def test_a_long_delay_is_a_delay_of_that_length():
     d = diagnosed("accel-gyro-time-offset", 4, 14, offset_s=0.04)
     first = d.effects[0]
@@ -110,22 +96,6 @@ def test_a_long_delay_is_a_delay_of_that_length():
     for effect in d.effects:  # nothing whose size is unknown
         assert any(abs(p.value) > p.std for p in effect.parameters), effect.id
         assert effect.share is None or 0.0 <= effect.share <= 1.0
-
-
-def test_white_noise_has_no_colour_and_a_zero_that_jumps_in_some_poses_is_bounded():
-    rng = np.random.default_rng(8)
-    density, lasts = np.full(3, 0.1), np.full(40, 4.0)
-    sigma = np.full((40, 3), 0.1 / np.sqrt(4.0))
-    move_s = 2.0
-    slow = []
-    for _ in range(100):
-        halves = rng.normal(size=(40, 3)) * 2.0 * sigma
-        assert coloured_variance(sigma, halves, density, lasts, np.array([move_s])) == pytest.approx(0.0, abs=1e-12)
-        # Uncertainty four times as wide: a quarter of the poses jumped; the quiet ones bound what is slow noise.
-        jumping = np.where(rng.random((40, 1)) < 0.25, 12.0 * sigma, 0.0)
-        slow.append(coloured_variance(4.0 * sigma, halves + jumping, density, lasts, np.array([move_s])))
-    as_error_bars_say = (4.0**2 - 1.0) * move_s * 0.1**2
-    assert float(np.mean(slow)) < 0.5 * as_error_bars_say  # 2.5 times the quiet poses' own, which is near one
 
 
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():

@@ -9,10 +9,6 @@ from trihedron.read import read_recording
 from trihedron.segment import segment_recording
 
 
-def codes(segments):
-    return {finding.code for finding in segments.findings}
-
-
 def test_mimu4444_poses_are_found_and_violent_rotation_gives_none(real_data):
     for device in (1, 8):
         recording = read_recording(real_data / "mimu4444" / "exp_3.npz", instance=device)

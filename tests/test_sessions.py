@@ -14,7 +14,7 @@ from trihedron.estimate.sessions.spread import next_session, repeated_parameters
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.files.calibration import read_calibration
 from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of
-from trihedron.records import FindingCode, Recording, Severity
+from trihedron.records import Recording, Severity
 from trihedron.records.sessions import PARAMETERS, Session
 
 UNIT = Instrument()
@@ -118,17 +118,6 @@ def test_a_recording_that_cannot_be_calibrated_is_left_out_with_its_reason(four_
     assert len(result.model.sessions) == 2
     with pytest.raises(ValueError, match="two recordings at least"):
         trihedron.calibrate_sessions([four_sessions[0], still], gravity_m_s2=G)
-
-
-def test_what_one_recording_leaves_is_a_warning_of_all(four_sessions):
-    first = four_sessions[0]
-    drift = 0.02 * (first.time_s / first.time_s[-1])[:, None]
-    drifting = replace(first, gyroscope=first.gyroscope + drift)
-    result = trihedron.calibrate_sessions([drifting, four_sessions[1]], gravity_m_s2=G)
-    said = [one.seen for one in result.model.findings if one.code is FindingCode.CALIBRATION_DOUBTED]
-    assert len(said) == 1
-    assert "bias drifts" in said[0]
-    assert result.model.is_trustworthy
 
 
 def test_dates_that_are_not_in_the_logs_are_asked_for(four_sessions):

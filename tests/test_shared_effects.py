@@ -95,22 +95,3 @@ def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     assert document.next_step.startswith("Record ")
     with pytest.raises(ValueError, match="two or more"):
         trihedron.diagnose_sessions([simulated("", 11, 14)[0]], gravity_m_s2=9.81)
-
-
-@pytest.mark.slow
-def test_the_g_sensitivity_of_a_real_unit_is_in_all_three_of_its_sessions_and_one_that_differs_in_none(real_data):
-    folder = real_data / "getovermassif"
-    recordings = [
-        trihedron.read(
-            accelerometer_path=folder / f"session{k}_acc.txt", gyroscope_path=folder / f"session{k}_gyro.txt"
-        )
-        for k in (2, 3, 4)
-    ]
-    found = trihedron.diagnose_sessions(recordings, gravity_m_s2=9.803)
-    (effect,) = found.effects
-    assert effect.id == "gyro-g-sensitivity"
-    assert effect.is_of_instrument
-    # Each of them by itself gains at the common expected size; together far more.
-    assert min(effect.scores) > 0.0
-    assert effect.score > 100.0
-    assert not any(one.is_of_instrument for one in sessions(4e-4, -4e-4).effects)

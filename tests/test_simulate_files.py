@@ -5,19 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from small_session import made_once
 from trihedron.api.reading import read
 from trihedron.cli import main
 from trihedron.files.log import truth_document, write_truth
-from trihedron.files.scenario import TEMPLATE, improved_scenario
-from trihedron.simulate import (
-    Pose,
-    Turn,
-    profile_by_name,
-    read_scenario,
-    scenario_by_name,
-    simulate,
-)
+from trihedron.simulate import Pose, Turn, profile_by_name, read_scenario, scenario_by_name, simulate
 
 EXAMPLE = """
 name = "bench"
@@ -113,6 +104,14 @@ def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, 
     assert "\n" not in str(caught.value)[:60]
 
 
+def test_a_unit_of_a_part_without_tolerances_is_the_part():
+    part = profile_by_name("ideal")
+    accelerometer, gyroscope = part.unit(7)
+    for unit, nominal in ((accelerometer, part.accelerometer), (gyroscope, part.gyroscope)):
+        np.testing.assert_array_equal(unit.S, nominal.S)
+        np.testing.assert_array_equal(unit.b, nominal.b)
+
+
 def test_truth_is_written_whole(tmp_path):
     _, truth = simulate(scenario_by_name("imperfect"), seed=3)
     write_truth(truth, tmp_path / "truth.npz")
@@ -156,28 +155,3 @@ def test_the_scenario_to_begin_with_is_a_whole_one_and_is_not_written_over(tmp_p
     assert simulate(read_scenario(begun), 1)[0].n_samples > 1000
     assert main(["simulate", "--template", str(begun)]) == 1
     assert "left alone" in capsys.readouterr().err
-
-
-# Scenarios of a user's own are improved in tests/test_worked_example.py.
-@pytest.mark.slow
-@pytest.mark.usefixtures("few_simulations")
-def test_the_scenario_to_begin_with_is_made_one_of_the_users_own_unit(tmp_path, capsys):
-    begun, better, log = tmp_path / "sensor.toml", tmp_path / "better.toml", made_once() / "log.csv"
-    assert main(["simulate", "--template", str(begun)]) == 0
-    asked = ["diagnose", str(log), "--gravity", "9.80665", "--against", str(begun), "--improved", str(better)]
-    assert main(asked) == 0
-    capsys.readouterr()
-    S = read_scenario(better).accelerometer.S
-    known = scenario_by_name("hand-session").accelerometer.S
-    np.testing.assert_allclose(np.linalg.norm(S, axis=0), np.linalg.norm(known, axis=0), rtol=2e-3)
-
-
-def test_an_improved_scenario_keeps_blank_lines_between_its_tables(tmp_path):
-    (tmp_path / "sensor.toml").write_text(TEMPLATE)
-    noise = {"noise": {"N": [1.0, 2.0, 3.0]}}
-    for effects in ([], [("accel-cubic", {"K3_x": 2.0})]):
-        text = improved_scenario(tmp_path / "sensor.toml", {"accelerometer": noise, "gyroscope": noise}, effects)
-        lines = text.splitlines()
-        headed = [k for k, line in enumerate(lines) if line.startswith("[")]
-        assert all(lines[k - 1] == "" and lines[k - 2] != "" for k in headed)
-        assert lines[-1] != ""

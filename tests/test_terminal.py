@@ -4,15 +4,12 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
 from trihedron.cli import COMMANDS, main
-from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report import Document, to_text
-from trihedron.report.document import Code, Facts, Paragraph, Section, Table
-from trihedron.report.findings import findings_block
+from trihedron.report.document import Facts, Paragraph, Section, Table
 from trihedron.report.page import to_html
 from trihedron.report.text import Style
 
@@ -37,64 +34,6 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
         assert all(word in said for word in cell.split())
     for cell in ROW[1:]:
         assert cell in text
-
-
-def test_s_and_b_stand_side_by_side_on_a_narrow_terminal_with_uncertainties_below():
-    lines = to_text(whole(), width=70).splitlines()
-    assert not any("(continued" in line for line in lines)
-    first = next(k for k, line in enumerate(lines) if line.startswith("f1 ="))
-    row, below = lines[first : first + 2]
-    assert row.split() == ["f1", "=", "2.412814", "0", "0", "−79.9221"]
-    assert below.split() == ["±", "0.000083", "±", "0.0025"]
-    assert below.index("± 0.0025") + len("± 0.0025") == len(row)
-    assert "2.412814 ± 0.000083" in to_text(whole(), width=120)
-
-
-def test_what_to_do_stands_below_the_verdict():
-    lines = to_text(replace(whole(), next_step="Test it on another recording. " * 4), width=80).splitlines()
-    after = lines.index("Usable, with 1 warning.") + 1
-    assert lines[after].startswith("→ Test it")
-    assert lines[after + 1].startswith("  ")
-
-
-def coloured():
-    """The same of three axes, and a note."""
-    cause, action = "A low-pass filter in the sensor.", "All terms are quoted from below."
-    findings = [
-        Finding(
-            FindingCode.SPECTRUM_LOW_PASS, Severity.WARNING, f"{axis}: Above {hz} Hz the spectrum falls.", cause, action
-        )
-        for axis, hz in (("gyro x", 8.84), ("gyro y", 12.5), ("accel x", 8.84))
-    ]
-    findings.append(Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "the gyro's unit is rad/s."))
-    return findings
-
-
-def whole():
-    """A report with a block of every kind."""
-    matrix = Table(
-        ("", "a′1 × 10⁻³", "a′2 × 10⁻³", "a′3 × 10⁻³", "b [m/s²]"),
-        (
-            ("f1 =", "2.412814 ± 0.000083", "0", "0", "−79.9221 ± 0.0025"),
-            ("f2 =", "−0.00874 ± 0.00016", "2.426470 ± 0.000043", "0", "−80.4527 ± 0.0057"),
-        ),
-        "Accelerometer: f = S a′ + b, with a′ in counts and S in m/s² per count",
-    )
-    facts = Facts(
-        (("recording", "512 s at 100.0 Hz"), ("residual", "1.35 mm/s² rms in sample; noise alone 0.975 mm/s²"))
-    )
-    sections = (
-        Section("Result", (facts, matrix)),
-        Section("Findings", (findings_block(coloured()),)),
-        Section("Kalibr", (Code("gyroscope_noise_density: 0.0003181  # rad/s/√Hz"), Paragraph("σ of a mean, in µg."))),
-    )
-    return Document("Calibration", "log.csv", "Usable, with 1 warning.", True, sections)
-
-
-def test_colour_changes_no_character_and_says_the_verdict_in_its_own():
-    coloured, plain = to_text(whole(), style=Style(80, has_colour=True)), to_text(whole(), width=80)
-    assert re.sub(r"\x1b\[[\d;]*m", "", coloured) == plain
-    assert "\x1b[1;33mUsable, with 1 warning.\x1b[0m" in coloured
 
 
 def test_names_from_a_log_steer_no_terminal_and_stay_one_line_of_a_page():
@@ -139,17 +78,3 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, caps
         known = capsys.readouterr().out
         for option in re.findall(r" (--?[a-z][a-z-]*)", line):
             assert option in known, (line, option)
-
-
-def test_every_part_of_a_divided_table_repeats_what_distinguishes_its_rows():
-    rows = tuple((f"sensor {k // 2}", f"axis {k % 2}", *["9.87654321"] * 8) for k in range(4))
-    table = Table(("sensor", "axis", *(f"quantity {k}" for k in range(8))), rows)
-    said = to_text(Document("T", "", "V", True, (Section("S", (table,)),)), width=60)
-    assert said.count("(continued: ") > 0
-    assert said.count("sensor 1   axis 0") == said.count("(continued: ") + 1
-
-
-def test_a_column_without_a_value_is_left_out():
-    table = Table(("name", "empty", "value"), (("a", "–", "1"), ("b", "", "2")))
-    assert table.head == ("name", "value")
-    assert table.rows == (("a", "1"), ("b", "2"))

@@ -3,8 +3,6 @@
 import numpy as np
 
 import trihedron
-from trihedron.segment.means import upright
-from trihedron.session.noise import along_gradient
 
 G = 9.81
 RATE_HZ, POSE_S = 100.0, 3.0
@@ -55,23 +53,3 @@ def test_calibration_on_a_soft_pad_counts_the_norms_by_their_own_errors():
     # Six sessions of at least seven degrees of freedom: their mean strays by 0.22 (one sigma). By the axes' errors it
     # is below 0.2.
     assert 0.5 < np.mean(reduced) < 1.7
-
-
-def test_upright_finds_the_gradient_through_offset_and_uneven_counts():
-    rng = np.random.default_rng(3)
-    up = directions(rng, 14)
-    scale = np.array([4000.0, 4300.0, 3700.0])
-    found = upright(32768.0 + up * scale, has_unit=False)
-    gradient = up / scale
-    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
-    np.testing.assert_allclose(found, gradient, atol=1e-6)  # exact but for the rounding of a least-squares fit
-
-
-def test_errors_along_a_gradient_are_the_verticals_own_and_the_axes_across():
-    rng = np.random.default_rng(5)
-    up = directions(rng, 5)
-    sigma, along = rng.uniform(1.0, 2.0, (5, 3)), np.array([0.1, 0.2, np.nan, 0.3, 0.4])
-    found = along_gradient(sigma, (up, along), 2.0 * up)
-    known = np.isfinite(along)
-    np.testing.assert_allclose(found[known], 2.0 * along[known])
-    np.testing.assert_allclose(found[2], 2.0 * np.sqrt((up[2] ** 2 * sigma[2] ** 2).sum()))

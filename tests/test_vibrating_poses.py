@@ -8,7 +8,6 @@ import pytest
 
 import trihedron
 from trihedron.records import Pose, Recording, Segments
-from trihedron.session import static_lines
 from trihedron.session.static_lines import means_beside_lines
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
@@ -97,29 +96,3 @@ def test_a_few_mm_s2_that_go_with_the_shaking_are_rectification_and_a_line_in_ev
     seed, shaken_share, gain, rate_line, named
 ):
     assert [effect.id for effect in session(seed, shaken_share, gain, rate_line).effects] == [named]
-
-
-@pytest.mark.parametrize("drifts", [True, False])
-def test_the_mean_beside_a_shaker_whose_frequency_wanders_is_known_and_its_error_is_right(drifts):
-    """Of 30 to 300 times the noise: the fit of steady lines knew the mean fifty times worse than white noise does."""
-    rng, sigma, z, over_white = np.random.default_rng(5), 0.01, [], []
-    for _ in range(60):
-        t = np.arange(int(rng.integers(120, 1200)))
-        f = rng.uniform(0.08, 0.45)
-        if drifts:
-            phase = np.cumsum(rng.normal(size=len(t))) * 0.03
-        else:
-            phase = rng.uniform(0.2, 1.0) * np.sin(2 * np.pi * rng.uniform(0.002, 0.02) * t + rng.uniform(0.0, 6.0))
-        turned = 2.0 * np.pi * f * t + phase
-        wave = rng.uniform(0.3, 3.0) * (np.sin(turned) + 0.4 * np.sin(2.02 * turned))
-        part = wave[:, None] * np.array([0.3, 0.4, 0.87]) + rng.normal(size=(len(t), 3)) * sigma
-        lines, has_line = static_lines.find_pose_lines(part)
-        if not lines:
-            continue  # a sway of three to five bins looks like what is slower: the plain mean stays
-        mean, error = static_lines._constant_beside(part, lines, np.full(3, sigma))
-        z += (mean / error)[has_line].tolist()
-        over_white += (error / (sigma / np.sqrt(len(t))))[has_line].tolist()
-    assert len(z) > 150
-    # 180 means of poses whose axes share one shaker, as 60: 95 ± 2.8 %, three of that below.
-    assert np.mean(np.abs(z) < 1.96) > 0.86
-    assert np.median(over_white) < 3.0

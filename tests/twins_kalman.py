@@ -1,7 +1,5 @@
 """Slow, obvious versions of what the Kalman room computes."""
 
-from fractions import Fraction
-
 import numpy as np
 
 GRAVITY = 9.80665
@@ -50,30 +48,6 @@ def generalised_least_squares(references, readings, covariance):
     inverse = np.linalg.inv(covariance)
     cov = np.linalg.inv(h.T @ inverse @ h)
     return cov @ h.T @ inverse @ readings, cov
-
-
-def recursive_least_squares_in_fractions(rows, readings, variance, prior_variance):
-    """Textbook recursion in exact arithmetic; returns the estimate and the variances as fractions."""
-    n = len(rows[0])
-    p = [[Fraction(prior_variance) if i == j else Fraction(0) for j in range(n)] for i in range(n)]
-    x = [Fraction(0)] * n
-    for row, reading in zip(rows, readings, strict=True):
-        h = [Fraction(v) for v in row]
-        ph = [sum(p[i][j] * h[j] for j in range(n)) for i in range(n)]
-        s = sum(h[i] * ph[i] for i in range(n)) + Fraction(variance)
-        innovation = Fraction(reading) - sum(h[i] * x[i] for i in range(n))
-        x = [x[i] + ph[i] * innovation / s for i in range(n)]
-        p = [[p[i][j] - ph[i] * ph[j] / s for j in range(n)] for i in range(n)]
-    return x, [p[i][i] for i in range(n)]
-
-
-def naive_covariance_form(rows, variance, prior_variance):
-    """Variances by ``P − K H P`` in double precision: the form the article prints."""
-    p = np.eye(len(rows[0])) * prior_variance
-    for h in rows:
-        ph = p @ h
-        p = p - np.outer(ph, ph) / (h @ ph + variance)
-    return np.diag(p)
 
 
 def normalised_error_squared(error, covariance):

@@ -99,9 +99,7 @@ SIZES: dict[str, Draw] = {
     "accel-saturation": lambda rng, s, _: {"limit": float(G * (1.0 + rng.uniform(0.01, 0.03) / s))},
     "accel-size-effect": lambda rng, s, _: {"places_m": matrix(rng, 4e-3 * s)},
     "lever-arm": lambda rng, s, _: {"arm_m": signed(rng, 0.04 * s)},
-    "accel-gyro-time-offset": lambda rng, s, _: {
-        "offset_s": float(rng.choice((-1, 1)) * rng.uniform(2e-3, 5e-3) * s),
-    },
+    "accel-gyro-time-offset": lambda rng, s, _: {"offset_s": float(rng.choice((-1, 1)) * rng.uniform(2e-3, 5e-3) * s)},
     "sensor-lag": lambda rng, s, _: {"sensor": sensor(rng), "lag_s": (float(rng.uniform(2e-3, 5e-3) * s),) * 3},
     "dropped-samples": _losses,
     "timing-jitter": lambda rng, s, _: {"jitter_s": float(rng.uniform(0.6e-3, 1.5e-3) * s)},

@@ -1,1 +1,1 @@
-"""The hot paths, one file each: data, our function, NumPy and SciPy, numba, what PyPI offers, tuned C where it is."""
+"""The hot paths, one file each: data, our function, NumPy and SciPy, what PyPI offers."""

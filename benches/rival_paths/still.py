@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from rival_paths import tuned_c as c
-
 WINDOW = 101
 
 
@@ -15,11 +13,11 @@ def data(n):
     return (a,)
 
 
-def ours():
+def ours(a):
     """Mean and variance of blocks of a fifth of the window, from which `segment` judges windows of five blocks."""
     from trihedron import _core
 
-    return lambda a: _core.block_statistics(a, WINDOW // 5)
+    return _core.block_statistics(a, WINDOW // 5)
 
 
 def scipy_filter(a):
@@ -42,20 +40,9 @@ def bottleneck(a):
     return np.linalg.norm(bottleneck.move_var(a, WINDOW, axis=0), axis=1)
 
 
-def tuned(kind):
-    def call(a):
-        out = np.empty(len(a) - WINDOW + 1)
-        c.loaded("static_ref").sv_run(c.pointer(a), c.size_t(len(a)), WINDOW, c.pointer(out), kind, 1)
-        return out
-
-    return call if c.is_here("static_ref") else None
-
-
 DETECT = {
     "trihedron": ours,
     "SciPy ndimage, uniform_filter1d": scipy_filter,
     "pandas, rolling": pandas_rolling,
     "bottleneck": bottleneck,
-    "C, running sums": tuned(0),
-    "C, prefix sums": tuned(1),
 }

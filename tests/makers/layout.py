@@ -12,8 +12,8 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from formats import written as known
-from formats.written import Session
+from formats import session as known
+from formats.session import Session
 
 EPOCH = datetime(2024, 3, 1, 12, 0, 0)
 EPOCH_S = 1709294400.0

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 
-from formats.layout import G
+from formats.session import G
 from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, session, written
 
 
