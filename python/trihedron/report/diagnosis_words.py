@@ -144,7 +144,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
     if len(of_session) == len(diagnosis.effects):
         alone = "No effect goes with them: none is corrected in another log."
-        return f"{use} {alone}{_in_the_next_log(diagnosis)}{_by_themselves(diagnosis)}"
+        return f"{_in_the_next_log(diagnosis)}{use} {alone}{_by_themselves(diagnosis)}"
     store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     return f"{store}{beside}.{_by_themselves(diagnosis)}"
@@ -153,7 +153,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
     """What to do about the first effect of this session alone."""
     advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
-    return next((f" Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+    return next((f"Against {id_in_print(name)}: {said}. " for name, said in advice if said), "")
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:

@@ -107,7 +107,8 @@ def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> st
     pairs = zip(found.diagnoses, found.of_single_recordings, strict=True)
     if alone := [f"`trihedron diagnose {shlex.quote(one.recording_source)}`" for one, ids in pairs if ids]:
         return (
-            f"What a recording misses alone belongs to its session (or its unit, where they differ): {listed(alone)}."
+            f"What a recording misses alone belongs to its session: {listed(alone)}; or to another unit, as "
+            "`trihedron calibrate ...` shows where S differs."
         )
     return "Nothing is to be added. Calibrate the recordings together: `trihedron calibrate ... -o calibration.json`."
 

@@ -18,6 +18,8 @@ NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
 _COMMAND = re.compile(r"\(?`[^`]+`[.,;:)]*")
+_SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])(?=(?:[^`]*`[^`]*`)*[^`]*$)")
+"""A space between sentences, not inside a command."""
 _COMMON_POWER = re.compile(r"^\((.+) ± (.+)\)(e\S+)$")
 _TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
@@ -58,7 +60,9 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     lines = [*title, *_wrap(style.plain(one_line(document.subtitle)), style.width), ""]
     lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
     if document.what_next:
-        lines += _wrap(style.plain(document.what_next), style.width, style.plain("→ "), "  ")
+        steps = _SENTENCE_END.split(style.plain(document.what_next))
+        for arrow, step in zip((style.plain("→ "), *["  "] * len(steps)), steps, strict=False):
+            lines += _wrap(step, style.width, arrow, "  ")
     for section in document.sections[:sections]:
         shown = [_block(block, document, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
