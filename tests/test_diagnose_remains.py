@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -143,7 +144,7 @@ def session(lean_rad, scatter_rad_s, seed=1):
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
-    return Context(obs, tune_noise(obs, start_state(obs, calibration), None))
+    return Context(tune_noise(obs, start_state(obs, calibration), None))
 
 
 def test_supports_that_give_are_told_from_zeros_that_scatter():
@@ -198,16 +199,20 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     assert found.verdict == "missing-physics"
 
 
+def found(*effects, candidates=()):
+    return SimpleNamespace(effects=effects, candidates=candidates, domains=(), remaining=())
+
+
 def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     pushed = effect("disturbed-pose", share=0.7, variant="")
     faint = effect("periodic-interference", share=0.05, variant="")
     strong = effect("periodic-interference", share=0.25, variant="")
-    assert not compare_effects([], [pushed, faint], [], alpha=0.01).differ
-    assert compare_effects([], [pushed, strong], [], alpha=0.01).differ
-    assert compare_effects([], [pushed, effect("accel-cubic")], [], alpha=0.01).differ
+    assert not compare_effects([], found(pushed, faint), alpha=0.01).differ
+    assert compare_effects([], found(pushed, strong), alpha=0.01).differ
+    assert compare_effects([], found(pushed, effect("accel-cubic")), alpha=0.01).differ
     # What only the model has is no footnote of the recording.
     tried = [Candidate("periodic-interference", 0.4, True)]
-    assert compare_effects([faint], [], tried, alpha=0.01).differ
+    assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ
 
 
 def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():

@@ -125,17 +125,21 @@ class PoseDesign:
         return float(np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows).max()))
 
     def advice(self, relative_sigma: float, n_poses: int) -> tuple[Words, ...]:
-        """The poses that most reduce the sum of the nine parameters' variances, one after another (greedy)."""
+        """The poses to add, one after another: those that add most information while parameters are undetermined, then
+        those that most reduce the largest variance."""
         information = self.information.copy()
         # A prior of one (100 % of scale, |g| of bias) makes undetermined and weakly determined parameters comparable.
         information += np.eye(9)
         rows = design_rows(CANDIDATES) / relative_sigma
         advised = []
-        for _ in range(n_poses):
+        for k in range(n_poses):
             covariance = np.linalg.inv(information)
             seen = rows @ covariance
-            gain = seen**2 / (1.0 + np.einsum("ij,ij->i", seen, rows))[:, None]
-            best = int(np.argmax(gain.sum(axis=1)))
+            of_rows = np.einsum("ij,ij->i", seen, rows)
+            left = np.diag(covariance) - seen**2 / (1.0 + of_rows)[:, None]
+            # The largest variance decides; the sum breaks ties, so that a pose also helps the second largest.
+            largest = left.max(axis=1) + 1e-3 * left.sum(axis=1)
+            best = int(np.argmax(of_rows) if self.rank + k < 9 else np.argmin(largest))
             advised.append(pose_in_words(CANDIDATES[best]))
             information += np.outer(rows[best], rows[best])
         return tuple(advised)
