@@ -165,3 +165,24 @@ def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():
     # A standard deviation of 20 000 draws is good to half a per cent.
     np.testing.assert_allclose(noise, drawn.std(axis=0), rtol=0.02)
     np.testing.assert_allclose(whole, both.std(axis=0), rtol=0.02)
+
+
+def test_poses_are_advised_first_where_parameters_are_undetermined():
+    from trihedron.estimate.accelerometer.poses import PoseDesign
+
+    # Seven poses of a session that stopped early: neither face along Y, and a second +X almost where the first was.
+    up = np.array(
+        [
+            [0, 0, 1],
+            [1, 0, 0.01],
+            [-0.96, -0.27, -0.07],
+            [-1, 0, 0],
+            [0.71, 0.42, 0.56],
+            [0.71, -0.71, 0],
+            [0, 0.7, -0.7],
+        ]
+    )
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    design = PoseDesign.of(up, np.full(7, 1e-4))
+    assert design.rank == 7
+    assert "+X up" not in [str(one) for one in design.advice(1e-4, 2)]

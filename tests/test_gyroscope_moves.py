@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from trihedron.estimate.gyroscope.findings import handedness
 from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
@@ -81,6 +82,13 @@ def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_rep
     assert np.linalg.det(found.S) * np.linalg.det(axes) > 0.0
     assert np.abs(z_scores(found, truth)).max() < 4.0
     assert FindingCode.LEFT_HANDED in codes(findings)  # which says that axes differ in name
+
+
+@pytest.mark.parametrize(("signs", "both"), [((-1, -1, -1), True), ((1, 1, -1), False), ((-1, 1, 1), False)])
+def test_gyro_axes_that_all_turn_against_the_accelerometers_are_a_left_handed_board(signs, both):
+    # One axis of the board documented the wrong way round mirrors both sensors: R and -R S instead of S.
+    (found,) = handedness(np.diag(signs) * 1e-4, np.eye(3))
+    assert ("both sensors" in found.seen) is both
 
 
 def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,17 @@ import tomllib
 
 import trihedron
 from trihedron.api import driving
-from trihedron.api.improving import improve
+from trihedron.api.improving import _mean_drift, improve
 from trihedron.records.channel_facts import ChannelFacts, Limit
-from trihedron.simulate import Scenario, diagnosed_sizes, hand_session, read_scenario, simulate
+from trihedron.simulate import (
+    Drift,
+    Scenario,
+    diagnosed_sizes,
+    hand_session,
+    read_scenario,
+    simulate,
+)
+from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.twin import unclipped
 
@@ -120,3 +129,23 @@ def test_a_straight_drift_of_a_session_whose_length_nobody_says_is_left_out():
     sizes, left_out = diagnosed_sizes([effect], 200.0)
     assert sizes == [("accel-bias-drift", {"change": change, "length_s": 200.0})]
     assert not left_out
+
+
+def test_b_beside_a_warm_up_is_the_mean_of_the_session_and_a_scenario_adds_it_back():
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    healthy = Scenario(hand_session(24, layout=5), "unit", accel, gyro, profile.clock)
+    size = {"amplitude": (0.08, -0.1, 0.06), "tau_s": 60.0}
+    recording, truth = simulate(with_effect(healthy, "accel-bias-drift", **size), seed=5)
+    found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
+    assert "accel-bias-drift" in [one.id for one in found.effects]
+    poses = found.segments
+    mean = np.average(Drift(**size).at(poses.time_mid_s), axis=0, weights=poses.duration_s)
+    # b of f = S a' + b takes the drift off.
+    fitted = found.extended.accelerometer
+    sigma = np.array(fitted["sigma_b"])
+    assert np.all(np.abs(np.array(fitted["b"]) - (truth.accelerometer_b - mean)) < 4.0 * sigma)
+    # The mean of the drift is far more certain than where it ends.
+    assert np.all(sigma < 0.1 * np.abs(mean))
+    beside = SimpleNamespace(own_effects=found.effects, recording=found.recording, segments=poses)
+    assert np.allclose(_mean_drift(beside, "accel-bias-drift"), mean, atol=0.2 * np.abs(mean).min())

@@ -163,3 +163,14 @@ def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
     ]
     assert found == [[], [Severity.WARNING]]
+
+
+def test_verify_names_the_one_scale_that_is_wrong_and_does_not_suspect_gravity(session):
+    log, known = session
+    a = known.accelerometer
+    off = replace(known, accelerometer=replace(a, S=np.diag([1.0, 1.05, 1.0]) @ a.S))
+    found = trihedron.verify(off, log, gravity_m_s2=9.81).findings
+    causes = [one.cause for one in found if one.code is FindingCode.RESIDUAL_ABOVE_NOISE]
+    assert len(causes) == 1
+    assert "accelerometer scale Y" in causes[0]
+    assert "gravity" not in causes[0].lower()
