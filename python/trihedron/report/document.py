@@ -45,6 +45,8 @@ CONSEQUENCE = (
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 WITHIN = "Usable where these errors are acceptable: "
 """Verdict with warnings, before the errors."""
+CALIBRATES = "`trihedron calibrate LOG"
+"""Command of an action beside which a first step that calibrates is the same one."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
 THEN_RUN = {
@@ -193,6 +195,8 @@ class Document:
             return action
         if first.code not in CONSEQUENCE:
             return then
+        if CALIBRATES in action and CALIBRATES in then.partition(".")[0]:
+            return action
         return f"{action} Then: {then[:1].lower()}{then[1:]}" if then else action
 
     @property
