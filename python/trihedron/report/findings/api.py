@@ -11,7 +11,8 @@ _CALIBRATE = {
         "{high_m_s2:.3f} m/s², and its error goes into every scale and bias of the accelerometer: up to "
         "{possible_error_percent:.1f} % that no residual shows and no ± contains.",
         "Neither --gravity nor --latitude was given.",
-        "Give --latitude DEG (and --height M), or --gravity M_S2.",
+        "Give --latitude DEG (and --height M), or --gravity M_S2: without it scales may be off by "
+        "{possible_error_percent:.1f} %.",
     ),
     (Code.TURN_ANGLE_UNKNOWN, "", SERIOUS): Words(
         "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
