@@ -53,7 +53,7 @@ def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
     _, clean = linear_fit(up, bent - up**power @ size, sigma)
     shape = bending.shape_of(up, residual, sigma, G, 1.0)
     assert shape is not None
-    assert shape.name == name
+    assert shape.names[0] == name
     assert shape.p < 1e-6
     assert shape.shift_m_s2 == pytest.approx(G * np.abs(found - clean).max(), rel=0.2)
 

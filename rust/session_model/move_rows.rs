@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
 use super::moves::{Carried, MoveCovariance, MoveModel, N_MOVE, PoseBiases, carry};
-use super::response::{Response, Sums, effect_columns, loosened, respond, sums, wrt_lost_time};
+use super::response::{Response, Sums, effect_columns, loosened, respond, sums};
 use super::rows::{Domain, Group, Kind};
 use super::sample_noise::widened;
 use super::{
@@ -166,24 +166,6 @@ impl Session {
                 }
             })
             .collect()
-    }
-
-    /// Whitened derivatives of a move's residuals by time lost at each of its samples.
-    ///
-    /// # Errors
-    /// As [`Weights::of`].
-    pub fn wrt_lost_time(&self, state: &State, index: usize) -> Result<Vec<SVector<f64, N_MOVE>>> {
-        let planes = self.planes(state);
-        let distortion = Distortion::default();
-        let passed = self.pass(state, &distortion, &planes);
-        let white = Weights::of(&passed, &Strengths::NONE)?.white[index];
-        let effects = Effects::at(&distortion, state);
-        let move_model = self.move_model(state, index, planes[index], &effects);
-        let Passed {
-            carried, response, ..
-        } = &passed[index];
-        let by = wrt_lost_time(&self.moves[index], &move_model, carried, response);
-        Ok(by.into_iter().map(|one| white * one).collect())
     }
 
     /// (11.3)-(11.7): five rows of a move.

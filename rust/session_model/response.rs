@@ -1,7 +1,7 @@
 //! Derivatives of the residuals of a move by every sample: one backward pass, and products with it
 //! (docs/model-session.md, equations 11.5-11.7).
 
-use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::N_SCATTER;
 use super::gaps::GAP;
@@ -101,28 +101,6 @@ pub fn respond(
         unresolved,
         lever,
     }
-}
-
-/// Derivatives of the residuals by time lost at each sample, over which both sensors keep their readings; zero where a
-/// sample carries no weight.
-#[must_use]
-pub fn wrt_lost_time(
-    one: &Move,
-    move_model: &MoveModel<'_>,
-    carried: &Carried,
-    response: &Response,
-) -> Vec<SVector<f64, N_MOVE>> {
-    let derivative = |k: usize| {
-        if one.weight[k] == 0.0 {
-            return SVector::zeros();
-        }
-        let mut out = response.by_rate[k] * carried.rate[k] / one.weight[k];
-        let gained = carried.attitude[k].tr_mul(&carried.force[k]);
-        let mut velocity = out.fixed_rows_mut::<3>(2);
-        velocity += gained - move_model.up[0] * move_model.gravity;
-        out
-    };
-    (0..one.n_samples()).map(derivative).collect()
 }
 
 /// `M [v]×`.

@@ -1,10 +1,9 @@
 //! The joint model of a session: derivatives against differences, one end whatever the start.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 use trihedron::session_model::chain::Layout;
 use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
-use trihedron::session_model::moves::Move;
 use trihedron::session_model::strength_search::Within;
 use trihedron::session_model::strengths::tune;
 use trihedron::session_model::{Distortion, Session, State, Strengths};
@@ -181,47 +180,4 @@ fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
     assert!(found.corner_s.iter().all(|corner| *corner >= 50.0 - 1e-9));
     assert!(found.scatter[0] <= 2.0 + 1e-9 && found.scatter[1..].iter().all(|s| *s <= 0.5 + 1e-9));
     assert!(found.excess.iter().all(|excess| *excess <= 1.0 + 1e-9));
-}
-
-/// One move with constant readings, so that an inserted sample is the motion that was lost there.
-fn turned_evenly(session: &mut Session, inserted: Option<usize>, lost_s: f64) {
-    let mut time: Vec<f64> = (0..61).map(|k| 2.0 + 0.02 * f64::from(k)).collect();
-    if let Some(k) = inserted {
-        time.iter_mut().skip(k + 1).for_each(|t| *t += lost_s);
-        time.insert(k + 1, time[k] + lost_s);
-    }
-    let n = time.len();
-    session.moves = std::sync::Arc::new(vec![Move::new(
-        0,
-        &time,
-        vec![Vector3::new(90.0, -40.0, 60.0); n],
-        vec![Vector3::new(4.0, 6.0, -3.0); n],
-        [0.0, 5.0],
-        [Vector3::zeros(); 4],
-        0,
-    )]);
-}
-
-#[test]
-fn the_derivative_by_lost_time_is_that_of_inserted_time() {
-    let (mut session, mut state) = made(false);
-    // A bias that changes along the move would change with its duration.
-    state.pose_rate_bias[1] = state.pose_rate_bias[0];
-    state.pose_force_bias[1] = state.pose_force_bias[0];
-    turned_evenly(&mut session, None, 0.0);
-    let by_time = session.wrt_lost_time(&state, 0).expect("a noisy move");
-    let planes = session.planes(&state);
-    let before = session.pass(&state, &Distortion::default(), &planes);
-    let white = Weights::of(&before, &Strengths::NONE)
-        .expect("a noisy move")
-        .white[0];
-    let lost_s = 1e-5;
-    for k in [5, 20, 41, 55] {
-        turned_evenly(&mut session, Some(k), lost_s);
-        let after = session.pass(&state, &Distortion::default(), &planes);
-        let change = white * (after[0].carried.residual - before[0].carried.residual) / lost_s;
-        let error = (change - by_time[k]).amax();
-        // Second order in a rotation of 1e-5 rad, and rounding of a difference of 1e-5.
-        assert!(error < 1e-4 * by_time[k].amax(), "{change} {}", by_time[k]);
-    }
 }

@@ -32,8 +32,8 @@ def plan_report(plan: ExperimentPlan) -> Document:
             f"gyro noise {plain_number(degrees_from_radians(plan.gyroscope_density), 2)} °/s/√Hz, accelerometer noise "
             f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
-        verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's scale to "
-        f"{_percent(turns.scale)}.",
+        verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's "
+        f"scale to {_percent(turns.scale)}.",
         is_trustworthy=True,
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),

@@ -244,26 +244,6 @@ impl SessionModel {
             .collect();
         flat.to_pyarray(py).reshape([passed.len(), 5])
     }
-
-    /// `(samples, 5)` derivatives of the whitened residuals of one move by time lost at each sample.
-    fn wrt_lost_time<'py>(
-        &self,
-        py: Python<'py>,
-        state: &SessionState,
-        index: usize,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let start = self.checked(state)?;
-        if index >= self.session.moves.len() {
-            return Err(PyValueError::new_err(format!("there is no move {index}")));
-        }
-        let session = Arc::clone(&self.session);
-        let found = super::run(py, || session.wrt_lost_time(&start, index))?;
-        let flat: Vec<f64> = found
-            .iter()
-            .flat_map(|one| one.as_slice().to_vec())
-            .collect();
-        flat.to_pyarray(py).reshape([found.len(), 5])
-    }
 }
 
 impl SessionModel {
