@@ -226,6 +226,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
         mean_m_s2=mean,
         share=abs(mean) / gravity_m_s2,
         worst_pose=worst + 1,
+        is_first=worst == 0,
         worst_m_s2=error[worst],
         severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
         times=beyond.times,

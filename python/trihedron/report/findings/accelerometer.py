@@ -106,8 +106,8 @@ ENTRIES = {
         "({share:.2g %} of gravity)|}; largest in pose {worst_pose} "
         "({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}, χ²/dof "
         "{chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
-        "{is_single:?The sensor moved or was touched in pose {worst_pose}|{is_bias:?Biases have changed since, scales "
-        "and axes have not (warm-up, temperature, shock)|{is_few:?In the file, or in the sensor since, {shifted:ids} "
+        "{is_single:?The sensor {is_first:?was still warming up|moved} or was touched in pose {worst_pose}|"
+        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the file, or in the sensor since, {shifted:ids} "
         "changed: nothing else differs from this log's own calibration|{is_offset:?Gravity or the unit is another "
         "here, or all scales have changed (temperature, supply)|{is_far:?The file is of another sensor, range or unit, "
         "or biases|Biases} and scales have changed since (temperature, shock, supply)}}}}.",
