@@ -71,7 +71,8 @@ def test_a_calibration_that_was_not_written_is_stored_first():
 
 
 def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_them():
-    found = Finding(FindingCode.GYRO_G_SENSITIVITY, Severity.WARNING, "Seen.", "", "Calibrate with --extended.")
+    action = "Calibrate: `trihedron calibrate LOG --extended -o FILE --force`."
+    found = Finding(FindingCode.GYRO_G_SENSITIVITY, Severity.WARNING, "Seen.", "", action)
     sections = (Section("Findings", (FindingList((found,)),)),)
     used = "Use it: `trihedron apply FILE LOG`."
     said = with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step

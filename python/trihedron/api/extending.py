@@ -110,7 +110,7 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
         if base.gyroscope is None or model.gyroscope is None
         else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
-        findings=(*not_explained(base.findings, diagnosis.remaining), finding, *_drifts(diagnosis)),
+        findings=(*_left(base, diagnosis), finding, *_drifts(diagnosis)),
         extensions=MappingProxyType(
             {
                 **base.extensions,
@@ -121,6 +121,13 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
             }
         ),
     )
+
+
+def _left(base: Calibration, diagnosis: Diagnosis) -> Iterator[Finding]:
+    """Findings of the linear calibration that its effects do not answer; the diagnosis has judged g-sensitivity."""
+    for one in not_explained(base.findings, diagnosis.remaining):
+        if one.code is not FindingCode.GYRO_G_SENSITIVITY:
+            yield one
 
 
 def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
-from trihedron.records.recording import distinct_names
+from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Session
 from trihedron.records.words import Words, words
@@ -130,7 +130,7 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
     for result, session in zip(results, sessions, strict=True):
         warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
         for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
-            seen, path = words("quoted", sentence=warned[code]), result.recording.source
+            seen, path = words("quoted", sentence=warned[code]), as_arguments(result.recording.source)
             yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=session.name, seen=seen, path=path)
 
 

@@ -65,8 +65,9 @@ def verify_calibration(
             moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
-    worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, moves.angle_deg))
     changed = _changed(shifted_parameters(parameters))
+    judged = (calibration, without, recording, segments)
+    worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
     beyond_noise = (*of_poses, *_angle_findings(moves, changed))
     return Verification(
@@ -107,6 +108,20 @@ def norm_error(
     return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
 
 
+class _Changed(NamedTuple):
+    """What differs from the calibration of the log itself: whether biases alone, or a few parameters, by name."""
+
+    is_bias: bool
+    is_few: bool
+    shifted: list[str]
+
+
+def _changed(shifted: list[JudgedParameter]) -> _Changed:
+    ids = {one.id for one in shifted}
+    is_bias = "accel-bias" in ids <= {"accel-bias", "gyro-bias"}
+    return _Changed(is_bias, 0 < len(shifted) <= FEW, [f"{one.id}-{one.name}" for one in shifted[:FEW]])
+
+
 def _worse_than_none(
     calibration: Calibration,
     without: Calibration,
@@ -114,6 +129,7 @@ def _worse_than_none(
     segments: Segments,
     gravity_m_s2: float,
     errors: tuple[FloatArray, FloatArray],
+    changed: _Changed,
 ) -> list[Finding]:
     """Findings where readings scaled by their unit alone have smaller errors, whatever uncertainty the file states."""
     error, angle = errors
@@ -126,7 +142,14 @@ def _worse_than_none(
         with_it = replace(calibration, gyroscope=gyroscope)
         pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments).angle_deg)
     return [
-        Finding.of(FindingCode.WORSE_THAN_UNCALIBRATED, f"verify-{case}", rms=rms_of(with_it), rms_without=rms_of(bare))
+        Finding.of(
+            FindingCode.WORSE_THAN_UNCALIBRATED,
+            f"verify-{case}",
+            rms=rms_of(with_it),
+            rms_without=rms_of(bare),
+            is_few=changed.is_few,
+            shifted=changed.shifted,
+        )
         for case, (with_it, bare) in pairs.items()
         if _is_larger(with_it, bare)
     ]
@@ -189,20 +212,6 @@ def _carried(
     noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_calibration2)[told]) / g
     left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
     return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
-
-
-class _Changed(NamedTuple):
-    """What differs from the calibration of the log itself: whether biases alone, or a few parameters, by name."""
-
-    is_bias: bool
-    is_few: bool
-    shifted: list[str]
-
-
-def _changed(shifted: list[JudgedParameter]) -> _Changed:
-    ids = {one.id for one in shifted}
-    is_bias = "accel-bias" in ids <= {"accel-bias", "gyro-bias"}
-    return _Changed(is_bias, 0 < len(shifted) <= FEW, [f"{one.id}-{one.name}" for one in shifted[:FEW]])
 
 
 def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, changed: _Changed) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -274,6 +275,12 @@ class Recording(Presented):
         )
         size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
         return f"<Recording {one_line(self.source)}: {size}, {sensors}>"
+
+
+def as_arguments(source: str) -> str:
+    """A recording as arguments of a command: a log, or the files of accelerometer and gyro."""
+    files = [shlex.quote(part) for part in source.split(" + ")]
+    return f"--accel {files[0]} --gyro {files[1]}" if len(files) == 2 else files[0]
 
 
 def distinct_names(sources: Sequence[str]) -> list[str]:

@@ -54,7 +54,6 @@ THEN_RUN = {
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`.",
-    FindingCode.GYRO_G_SENSITIVITY: "Run `trihedron calibrate LOG --extended -o FILE --force`.",
 }
 """The command of an action in the next step."""
 

@@ -1,13 +1,12 @@
 """Report of several recordings of one unit, diagnosed together."""
 
-import shlex
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from trihedron.records.recording import distinct_names
+from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
 from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_words import (
@@ -105,7 +104,7 @@ def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> st
             "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."
         )
     pairs = zip(found.diagnoses, found.of_single_recordings, strict=True)
-    if alone := [f"`trihedron diagnose {shlex.quote(one.recording_source)}`" for one, ids in pairs if ids]:
+    if alone := [f"`trihedron diagnose {as_arguments(one.recording_source)}`" for one, ids in pairs if ids]:
         return (
             f"What a recording misses alone belongs to its session: {listed(alone)}; or to another unit, as "
             "`trihedron calibrate ...` shows where S differs."

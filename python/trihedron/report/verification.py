@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
-from trihedron.records import Finding, FindingCode, Recording, Segments, Verification
+from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
@@ -92,6 +92,8 @@ def _of_uncertainty(v: Verification) -> str:
 def use_in_words(v: Verification, what: str) -> str:
     """Advice about errors above noise; else to use the calibration, unless it is rejected."""
     above = above_noise(v)
+    if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
+        return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed else ""
     return above[0].action if above else use
 

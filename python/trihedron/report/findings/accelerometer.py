@@ -107,10 +107,11 @@ ENTRIES = {
         "({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}, χ²/dof "
         "{chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
         "{is_single:?The sensor {is_first:?was still warming up|moved} or was touched in pose {worst_pose}|"
-        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the file, or in the sensor since, {shifted:ids} "
-        "changed: nothing else differs from this log's own calibration|{is_offset:?Gravity or the unit is another "
-        "here, or all scales have changed (temperature, supply)|{is_far:?The file is of another sensor, range or unit, "
-        "or biases|Biases} and scales have changed since (temperature, shock, supply)}}}}.",
+        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
+        "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
+        "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|{is_far:?"
+        "The file is of another sensor, range or unit, or biases|Biases} and scales have changed since (temperature, "
+        "shock, supply)}}}}.",
         "{is_single:?Look at pose {worst_pose}; if it was static, calibrate|{is_bias:?Let the sensor warm up, then "
         "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_offset:?Check gravity (--gravity, "
         "--latitude) and unit; if both are right, calibrate|{is_far:?Check that file, sensor and unit belong together; "

@@ -65,14 +65,16 @@ _VERIFIED = {
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
         "{rms_without:.3g mm/s²} without.",
-        "A wrong file, unit, axis or sign, or a calibration of too few poses.",
-        "Do not use it: check that file, unit and device belong together.",
+        "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
+        "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
-        "A wrong file, unit, axis or sign, or a calibration of too few rotations.",
-        "Do not use it: check that file, unit and device belong together.",
+        "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
+        "calibration|A wrong file, unit, axis or sign, or a calibration of too few rotations}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
     ),
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
@@ -116,7 +118,7 @@ _USE = {
     (Code.EFFECT_NOT_APPLIED, "", WARNING): Words(
         "The {effect:ids} of the extended calibration was not compensated: {why}.",
         "It was in the recording that was calibrated; S and b were fitted beside it.",
-        "Record again ({why}), or update the program that applies the calibration.",
+        "Use a log that has what it needs ({why}), or update the program that applies the calibration.",
     ),
     (Code.LIMIT_EXCEEDED, "static", SERIOUS): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "

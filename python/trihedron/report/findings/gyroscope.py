@@ -75,7 +75,8 @@ _MOVES = {
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
         "g-sensitivity of the gyro.",
-        "Calibrate with --extended, which fits the dependence on gravity together with S and b.",
+        "See whether it is that or a bias that differs from pose to pose: `trihedron diagnose LOG`; the first is "
+        "fitted with --extended.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),
