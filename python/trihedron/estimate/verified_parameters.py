@@ -44,6 +44,7 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
     other_sigma = np.sqrt(other_sigma**2 + 2.0 * drift)
     out = []
     for k, parameter in enumerate(PARAMETERS[:n]):
+        apart = float(numbers[k] - other[k])
         vague = not np.isfinite(other[k]) or not np.isfinite(other_sigma[k])
         vague = vague or (sigma[k] > 0.0 and other_sigma[k] > TOO_VAGUE * sigma[k])
         out.append(
@@ -51,7 +52,8 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
                 id=parameter.id,
                 name=parameter.name,
                 unit=parameter.unit,
-                difference=float(numbers[k] - other[k]),
+                # Scales are logarithms: their difference relative to the file.
+                difference=-float(np.expm1(-apart)) if parameter.id.endswith("scale") else apart,
                 sigma_file=float(sigma[k]),
                 sigma_log=float(other_sigma[k]),
                 is_judged=not vague,

@@ -37,14 +37,20 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
     """``gyro bias Z +0.31 ± 0.01 °/s`` for every parameter that differs."""
     said = []
     for members in _groups_that_differ(diagnosis).values():
-        size = [_in_sigmas(p) for p in members]
-        said += [
-            f"{id_in_print(f'{p.id}-{p.name}')} {_difference(p)}"
-            for p, s in zip(members, size, strict=True)
-            if s > NAMED_SIGMAS or s == max(size)
-        ]
+        said += [f"{id_in_print(f'{p.id}-{p.name}')} {_difference(p)}" for p in _clear(members)]
         said += _remarks(members)
     return said
+
+
+def n_differing(diagnosis: Diagnosis) -> int:
+    """Number of parameters that differ."""
+    return sum(len(_clear(members)) for members in _groups_that_differ(diagnosis).values())
+
+
+def _clear(members: list[ParameterDifference]) -> list[ParameterDifference]:
+    """The components of a differing group that are named."""
+    most = max(map(_in_sigmas, members))
+    return [p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, most)]
 
 
 def _groups_that_differ(diagnosis: Diagnosis) -> dict[str, list[ParameterDifference]]:
@@ -101,10 +107,7 @@ def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
     """Groups that differ, the most significant first, each with its largest significant member."""
     said = []
     for name, members in sorted(_groups_that_differ(diagnosis).items(), key=lambda group: group[1][0].p_value):
-        clear = max(map(_in_sigmas, members))
-        largest = max(
-            (p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, clear)), key=lambda p: abs(p.difference)
-        )
+        largest = max(_clear(members), key=lambda p: abs(p.difference))
         scale, unit = in_print(largest)
         size = with_unit(plain_number(abs(scale * largest.difference), 2), unit)
         said.append(f"{id_in_print(name)} by up to {size}")

@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut, not_explained
 from trihedron.records.finding import FindingCode
 from trihedron.report.calibration import errors_in_words
-from trihedron.report.diagnosis_numbers import differing_in_short
+from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level, action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print, variable_in_print
@@ -305,7 +305,7 @@ def value_in_words(value: float, sigma: float) -> str:
 
 def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
     """Number of parameters of the model that differ from the recording's."""
-    n_off = sum(p.significant for p in diagnosis.parameters)
+    n_off = n_differing(diagnosis)
     if not n_off:
         return ()
     return (Headline("parameters that differ", str(n_off), "", f"of {len(diagnosis.parameters)} compared"),)

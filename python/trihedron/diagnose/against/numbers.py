@@ -42,6 +42,8 @@ NO_BIAS = 0.05
 """p-value of three biases against 0 above which they count as zero: true zeros fail in one model of twenty."""
 WOULD_SHOW = 0.1
 """Uncertainty of a model's biases, relative to the rms of the recording's, below which missing biases are noticed."""
+LOGARITHMIC = ("accel-scale", "gyro-scale", "gravity")
+"""Groups that are compared by the logarithms of their members."""
 ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance counts as zero."""
 
@@ -123,12 +125,14 @@ def compare_numbers(
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group
         sigma = np.sqrt(np.maximum(np.diag(named.covariance), 0.0))
         remark = named.remark if is_significant or named.is_relative else ""
-        values = (v.tolist() for v in (named.model, named.recording, named.difference, sigma))
+        # Scales were compared by their logarithms.
+        apart = np.expm1(named.difference) if named.id in LOGARITHMIC else named.difference
+        values = (v.tolist() for v in (named.model, named.recording, apart, sigma))
         out += [
             ParameterDifference(
-                named.id, named.sensor, name, before, after, apart, s, named.unit, p_value, is_significant, remark
+                named.id, named.sensor, name, before, after, change, s, named.unit, p_value, is_significant, remark
             )
-            for name, before, after, apart, s in zip(named.names, *values, strict=True)
+            for name, before, after, change, s in zip(named.names, *values, strict=True)
         ]
     return ComparedNumbers(tuple(out), factors)
 
