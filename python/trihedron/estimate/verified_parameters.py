@@ -9,6 +9,7 @@ from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records.diagnosis import RELATIVE
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import in_frame
@@ -53,7 +54,7 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
                 name=parameter.name,
                 unit=parameter.unit,
                 # Scales are logarithms: their difference relative to the file.
-                difference=-float(np.expm1(-apart)) if parameter.id.endswith("scale") else apart,
+                difference=-float(np.expm1(-apart)) if parameter.id in RELATIVE else apart,
                 sigma_file=float(sigma[k]),
                 sigma_log=float(other_sigma[k]),
                 is_judged=not vague,

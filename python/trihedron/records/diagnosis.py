@@ -17,6 +17,10 @@ Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexpla
 SCHEMA_VERSION = 3
 
 
+RELATIVE = ("accel-scale", "gyro-scale", "gravity")
+"""Groups of parameters whose differences and uncertainties are relative; they are compared by their logarithms."""
+
+
 @dataclass(frozen=True)
 class EffectParameter(Plain):
     """One physical parameter of an effect with its standard error."""

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
+from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
@@ -22,8 +22,6 @@ from trihedron.report.numbers import (
 
 NAMED_SIGMAS = 3.0
 """Components of a differing group are listed from this many σ; the largest always is."""
-SCALES = ("accel-scale", "gyro-scale", "gravity")
-"""Groups whose differences and uncertainties are relative."""
 MOST_NUMBERS, MOST_NOISE = 3, 2
 """Most clauses about parameters and about noise in a headline; a table lists all."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
@@ -217,7 +215,7 @@ def _difference(p: ParameterDifference) -> str:
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
-    sigma = p.std * abs(value) if p.id in SCALES else scale * p.std
+    sigma = p.std * abs(value) if p.id in RELATIVE else scale * p.std
     if not 0.0 < sigma < float("inf"):
         # Exact.
         return with_unit(plain_number(scale * value, 6), unit)
@@ -228,7 +226,7 @@ def _value(p: ParameterDifference, value: float) -> str:
 
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
     """Factor from SI and customary unit for a parameter of this kind."""
-    is_relative = is_difference and p.id in SCALES
+    is_relative = is_difference and p.id in RELATIVE
     return (1.0, "") if p.unit == "1" and not is_relative else shown(p.unit)
 
 

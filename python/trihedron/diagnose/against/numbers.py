@@ -13,7 +13,7 @@ from trihedron.arrays import AXES, TINY, FloatArray
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import chdtri, fdtrc
-from trihedron.records.diagnosis import ParameterDifference
+from trihedron.records.diagnosis import RELATIVE, ParameterDifference
 from trihedron.records.words import words
 from trihedron.session.noise import DRIFT_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2
@@ -42,8 +42,6 @@ NO_BIAS = 0.05
 """p-value of three biases against 0 above which they count as zero: true zeros fail in one model of twenty."""
 WOULD_SHOW = 0.1
 """Uncertainty of a model's biases, relative to the rms of the recording's, below which missing biases are noticed."""
-LOGARITHMIC = ("accel-scale", "gyro-scale", "gravity")
-"""Groups that are compared by the logarithms of their members."""
 ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance counts as zero."""
 
@@ -126,7 +124,7 @@ def compare_numbers(
         sigma = np.sqrt(np.maximum(np.diag(named.covariance), 0.0))
         remark = named.remark if is_significant or named.is_relative else ""
         # Scales were compared by their logarithms.
-        apart = np.expm1(named.difference) if named.id in LOGARITHMIC else named.difference
+        apart = np.expm1(named.difference) if named.id in RELATIVE else named.difference
         values = (v.tolist() for v in (named.model, named.recording, apart, sigma))
         out += [
             ParameterDifference(

@@ -214,7 +214,7 @@ def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, 
     said = Finding.of(
         FindingCode.NONLINEAR_RESIDUAL,
         "poses",
-        is_quadratic=float("quadratic" in shape.names),
+        is_quadratic=float(shape.names[0] == "quadratic"),
         is_cubic=float("cubic" in shape.names),
         is_unlike=float("unlike-scales" in shape.names),
         p=shape.p,

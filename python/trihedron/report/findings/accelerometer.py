@@ -5,9 +5,9 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 _UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated"
 _LOOK = (
     "{is_drift:?{has_temperature:?Calibrate with the logged temperature: `trihedron calibrate LOG --extended -o FILE "
+    "--force`|Let the sensor warm up and record again}|Look at the error of each pose in the whole report}; "
+    "`trihedron diagnose LOG` tests which effects explain the error."
 )
-_LOOK += "--force`|Let the sensor warm up and record again}|Look at the error of each pose in the whole report}; "
-_LOOK += "`trihedron diagnose LOG` tests which effects explain the error."
 _ADD_POSES = "Add poses with {advice:numbered}."
 _FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
 _FACES_OR_POSES += "{advice:numbered}."
