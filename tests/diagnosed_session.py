@@ -7,9 +7,9 @@ from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
 
 
-def simulated(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
-    """Recording and truth of a hand session with an effect of a stated size, or healthy."""
-    scenario = _of(profile_by_name(grade), hand_session(n_poses, layout=seed), "session", seed)
+def simulated(effect_id="", seed=1, n_poses=24, grade="mpu", unit=None, **size):
+    """Recording and truth of a hand session with an effect of a stated size, or healthy; ``unit`` None is ``seed``."""
+    scenario = _of(profile_by_name(grade), hand_session(n_poses, layout=seed), "session", unit or seed)
     return simulate(with_effect(scenario, effect_id, **size) if effect_id else scenario, seed)
 
 

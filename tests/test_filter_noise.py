@@ -148,6 +148,16 @@ def test_an_n_with_a_wide_interval_is_a_warning(found):
     assert FindingCode.FILTER_NOISE_UNCERTAIN in {one.code for one in noticed([wide])}
 
 
+def test_an_n_below_the_noise_of_the_quietest_second_is_a_warning(found):
+    # The least of some 60 estimates with a relative error of 5 % each.
+    assert found.sensors[0].quietest == pytest.approx(N, rel=0.2)
+    codes = [
+        {one.code for one in noticed([replace(found.sensors[0], N=Bounded(n, 0.9 * n, 1.1 * n), static=None)])}
+        for n in (N, N / 2.0)
+    ]
+    assert [FindingCode.FILTER_NOISE_BELOW_QUIETEST in one for one in codes] == [False, True]
+
+
 def both(found):
     """With an accelerometer as a position would give it."""
     b = Bounded(2e-3, 1e-3, 3e-3)

@@ -61,12 +61,12 @@ def test_values_that_agree_do_so_at_the_rate_of_chance():
     assert 0.07 <= np.mean(np.array(p) < 0.1) <= 0.13
 
 
-def sessions(*strengths):
-    """Recordings of one unit whose gyro has these g-sensitivities [(rad/s)/(m/s²)]."""
+def sessions(*strengths, unit=1):
+    """Recordings of one unit, or of several (None), whose gyro has these g-sensitivities [(rad/s)/(m/s²)]."""
     made = []
     for k, g in enumerate(strengths):
         size = {"matrix": [[0.0, g, 0.0], [0.0, 0.0, g], [-g, 0.0, 0.0]]} if g else {}
-        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, **size)[0])
+        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, unit=unit, **size)[0])
     return trihedron.diagnose_sessions(made, gravity_m_s2=9.81)
 
 
@@ -82,8 +82,11 @@ def test_an_effect_too_weak_for_one_recording_is_found_in_three():
 
 def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     found = sessions(0.0, 0.0)
-    assert found.effects == ()
+    assert found.effects == found.findings == ()
     assert "share no missing effect" in " ".join(str(found).split())
+    several = sessions(0.0, 0.0, unit=None)
+    assert {one.code for one in several.findings} == {FindingCode.SEVERAL_DEVICES}
+    assert shared_diagnosis_report(several).what_next.startswith("Diagnose the recordings of one unit")
     # One that is red by itself is named, and makes the whole red.
     serious = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "The poses determine 4 parameters.", "", "Add.")
     first, second = found.calibrations

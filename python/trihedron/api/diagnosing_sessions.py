@@ -7,9 +7,13 @@ from dataclasses import replace
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.sessions import of_several_units
 from trihedron.diagnose import diagnose_recordings
 from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.records.calibration import Calibration
 from trihedron.records.progress import Progress
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.segment import resegment
 
@@ -53,13 +57,16 @@ def diagnose_sessions(
     >>> import trihedron
     >>> together = trihedron.diagnose_sessions(["monday.csv", "friday.csv"], latitude_deg=50.1)  # doctest: +SKIP
     """
-    given = []
+    given: list[tuple[Recording, Segments, Calibration]] = []
+    results = []
     for one in recordings:
         recording = recording_of(one)
         try:
             result = calibrate(recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
         except INPUT_ERRORS as error:
             raise InputError(f"{recording.source}: {error}") from None
+        results.append(result)
         given.append((recording, resegment(recording, result.segments), result.calibration))
     found = diagnose_recordings(given, alpha=alpha, progress=progress)
-    return replace(found, calibrations=tuple(calibration for _, _, calibration in given))
+    calibrations = tuple(calibration for _, _, calibration in given)
+    return replace(found, calibrations=calibrations, findings=of_several_units(results))

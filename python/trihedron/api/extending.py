@@ -14,8 +14,8 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
-from trihedron.records.diagnosis import Diagnosis, StageDomain
-from trihedron.records.domains import Domain, not_explained
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import not_explained
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
@@ -70,21 +70,11 @@ MAY_RISE = 1.25
 """Largest allowed rise of a cross-validated rms: twice the relative uncertainty (13 %) of an rms over 30 poses."""
 DRIFTS = "accel-bias-drift", "gyro-bias-drift"
 """Effects by which a bias changes within the recording."""
-CARRIED: tuple[Domain, ...] = ("static-accel", "moves")
-"""Domains that an extension must predict: gravity error in static poses and tilt error after rotations."""
-
-
-def _raised(diagnosis: Diagnosis) -> list[tuple[StageDomain, StageDomain]]:
-    """Domains that an extension must predict whose cross-validated rms the effects raise: without and with them."""
-    stages = {stage.stage: {d.domain: d for d in stage.domains} for stage in diagnosis.stages}
-    before, after = stages.get("parameters", {}), stages.get("effects", {})
-    pairs = [(before[one], after[one]) for one in CARRIED if one in before and one in after]
-    return [(first, second) for first, second in pairs if second.rms > first.rms]
 
 
 def _spoilt(diagnosis: Diagnosis) -> Finding | None:
     """A finding where the effects raise the cross-validated rms of a domain by more than chance; else None."""
-    for before, after in _raised(diagnosis):
+    for before, after in diagnosis.predicted:
         if after.rms > MAY_RISE * before.rms:
             return Finding.of(
                 FindingCode.EFFECTS_MODELLED,
@@ -178,7 +168,6 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         "fitted-but-disagree" if left else "fitted",
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
-        raised=[(b.domain, (b.rms, b.unit), (a.rms, a.unit)) for b, a in _raised(diagnosis)],
         left=left,
         n_effects=len(diagnosis.effects),
         n_domains_left=len(left),

@@ -262,6 +262,12 @@ def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
             out.append(said)
         if one.static is None:
             out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
+            if one.N.upper < one.quietest:
+                value = one.N.filter_value
+                said = Finding.of(
+                    FindingCode.FILTER_NOISE_BELOW_QUIETEST, sensor=one.sensor, in_file=value, quietest=one.quietest
+                )
+                out.append(said)
         if one.reference is not None and one.reference.follows:
             out.append(Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=one.sensor))
         if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):

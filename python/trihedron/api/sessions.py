@@ -13,8 +13,9 @@ import numpy as np
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.sessions_combined import ALPHA, combine
+from trihedron.api.sessions_combined import ALPHA, amount_of, combine
 from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.estimate.sessions.changes import changes_among
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
@@ -33,6 +34,8 @@ LEFT_BY_S_AND_B = (
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.GYRO_BIAS_DRIFT,
 )
+GEOMETRY = ("accel-misalignment", "gyro-misalignment", "triad-alignment")
+"""Ids of parameters that the package and the board fix."""
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
 resolution of 0.1 to 0.5 °C."""
@@ -152,6 +155,19 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
         if first.extensions.get("onboard") != own.extensions.get("onboard"):
             return words("another-correction")
     return None
+
+
+def of_several_units(results: Sequence[CalibrationResult]) -> tuple[Finding, ...]:
+    """Findings where misalignments differ between recordings: in one unit the axes keep their directions."""
+    alike = [one for k, one in enumerate(results) if _unfit(one, results[:k]) is None]
+    if len(alike) < 2:
+        return ()
+    changes = changes_among([sessions_of(alike, [""] * len(alike))], alpha=ALPHA)
+    return tuple(
+        Finding.of(FindingCode.SEVERAL_DEVICES, parameter=one.id, amount=amount_of(one))
+        for one in changes
+        if one.significant and one.id in GEOMETRY
+    )
 
 
 def _label(recording: Recording, by: By) -> str:

@@ -186,14 +186,15 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
         parameter=change.id,
         device=change.group,
         is_of_device=model.by == "device",
-        amount=_amount(change),
+        amount=amount_of(change),
         where=change.where,
         p_adjusted=change.p_adjusted,
         numbers={f"{name}_size": size for name, size in zip(change.names, change.size, strict=True)},
     )
 
 
-def _amount(change: Change) -> Words:
+def amount_of(change: Change) -> Words:
+    """The largest of a group's changes, in words."""
     k = int(np.argmax(np.abs(change.size)))
     value, std = change.size[k], change.std[k]
     factor, unit = {

@@ -309,6 +309,14 @@ class Diagnosis(Frozen, Plain):
         all_of("stages", self.stages, Stage)
         freeze(self)
 
+    @property
+    def predicted(self) -> tuple[tuple[StageDomain, StageDomain], ...]:
+        """Cross-validated gravity error in poses and tilt error after rotations, without and with the effects."""
+        stages = {stage.stage: {one.domain: one for one in stage.domains} for stage in self.stages}
+        before, after = stages.get("parameters", {}), stages.get("effects", {})
+        of_both = (domain for domain in ("static-accel", "moves") if domain in before and domain in after)
+        return tuple((before[domain], after[domain]) for domain in of_both)
+
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, valid against the published schema."""
         return as_plain(self, Diagnosis)

@@ -92,7 +92,8 @@ class SensorFilterNoise(Plain):
     """One sensor: the filter's ``N`` and ``K``, static values, shares by cause, and consistency tests.
 
     ``N`` includes static noise and vibration; ``axes_N`` is the density of X, Y and Z where they differ. Intervals are
-    valid where ``is_settled``: the posterior has enough effective draws.
+    valid where ``is_settled``: the posterior has enough effective draws. ``quietest`` is the noise density of the log's
+    quietest second, above the band; 0 without a reference.
     """
 
     sensor: Literal["gyroscope", "accelerometer"]
@@ -108,6 +109,7 @@ class SensorFilterNoise(Plain):
     consistency: tuple[Nees, ...] = ()
     is_only_static: bool = False
     is_settled: bool = True
+    quietest: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,7 @@ class FindingCode(str, Enum):
     # noise for a filter
     FILTER_NOISE_STATIC = "filter-noise-static"
     FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
+    FILTER_NOISE_BELOW_QUIETEST = "filter-noise-below-quietest"
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"
     FILTER_NOISE_INCONSISTENT = "filter-noise-inconsistent"
@@ -125,6 +126,7 @@ class FindingCode(str, Enum):
     SHARED_MOTION = "shared-motion"
     # many recordings, temperature
     PARAMETERS_CHANGED = "parameters-changed"
+    SEVERAL_DEVICES = "several-devices"
     FEW_SESSIONS = "few-sessions"
     SESSION_LEFT_OUT = "session-left-out"
     OUTSIDE_VALID_RANGE = "outside-valid-range"

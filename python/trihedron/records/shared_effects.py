@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from trihedron.records.calibration import Calibration
 from trihedron.records.diagnosis import Diagnosis, EffectParameter
+from trihedron.records.finding import Finding
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Printed
@@ -50,6 +51,8 @@ class SharedDiagnosis(Printed):
     candidates: tuple[SharedCandidate, ...]
     calibrations: tuple[Calibration, ...] = ()
     """The calibration of each recording by itself, with which its diagnosis began."""
+    findings: tuple[Finding, ...] = ()
+    """Parameters in which the recordings differ as those of different units do."""
 
     @property
     def of_single_recordings(self) -> tuple[tuple[str, ...], ...]:

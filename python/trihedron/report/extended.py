@@ -22,8 +22,6 @@ from trihedron.report.reference import beside_reference
 
 FIRST = "static-accel"
 """The domain that is always drawn: gravity error in static poses."""
-PREDICTED = ("static-accel", "moves")
-"""Domains whose cross-validated error with the effects is on the first screen."""
 NEXT = (
     "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: "
     "`trihedron apply FILE LOG -o corrected.csv`; of what `trihedron export` writes, few formats hold the effects."
@@ -42,8 +40,8 @@ def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diag
     pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
     effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
     headlines = _headlines(diagnosis)
-    errors = listed([f"{one.what} {with_unit(one.value, one.unit)}" for one in headlines])
-    predicted = f" Errors in this log, {HELD_OUT} with the effects: {errors}." if errors else ""
+    errors = listed([f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in headlines])
+    predicted = f" Errors over all poses and moves, {HELD_OUT} with the effects: {errors}." if errors else ""
     return replace(
         document,
         verdict=document.verdict + predicted,
@@ -66,13 +64,12 @@ def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """Cross-validated errors with the effects."""
+    """Cross-validated errors with the effects, beside those without them."""
     found = []
-    for one in (one for stage in diagnosis.stages if stage.stage == "effects" for one in stage.domains):
-        if one.domain in PREDICTED:
-            factor, unit = shown(one.unit)
-            beside = f"rms, {HELD_OUT}, with the effects"
-            found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
+    for linear, one in diagnosis.predicted:
+        factor, unit = shown(one.unit)
+        beside = f"without them {with_unit(plain_number(factor * linear.rms), unit)}"
+        found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 
 

@@ -1,7 +1,7 @@
 """Names of effects, parameters, domains and axes in print."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from trihedron.report.numbers import listed
 
@@ -21,6 +21,30 @@ MEANING = {
     "noise": "noise and sampling",
 }
 """Domains of residuals in words."""
+FINDINGS = {
+    "accelerometer-nominal": "accelerometer not calibrated",
+    "calibration-shift": "parameters differ",
+    "effect-not-applied": "effect not compensated",
+    "effects-modelled": "residuals that no effect explains",
+    "filter-noise-below-quietest": "N below the noise of the quietest second",
+    "filter-noise-followed": "reference follows the sensor's noise",
+    "filter-noise-inconsistent": "NEES inconsistent",
+    "filter-noise-static": "no reference",
+    "filter-noise-uncalibrated": "errors that a calibration removes",
+    "filter-noise-uncertain": "N uncertain",
+    "filter-noise-unsettled": "search not settled",
+    "gravity-defaulted": "gravity not given",
+    "held-out-worse": "tilt error after rotations above noise",
+    "non-finite": "rows without time",
+    "reference-apart": "reference deviates in a part of the log",
+    "reference-misfit": "parts of the log disagree",
+    "reference-of-itself": "reference in the log's own file",
+    "time-duplicate": "equal timestamps",
+    "time-unit-detected": "time unit uncertain",
+    "turn-not-a-multiple": "turn excluded",
+}
+"""Warnings in words, where the code is no phrase of the field."""
+SENSOR = re.compile(r"\bthe (accelerometer|gyro)", re.IGNORECASE)
 
 
 def axis_in_print(name: str) -> str:
@@ -33,6 +57,16 @@ def id_in_print(name: str) -> str:
     """An effect, a domain or a parameter in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
     ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
     return MEANING.get(name) or axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
+
+
+def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
+    """Warnings of one code by name, with the sensors that their sentences name, or else their number:
+    ``clipping (accelerometer and gyro)``, ``outlier pose (3)``."""
+    name = FINDINGS.get(code) or id_in_print(code)
+    named = {found[1].lower() for one in sentences if (found := SENSOR.search(one))}
+    if named and not SENSOR.search(name):
+        return f"{name} ({listed(sorted(named))})"
+    return name if len(sentences) == 1 else f"{name} ({len(sentences)})"
 
 
 def label_of(group: str, name: str) -> str:

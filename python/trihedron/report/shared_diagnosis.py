@@ -18,6 +18,7 @@ from trihedron.report.diagnosis_words import (
     verdict_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, listed, plain_number, with_sigma
@@ -35,10 +36,11 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     """Lay out shared effects, and effects of single recordings."""
     names = distinct_names([one.recording_source for one in found.diagnoses])
     own = [one.id for one in found.effects if one.is_of_instrument]
+    owner = "design" if found.findings else "instrument"
     verdict = "The recordings share no missing effect."
     if own:
         verb = "is missing from the model and belongs" if len(own) == 1 else "are missing from the model and belong"
-        verdict = f"{ids_in_print(own)} {verb} to the instrument: one size fits all recordings."
+        verdict = f"{ids_in_print(own)} {verb} to the {owner}: one size fits all recordings."
     elif found.effects:
         verdict = f"{ids_in_print(one.id for one in found.effects)} differs from recording to recording."
     tried = tuple((id_in_print(one.id), plain_number(one.score)) for one in found.candidates)
@@ -51,6 +53,8 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         wrong.append(f"MISSING PHYSICS: {'; '.join(missing)}.")
     if not (wrong or found.effects):
         wrong.append("CONSISTENT: no recording misses an effect by itself.")
+    if found.findings:
+        wrong.insert(0, "The recordings look like those of different units: their axes differ in direction.")
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
@@ -59,6 +63,7 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),
+            *((Section("Findings", (findings_block(found.findings),)),) if found.findings else ()),
             Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
         stated_level="bad" if doubted else "usable" if found.effects or alone else "good",
@@ -99,6 +104,8 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
 def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
     if doubted:
         return f"Record {listed(doubted)} again, and diagnose all recordings together then."
+    if found.findings:
+        return found.findings[0].action
     if own:
         return (
             "Store it with the calibration of one recording: `trihedron calibrate LOG --extended -o calibration.json`."
@@ -127,7 +134,7 @@ def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:
 def _agreement(effect: SharedEffect) -> str:
     p = p_in_words(effect.p_agree)
     if effect.is_of_instrument:
-        return f"Its values agree between recordings (p {p}): it belongs to the instrument."
+        return f"Its values agree between recordings (p {p}): one size fits all recordings."
     return f"Its values differ between recordings (p {p}): it belongs to the single recordings, or another effect does."
 
 

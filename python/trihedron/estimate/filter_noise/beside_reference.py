@@ -172,6 +172,7 @@ def _sensor(
             one for h in asked.horizons_s if (one := consistency(learnt.held, taught, static, h)) is not None
         ),
         is_settled=found.is_settled and taught.is_settled,
+        quietest=stretches[0].quietest,
     )  # fmt: skip
 
 

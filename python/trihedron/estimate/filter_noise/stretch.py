@@ -37,7 +37,8 @@ class Stretch:
     where the observation is the angle itself; ``given`` (3 m, 3 m) a known covariance, or None; ``attitude`` (m, 3, 3)
     body to world; ``bias_steps`` (3 m, 3 m) the derivative of the observations with respect to the bias in each block;
     ``power`` (m,) that of vibration, with mean 1; ``ends`` as ``BLOCK_ENDS``; ``kelvin`` (m,) the logged temperature
-    less its mean, ``kelvin_size`` [SI/K] the prior σ of the bias per kelvin, which is the last three columns.
+    less its mean, ``kelvin_size`` [SI/K] the prior σ of the bias per kelvin, which is the last three columns;
+    ``quietest`` [SI/√Hz] the noise density of the log's quietest block, above the band: static noise and vibration.
     """
 
     time_s: FloatArray
@@ -54,6 +55,7 @@ class Stretch:
     kelvin: FloatArray | None = None
     kelvin_size: float = 0.0
     given: AnyFloats | None = None
+    quietest: float = 0.0
 
     @cached_property
     def tilted(self) -> tuple[FloatArray, FloatArray]:

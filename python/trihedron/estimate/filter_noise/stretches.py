@@ -48,6 +48,11 @@ def relative(power: FloatArray, density: float, width_hz: float) -> FloatArray:
     return np.asarray(beyond / beyond.mean()) if beyond.mean() > 0.5 * floor else np.zeros(len(power))
 
 
+def quietest_density(power: FloatArray, width_hz: float) -> float:
+    """Noise density [SI/√Hz] in the quietest block: an upper limit of static noise that is white up to the band."""
+    return float(np.sqrt(np.min(power) / (2.0 * width_hz))) if len(power) else 0.0
+
+
 def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[Stretch]:
     """Stretches of recording 0 between its gaps; ``static_N`` [rad/s/√Hz], 0 where it is not known."""
     side, problem, point = found.sides[0], found.problems[0], found.points[0]
@@ -57,7 +62,9 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
     is_good = np.asarray(blocks.rows()[:, 0] > 0, dtype=bool)
     m = min(len(seen), len(is_good))
     power = band_power(side.corrected(point), side.grid.step_s, band_hz, n)
-    vibration = relative(power[:m], static_N, 0.5 / side.grid.step_s - band_hz)
+    width_hz = 0.5 / side.grid.step_s - band_hz
+    vibration = relative(power[:m], static_N, width_hz)
+    quietest = quietest_density(power[:m], width_hz)
     rows = blocks.rows()[:, 0]
     moments = blocks.moments().reshape(-1, 3, 3, blocks.moments().shape[-1])
     table = {
@@ -66,7 +73,7 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
         "white": rows.max() / np.maximum(rows, 1), "power": np.pad(vibration, (0, len(rows) - m)),
     }  # fmt: skip
     return [
-        _angle_stretch(table, slice(a, b), n * side.grid.step_s, problem.centre)
+        replace(_angle_stretch(table, slice(a, b), n * side.grid.step_s, problem.centre), quietest=quietest)
         for a, b in runs(is_good[:m] & seen[:m])
     ]
 
@@ -126,14 +133,16 @@ def velocity_stretches(
     seen = side.seen[: m * n] & side.reference.covers(inside)
     is_good = np.asarray(np.all(seen.reshape(m, n), axis=1), dtype=bool)
     power = band_power(side.force[: m * n], h_grid, band_hz, n)
-    vibration = relative(power, static_N, 0.5 / h_grid - band_hz)
+    width_hz = 0.5 / h_grid - band_hz
+    vibration = relative(power, static_N, width_hz)
+    quietest = quietest_density(power[is_good], width_hz)
     C = side.reference.attitude(inside) @ point.mounting
     out = []
     for a, b in runs(is_good):
         at = slice(a * n, b * n)
         local = (C[at], side.force[at], side.reference.position(inside[at]))
         out.append(_velocity_stretch(local, time[at], n, vibration[a:b], gravity_m_s2))
-    return [replace(one, given=_of_white_attitude(one, white_rad)) for one in out]
+    return [replace(one, given=_of_white_attitude(one, white_rad), quietest=quietest) for one in out]
 
 
 def _velocity_stretch(

@@ -155,7 +155,6 @@ _MODELLED = "The linear model alone does not reproduce this recording: {statemen
 _TAKES_OFF = (
     "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
 )
-_RAISED = {"raised": " (cross-validated, {v0:ids} grows from {v1:quantity} to {v2:quantity} rms with them)"}
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
@@ -175,17 +174,15 @@ _DIAGNOSE = {
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
-        "S and b were fitted together with {effects:ids}{raised:run}.",
+        "S and b were fitted together with {effects:ids}.",
         _MODELLED,
         _TAKES_OFF,
-        lines=_RAISED,
         numbers=("left", "n_effects", "n_domains_left"),
     ),
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:ids}{raised:run}; unexplained: {left:ids}.",
+        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
         _MODELLED,
         _TAKES_OFF,
-        lines=_RAISED,
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.BIAS_DRIFT, "", WARNING): Words(
@@ -239,6 +236,11 @@ _MANY_RECORDINGS = {
         "Biases and scales of every part follow temperature.",
         "Use --by temperature.",
         numbers=("span_degc",),
+    ),
+    (Code.SEVERAL_DEVICES, "", WARNING): Words(
+        "The {parameter:ids} differs between the recordings: {amount}.",
+        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Diagnose the recordings of one unit together; what recordings of different units share is of the design.",
     ),
     **{
         (Code.PARAMETERS_CHANGED, f"{parameter}-{kind}", WARNING): Words(

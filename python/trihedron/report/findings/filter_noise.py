@@ -13,6 +13,13 @@ ENTRIES = {
         "No static log was given, and the sensor is not static for 20 s in this log.",
         "Give a static log of the unit with --static STATIC.",
     ),
+    (Code.FILTER_NOISE_BELOW_QUIETEST, "", WARNING): Words(
+        "N of the {sensor}, {in_file:.3g}, is less than the noise density in the log's quietest second, "
+        "{quietest:.3g}.",
+        "A reference computed with this unit's own readings (a filter or smoother) repeats part of their noise; or "
+        "that second contains vibration.",
+        "Give a static log of the unit with --static STATIC; until then use {quietest:.3g} in a filter.",
+    ),
     (Code.FILTER_NOISE_NOT_SEPARATED, "", NOTE): Words(
         "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
         "marked 'below' has an upper limit only.",

@@ -1,14 +1,13 @@
 """Findings in reading order, with equal ones merged, and the verdict that follows from them."""
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, Severity
 from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with
 from trihedron.report.findings.wording import opening
-from trihedron.report.names import id_in_print
+from trihedron.report.names import warnings_in_print
 from trihedron.report.numbers import MINUS, capital, how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
@@ -44,13 +43,17 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
     ``good``."""
     serious = serious_ones(findings)
-    warned = Counter(id_in_print(one.code.value) for one in by_weight(findings) if one.severity is Severity.WARNING)
+    warned: dict[str, list[str]] = {}
+    for one in by_weight(findings):
+        if one.severity is Severity.WARNING:
+            warned.setdefault(one.code.value, []).append(opening(one.seen))
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
         return good
-    named = [name if n == 1 else f"{name} ({n})" for name, n in warned.items()]
-    return f"{usable}, with {how_many(warned.total(), 'warning')}: {listed(named)}."
+    named = [warnings_in_print(code, sentences) for code, sentences in warned.items()]
+    total = sum(map(len, warned.values()))
+    return f"{usable}, with {how_many(total, 'warning')}: {listed(named)}."
 
 
 def likely(cause: str) -> str:
