@@ -41,6 +41,12 @@ class Sampling:
     followed: float = 0.0
     sigma_followed: float = float("inf")
 
+    @property
+    def has_own_clock(self) -> bool:
+        """Whether the timestamps were not computed from the row number and show lost samples: late ones and those that
+        scatter are from a clock of their own."""
+        return self.counts_losses and self.kind in (TimestampKind.LATE, TimestampKind.SCATTERED)
+
 
 UNJUDGED = Sampling()
 """Timestamps of unknown kind: a recording made in memory, or without timestamps."""

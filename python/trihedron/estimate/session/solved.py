@@ -207,7 +207,9 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
 
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
     """Undetected lost samples that may explain the tilt errors."""
-    time_s = log.recording.time_s
+    time_s, sampling = log.recording.time_s, log.recording.sampling
+    if sampling.is_even and sampling.has_own_clock:
+        return PossibleLosses()
     if not is_asked_for_losses(time_s, found.measured, found.outliers, found.solution, found.seen):
         return PossibleLosses()
     missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
