@@ -75,6 +75,7 @@ class FindingCode(str, Enum):
     BIAS_SETTLING = "bias-settling"
     POSE_DISTURBED = "pose-disturbed"
     POSE_UNSTEADY = "pose-unsteady"
+    POSES_VIBRATE = "poses-vibrate"
     POSE_AT_RANGE_LIMIT = "pose-at-range-limit"
     SLOW_TURN = "slow-turn"
     FEW_POSES = "few-poses"

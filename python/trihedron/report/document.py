@@ -22,6 +22,7 @@ CONSEQUENCE = (
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
+    FindingCode.POSES_VIBRATE,
     FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,
     FindingCode.CALIBRATION_DOUBTED,

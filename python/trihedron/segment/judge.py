@@ -16,6 +16,8 @@ from trihedron.segment.runs import MIN_POSE_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
 """Probability that any steady pose of a log is called settling though none is."""
+LARGEST_NOISE_G = 0.05
+"""Noise of one sample, in g, above which poses vibrate: at 1 kHz the noisiest MEMS parts (400 µg/√Hz) reach 0.015."""
 POSES_FOR_NINE = 9
 """A norm fit of nine parameters needs nine poses in different directions, and more to test itself."""
 
@@ -130,6 +132,13 @@ def judge_log(
     if len(poses) < POSES_FOR_NINE:
         found.append(Finding.of(FindingCode.FEW_POSES, poses=len(poses), duration_s=duration, needed=POSES_FOR_NINE))
     return found
+
+
+def judge_vibration(sigma: FloatArray, mean: FloatArray) -> list[Finding]:
+    """Vibration in the poses, by the accelerometer's noise of one sample (3,) and the means of the poses (h, 3)."""
+    gravity = float(np.median(np.linalg.norm(mean, axis=1))) if len(mean) else 0.0
+    share = float(sigma.max(initial=0.0)) / gravity if gravity > 0.0 else 0.0
+    return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)] if share > LARGEST_NOISE_G else []
 
 
 def judge_bias(means: PoseMeans) -> list[Finding]:

@@ -16,7 +16,7 @@ from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity, range_ends
-from trihedron.segment.judge import judge_bias, judge_log, judge_runs, without_cut
+from trihedron.segment.judge import judge_bias, judge_log, judge_runs, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
@@ -155,6 +155,8 @@ def _describe(
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
     found += judge_bias(means)
+    if recording.accelerometer is not None:
+        found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
     return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 

@@ -43,6 +43,12 @@ ENTRIES = {
         "Log again: put the case down for several seconds in each pose.",
         numbers=("poses",),
     ),
+    (Code.POSES_VIBRATE, "", SERIOUS): Words(
+        "The sensor vibrates in its poses: the accelerometer's readings scatter by {scatter_g:.2g} g, more than any "
+        "sensor's noise.",
+        "Motors run, as in a flight or a drive.",
+        "Record static poses with the motors off; for noise in motion: `trihedron noise LOG --reference MOTION`.",
+    ),
     (Code.SLOW_TURN, "", NOTE): Words(
         "{turning_s:.1f} s are static to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} "
         "s; taken as moving.",
