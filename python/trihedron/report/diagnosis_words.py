@@ -114,7 +114,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
     serious = own_serious(diagnosis)
     if serious is not None and diagnosis.verdict != "not-testable":
-        return _dependent(diagnosis) or action_in_words(serious)
+        return _dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
         return _dependent(diagnosis) or (keep if diagnosis.parameters else use)
@@ -134,11 +134,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
             if improved
             else f"Take over {said}: {_taken_by(model)}."
         )
-    rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
-    if rivals is not None and rivals.separating_experiment:
-        first, others = id_in_print(rivals.id), ids_in_print(rivals.confounded_with)
-        begun = "Then separate" if steps else "Separate"
-        steps.append(f"{begun} {first} from {others}: {rivals.separating_experiment}.")
+    steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
@@ -148,6 +144,16 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     return f"{store}{beside}.{_by_themselves(diagnosis)}"
+
+
+def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
+    """The experiment that separates the first effect from those confounded with it; empty where there is none."""
+    rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
+    if rivals is None or not rivals.separating_experiment:
+        return []
+    return [
+        f"{begun} {id_in_print(rivals.id)} from {ids_in_print(rivals.confounded_with)}: {rivals.separating_experiment}."
+    ]
 
 
 def _in_the_next_log(diagnosis: Diagnosis) -> str:

@@ -191,6 +191,8 @@ class Document:
         if first is None or not first.action or begins_with(then, first.action):
             return then
         action = action_in_words(first)
+        if action.startswith("If ") and then:
+            return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
         if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:
             return action
         if first.code not in CONSEQUENCE:
