@@ -29,6 +29,8 @@ _WITH_PLACE = ("calibrate", "diagnose", "noise")
 _NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
 """A command with one of several logs by its name: this place is also its own."""
 UNSTORED = "calibration.json"
+UNKNOWN_PLACE = "--latitude DEG"
+"""Option of the next command where gravity was not given."""
 # Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
     *("json", "report", "output", "force", "full", "csv", "plot", "updated", "improved"),
@@ -125,7 +127,11 @@ def _word(value: Any) -> str:
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
     """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
     replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
+    from trihedron.records import FindingCode
+
     said, what_next = document.next_step, document.what_next
+    if any(one.code is FindingCode.GRAVITY_DEFAULTED for one in document.findings):
+        _now().place = UNKNOWN_PLACE
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
@@ -145,6 +151,7 @@ def _filled(command: str) -> str:
     if verb in _WITH_PLACE and _NAMES_A_LOG.search(command) and _now().place:
         return f"{command[:-1]} {_now().place}`"
     same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
+    same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
 

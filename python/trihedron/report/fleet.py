@@ -14,7 +14,7 @@ from trihedron.report.axes import TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
-from trihedron.report.names import axis_in_print, id_in_print, label_of
+from trihedron.report.names import axis_in_print, finding_in_print, id_in_print, label_of
 from trihedron.report.numbers import capital, how_many, listed, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
@@ -131,7 +131,7 @@ def _called(log: FleetLog, summary: FleetSummary) -> str:
 
 
 def _why(log: FleetLog) -> str:
-    why = log.serious[0].replace("-", " ") if log.serious else "not calibrated"
+    why = finding_in_print(log.serious[0]) if log.serious else "not calibrated"
     return f" ({why})"
 
 
@@ -172,7 +172,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     facts = [("calibrated", how_many(status["done"], "log"))]
     if doubtful:
         codes = Counter(code for log in doubtful for code in log.serious).most_common()
-        why = ", ".join(f"{code.replace('-', ' ')} ({count})" for code, count in codes)
+        why = ", ".join(f"{finding_in_print(code)} ({count})" for code, count in codes)
         facts.append(("not to be trusted", f"{how_many(len(doubtful), 'log')}: {why}"))
     if status["rejected"]:
         facts.append(("not calibrated", f"{how_many(status['rejected'], 'log')}: they do not allow a calibration"))
@@ -180,7 +180,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         facts.append(("failed", f"{how_many(status['crashed'], 'log')}: tried again by the next run"))
     if summary.n_before:
         facts.append(("from before", f"{how_many(summary.n_before, 'result')} of an earlier run were kept"))
-    for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict).most_common():
+    for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict and _is_usable(log)).most_common():
         facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
     seconds = [log.seconds for log in summary.logs if log.seconds is not None]
     if seconds:

@@ -59,10 +59,15 @@ def id_in_print(name: str) -> str:
     return MEANING.get(name) or axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
 
 
+def finding_in_print(code: str) -> str:
+    """A finding's code in words."""
+    return FINDINGS.get(code) or id_in_print(code)
+
+
 def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
     """Warnings of one code by name, with the sensors that their sentences name, or else their number:
     ``clipping (accelerometer and gyro)``, ``outlier pose (3)``."""
-    name = FINDINGS.get(code) or id_in_print(code)
+    name = finding_in_print(code)
     named = {found[1].lower() for one in sentences if (found := SENSOR.search(one))}
     if named and not SENSOR.search(name):
         return f"{name} ({listed(sorted(named))})"
