@@ -227,6 +227,17 @@ def test_a_log_that_never_rests_is_a_serious_finding():
     assert FindingCode.NOT_STATIC in codes(segments)
 
 
+@pytest.mark.parametrize(("scatter", "is_said"), [(0.2, False), (1.2, True)])
+def test_a_hovering_flight_is_not_taken_for_poses_in_silence(scatter, is_said):
+    """0.2 m/s² a sample is a very noisy part, 1.2 m/s² the rotors of a flight."""
+    rng = np.random.default_rng(4)
+    force = [0.0, 0.0, 9.81] + scatter * rng.normal(size=(6000, 3))
+    hover = Recording(np.arange(6000) / 200.0, force, 0.03 * rng.normal(size=(6000, 3)), 200.0)
+    segments = segment_recording(hover)
+    assert segments.n_poses > 0
+    assert (FindingCode.POSES_VIBRATE in codes(segments)) == is_said
+
+
 @pytest.mark.parametrize("n", [1, 2, 60])
 def test_a_log_too_short_for_a_hold_is_a_finding_not_an_exception(n):
     rng = np.random.default_rng(n)
