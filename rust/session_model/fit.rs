@@ -27,8 +27,10 @@ const SAME_PLANE: f64 = 1e-2;
 /// Largest number of iterations of such a descent, and of any.
 const ROUGH_ITERATIONS: usize = 12;
 const MOST_ITERATIONS: usize = 50;
-/// Largest number of renewals of the moves' weights; they depend on the state in second order and converge in two.
+/// Largest number of renewals of the moves' weights; they depend on the state in second order and mostly converge in
+/// two. Later ones go half way.
 const RENEWALS: usize = 6;
+const WHOLE_RENEWALS: usize = 2;
 
 /// A fitted session.
 #[derive(Debug)]
@@ -140,6 +142,7 @@ pub(super) fn fit_from(
     let mut state = start;
     let mut iterations = 0;
     let mut spread = 1.0_f64;
+    let mut before: Option<Weights> = None;
     let mut passed = match known {
         Some(known) if session.compares_in(&known, &state) => known,
         _ => session.pass(&state, distortion, &session.planes(&state)),
@@ -151,7 +154,12 @@ pub(super) fn fit_from(
         } else {
             (STEP_TOLERANCE * spread, MOST_ITERATIONS)
         };
-        let weights = Weights::of(&passed, &strengths)?;
+        let weights = match before {
+            Some(before) if renewal > WHOLE_RENEWALS => {
+                Weights::between(&before, &passed, &strengths)?
+            }
+            _ => Weights::of(&passed, &strengths)?,
+        };
         let problem = FixedWeights {
             session,
             distortion,
@@ -191,6 +199,7 @@ pub(super) fn fit_from(
                 iterations,
             });
         }
+        before = Some(weights);
     }
     unreachable!("the loop returns at its last renewal")
 }

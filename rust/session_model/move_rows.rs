@@ -25,6 +25,8 @@ pub struct Weights {
     pub white: Vec<Whitening>,
     /// Plane in which the vertical after each move is compared.
     pub plane: Vec<Matrix3x2<f64>>,
+    /// Covariance of each move.
+    covariance: Vec<MoveCovariance>,
 }
 
 impl Weights {
@@ -33,14 +35,27 @@ impl Weights {
     /// # Errors
     /// When the noise of a move cannot be whitened.
     pub fn of(passed: &[Passed], strengths: &Strengths) -> Result<Self> {
-        let white = passed
+        let covariance = passed.iter().map(|one| one.covariance(strengths));
+        Self::whitening(passed, covariance.collect())
+    }
+
+    /// Weights from integrated moves half way from `before`: the solution under weights that follow it may alternate
+    /// between two points, while half way it converges to the one that gives its own weights.
+    ///
+    /// # Errors
+    /// When the noise of a move cannot be whitened.
+    pub fn between(before: &Self, passed: &[Passed], strengths: &Strengths) -> Result<Self> {
+        let each = passed.iter().zip(&before.covariance);
+        let covariance = each.map(|(one, known)| 0.5 * (one.covariance(strengths) + known));
+        Self::whitening(passed, covariance.collect())
+    }
+
+    fn whitening(passed: &[Passed], covariance: Vec<MoveCovariance>) -> Result<Self> {
+        let white = covariance
             .iter()
             .enumerate()
             .map(|(m, one)| {
-                let half = one
-                    .covariance(strengths)
-                    .cholesky()
-                    .and_then(|half| half.l().try_inverse());
+                let half = one.cholesky().and_then(|half| half.l().try_inverse());
                 half.ok_or_else(|| {
                     Error::not_determined(format!(
                         "move {m} has no noise or turns nothing: its residuals cannot be weighed"
@@ -51,6 +66,7 @@ impl Weights {
         Ok(Self {
             white,
             plane: passed.iter().map(|one| one.plane).collect(),
+            covariance,
         })
     }
 }
