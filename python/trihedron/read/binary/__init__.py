@@ -1,6 +1,6 @@
 """Binary formats, one module each, found automatically.
 
-``starts(first)`` recognises a file by its first 512 bytes. ``read(path, choice, progress)`` makes one table, or the
+A file of the format begins with one of its ``STARTS``. ``read(path, choice, progress)`` makes one table, or the
 accelerometer's and the gyro's; a format that holds several logs reads the chosen one, with ``is_chosen``.
 """
 
@@ -14,5 +14,5 @@ from trihedron.records.progress import Progress
 
 def read_binary(path: Path, first: bytes, choice: Choice, progress: Progress | None) -> tuple[Table, ...] | None:
     """The tables of a file that begins with ``first``; None for a format that no module reads."""
-    module = next((one for one in modules_of(__name__, __path__) if one.starts(first)), None)
+    module = next((one for one in modules_of(__name__, __path__) if first.startswith(one.STARTS)), None)
     return None if module is None else module.read(path, choice, progress)

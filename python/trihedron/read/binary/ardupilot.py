@@ -20,6 +20,7 @@ from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
+STARTS = (b"\xa3\x95",)
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
 """Parameters of the corrections that the board applies to readings (the INS library of ArduPilot)."""
 _TYPES = ["PARM", "IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
@@ -30,11 +31,6 @@ _FIELDS = {
     "GYR": ("GyrX", "GyrY", "GyrZ"),
 }
 _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
-
-
-def starts(first: bytes) -> bool:
-    """Whether a file is a DataFlash log."""
-    return first.startswith(b"\xa3\x95")
 
 
 def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:

@@ -12,10 +12,7 @@ from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
-
-def starts(first: bytes) -> bool:
-    """Whether a file is Parquet."""
-    return first.startswith(b"PAR1")
+STARTS = (b"PAR1",)
 
 
 def read(path: Path, _choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:

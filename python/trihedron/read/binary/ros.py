@@ -15,14 +15,10 @@ from trihedron.read.table import Table
 from trihedron.records.progress import Progress
 
 _SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}
+STARTS = tuple(_SUFFIXES)
 _IMU = "sensor_msgs/msg/Imu"
 _NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))
 _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "received")
-
-
-def starts(first: bytes) -> bool:
-    """Whether a file is a bag of ROS 1, or of ROS 2 in one file."""
-    return first.startswith(tuple(_SUFFIXES))
 
 
 def read(path: Path, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:

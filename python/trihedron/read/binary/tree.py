@@ -25,13 +25,9 @@ from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
 from trihedron.records.progress import Progress
 
+STARTS = (b"\x89HDF", b"MATLAB")
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
 MIN_ROWS = 8
-
-
-def starts(first: bytes) -> bool:
-    """Whether a file is HDF5 or MATLAB's."""
-    return first.startswith((b"\x89HDF", b"MATLAB"))
 
 
 def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:

@@ -26,6 +26,7 @@ from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.records.onboard import Stage
 from trihedron.records.progress import Progress
 
+STARTS = (b"ULog",)
 SUFFIX = "_fifo"
 
 
@@ -56,11 +57,6 @@ _PARAMETERS = re.compile(r"(CAL|TC)_(ACC|GYRO|A|G)(\d|_)|SENS_BOARD_|SENS_EN_THE
 _SENSORS: dict[str, Any] = {_RAW: ("accelerometer", "acc", "m/s^2"), _GYRO: ("gyroscope", "gyr", "rad/s")}
 """Topic → sensor, and word and unit in the names of its columns."""
 _SKIP = {"timestamp", "timestamp_sample"}
-
-
-def starts(first: bytes) -> bool:
-    """Whether a file is a ULog."""
-    return first.startswith(b"ULog")
 
 
 def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
