@@ -91,10 +91,10 @@ def test_every_entry_of_the_catalogue_is_created_somewhere_and_once_in_the_table
 
 
 def test_a_finding_carries_its_numbers_for_machines():
-    found = Finding.of(FindingCode.FEW_POSES, poses=np.int64(1), duration_s=np.float64(12.5), needed=9)
+    found = Finding.of(FindingCode.FEW_POSES, poses=np.int64(1), duration_s=np.float64(12.5), needed=9, least_s=1.0)
     assert found.seen.startswith("1 pose found in 12.5 s")
     assert found.severity is Severity.WARNING
-    assert dict(found.numbers) == {"poses": 1.0, "duration_s": 12.5, "needed": 9.0}
+    assert dict(found.numbers) == {"poses": 1.0, "duration_s": 12.5, "needed": 9.0, "least_s": 1.0}
 
 
 def test_the_documents_list_the_catalogue_as_it_is():

@@ -74,7 +74,7 @@ def test_the_words_are_found_where_they_are():
     assert not retired("The log holds zeros where nothing was read; the timestamp of X; a digital twin; rows of zeros.")
 
 
-CHANNELS = re.compile(r"((tow|gyro|accelerometer|acc)( [xyz])?( \[\w+\])?,?)+")
+CHANNELS = re.compile(r"((tow|time|gyro|accelerometer|accel|acc)( [xyz])?( \[[^\]]+\])?,?)+")
 Said = Iterator[tuple[str, str]]
 """Texts, each with where it stands."""
 

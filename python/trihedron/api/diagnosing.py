@@ -11,6 +11,7 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log, model_of_static_log
 from trihedron.api.reading import AnyRecording, accelerometer_only, recording_of, segments_of
+from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.errors import INPUT_ERRORS, InputError
@@ -35,7 +36,7 @@ def diagnose(
     against: GivenModel | None = None,
     reference: AnyReference | None = None,
     reference_columns: str | None = None,
-    alpha: float = 0.01,
+    alpha: float = FALSE_ALARM,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
     """Where a recording and its model differ, which physical effects are missing, their size and its uncertainty.
@@ -81,8 +82,7 @@ def diagnose(
     """
     if calibration is not None and against is not None:
         raise InputError("two models were given: a calibration or a simulated recording to compare with, not both.")
-    if not 0.0 < alpha < 0.5:
-        raise InputError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+    check_alpha(alpha)
     notify = progress or (lambda _fraction, _text: None)
     # A reference and a simulation are imported where one is given: that takes longer than reading the log.
     place = (gravity_m_s2, latitude_deg, height_m)

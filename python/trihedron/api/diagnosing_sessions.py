@@ -8,6 +8,7 @@ from dataclasses import replace
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions import of_several_units
+from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose import diagnose_recordings
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.records.calibration import Calibration
@@ -24,7 +25,7 @@ def diagnose_sessions(
     gravity_m_s2: float | None = None,
     latitude_deg: float | None = None,
     height_m: float | None = None,
-    alpha: float = 0.01,
+    alpha: float = FALSE_ALARM,
     progress: Progress | None = None,
 ) -> SharedDiagnosis:
     """Effects that several recordings of one unit share, and effects of single recordings.

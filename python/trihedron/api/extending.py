@@ -12,6 +12,7 @@ import numpy as np
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
@@ -21,7 +22,9 @@ from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
 
 
-def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
+def extend(
+    result: CalibrationResult, *, alpha: float = FALSE_ALARM, progress: Progress | None = None
+) -> CalibrationResult:
     """A calibration with the physical effects found in its recording: S, b fitted with them, effects in ``extensions``.
 
     Parameters

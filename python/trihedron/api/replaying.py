@@ -14,6 +14,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.capture.guide import Guide
+from trihedron.defaults import ACCURACY
 from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.records.guiding import Accuracy, Examination, GuideView
@@ -21,8 +22,6 @@ from trihedron.records.results import CalibrationResult, VerificationResult
 
 STEP_S = 0.25
 """Length of a block of a replayed log [s], as in a live session."""
-
-DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 
 OnPose = Callable[[GuideView], Any]
 
@@ -39,7 +38,7 @@ class Replay:
 
 def guide(
     recording: AnyRecording,
-    accuracy: str = DEFAULT_ACCURACY,
+    accuracy: str = ACCURACY,
     *,
     gravity_m_s2: float | None = None,
     latitude_deg: float | None = None,

@@ -12,6 +12,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
+from trihedron.records.segments import LEAST_POSE_S
 
 Examine = Callable[[], Examination]
 
@@ -232,9 +233,6 @@ class Guide:
 
 MOVED_DEG = 8.0
 """Smallest change of direction that is another orientation."""
-
-LEAST_POSE_S = 1.0
-"""Static time after which a pose that was left early is examined: the segmentation decides whether it counts."""
 
 WINDOW_S = 0.25
 LOUDER = 3.0

@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from trihedron.cli.guide import DEFAULT_ACCURACY
 from trihedron.cli.options import GravitySource, LogSource, with_options
+from trihedron.defaults import ACCURACY
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Block, Recorder
 
 SAY_EVERY_S = 1.0
-LOSSES_NOT_TRUSTED = 0.05
-"""Fraction of lost frames above which `read` makes a log's gaps a serious finding."""
 
 
 OPTIONS = {
@@ -58,7 +56,7 @@ def capture(
     guide: bool = False,
     browser: bool = False,
     no_open: bool = False,
-    accuracy: str = DEFAULT_ACCURACY,
+    accuracy: str = ACCURACY,
     calibration: Path | None = None,
     bell: bool = False,
     list_them: bool = False,
@@ -142,6 +140,8 @@ def full_disk_is_status_2() -> Iterator[None]:
 
 def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = False) -> None:
     """Report what was saved and the clock of its timestamps; status 2 where it is not to be trusted."""
+    from trihedron.read.audit.timing import SERIOUS_LOSS
+
     count = recorder.count
     typer.echo(f"{output}: {n} frames; {count.sentence().replace(' / ', ', ')}")
     if recorder.clock is not None:
@@ -149,7 +149,7 @@ def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = 
     if recorder.ended_because and not is_ended_well:
         _say(f"trihedron: {recorder.ended_because}; what came before is saved in {output}.")
         raise typer.Exit(2)
-    if count.lost > LOSSES_NOT_TRUSTED * (n + count.lost):
+    if count.lost > SERIOUS_LOSS * (n + count.lost):
         _say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
         raise typer.Exit(2)
 

@@ -10,6 +10,7 @@ import typer
 from trihedron.cli.options import GravitySource, LogsSource, progress, with_options
 from trihedron.cli.output import FullResults, leave, say
 from trihedron.cli.run import name_log
+from trihedron.defaults import FALSE_ALARM, check_alpha
 
 if TYPE_CHECKING:
     from trihedron.records.results import DiagnosisResult
@@ -39,7 +40,7 @@ def diagnose(
     reference_columns: str | None = None,
     improved: Path | None = None,
     updated: Path | None = None,
-    alpha: float = 0.01,
+    alpha: float = FALSE_ALARM,
     results: FullResults,
 ) -> None:
     """Where a log and its model differ, which effects are missing, and what adding them gains.
@@ -48,8 +49,7 @@ def diagnose(
     """
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
-    if not 0.0 < alpha < 0.5:
-        raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
+    check_alpha(alpha)
     if updated is not None and calibration is None:
         raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
     if improved is not None and (against is None or against.suffix.lower() != ".toml"):

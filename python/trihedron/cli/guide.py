@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, with_options
+from trihedron.defaults import ACCURACY
 
 if TYPE_CHECKING:
     from trihedron.capture.recorder import Recorder
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 MOST_COLUMNS = 120
 """Largest width of the screen, in columns."""
 
-DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
 
 
@@ -38,7 +38,7 @@ OPTIONS = {
 def guide(
     source: LogSource,
     place: GravitySource,
-    accuracy: str = DEFAULT_ACCURACY,
+    accuracy: str = ACCURACY,
     every: bool = False,
     output: Path | None = None,
     force: bool = False,

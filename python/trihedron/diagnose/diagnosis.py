@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.special import ndtr
 
+from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
 from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import with_shapes
@@ -45,7 +46,7 @@ def diagnose_recording(
     calibration: Calibration,
     *,
     calibration_is_given: bool = False,
-    alpha: float = 0.01,
+    alpha: float = FALSE_ALARM,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Fit the sensor model to a recording and report the physical effects that it lacks (docs/diagnosis.md).
@@ -90,9 +91,7 @@ def _diagnosed(
     notify: Progress,
 ) -> tuple[Diagnosis, Hypothesis]:
     """As :func:`diagnose_recording`, and the final hypothesis of the search."""
-    # A test with a false-alarm rate of one half or more carries no information.
-    if not 0.0 < alpha < 0.5:
-        raise InputError(f"alpha is a small probability such as 0.01, got {alpha}")
+    check_alpha(alpha)
     obs = observe(recording, segments, calibration.averaging)
     begin = calibration
     prior = prior_of(obs, calibration) if calibration_is_given else None

@@ -1,10 +1,10 @@
 """Any supported file as tables of numbers; the format is recognised by the first bytes, never by the name."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from trihedron.read.archive import read_npy
+from trihedron.read.binary import read_binary, ros
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, check_readable, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
@@ -71,9 +71,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     Raises ``ReadError`` when the file cannot be read or is not a log, or contains several devices and none is chosen.
     """
     if path.is_dir() and (path / "metadata.yaml").is_file():
-        from trihedron.read.ros import read_bag
-
-        return tuple(replace(table, is_chosen=True) for table in read_bag(path, "", choice, progress))
+        return ros.read(path, choice, progress)
     if path.is_dir() and (oxts := oxts_folder(path)) is not None:
         return (read_kitti(oxts),)
     size = check_readable(path)
@@ -82,47 +80,13 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
         return read_zip(path, choice, progress)
-    # The library for tables is large, and arrays do not need it.
-    if magic.startswith(b"PAR1"):
-        from trihedron.read.parquet import read_parquet
-
-        return (read_parquet(path),)
-    known = _ecosystem(path, magic, choice, progress)
+    known = read_binary(path, magic, choice, progress)
     if known is not None:
-        return tuple(replace(table, is_chosen=True) for table in known)
+        return known
     reject_foreign(path, magic)
+    # The library for tables is large, and arrays do not need it.
     from trihedron.read.text.blocks import TextFile, compression_of
     from trihedron.read.text.open import read_text
 
     tables = read_text(TextFile(path, size, compression_of(magic), progress))
     return by_sensor(tables[0]) if len(tables) == 1 else tables
-
-
-def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | None) -> tuple[Table, ...] | None:
-    """Tables of formats that other libraries read, each imported only for such a file; None for other formats."""
-    suffix = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}.get(
-        magic[: 5 if magic[:1] == b"\x89" else 7]
-    )
-    if suffix is not None:
-        from trihedron.read.ros import read_bag
-
-        return read_bag(path, suffix, choice, progress)
-    if magic.startswith(b"ULog"):
-        from trihedron.read.ulog import read_ulog
-
-        return read_ulog(path, choice)
-    if magic.startswith(b"\xa3\x95"):
-        from trihedron.read.ardupilot import read_dataflash
-
-        return read_dataflash(path, choice)
-    # Bytes 125 and 126 of a MATLAB file state whether HDF5 follows, whatever text precedes them.
-    is_hdf5_inside = magic.startswith(b"MATLAB") and magic[124:126] in (b"\x00\x02", b"\x02\x00")
-    if magic.startswith(b"\x89HDF") or is_hdf5_inside or magic.startswith(b"MATLAB 7.3"):
-        from trihedron.read.tree import read_hdf5
-
-        return read_hdf5(path, choice)
-    if magic.startswith(b"MATLAB"):
-        from trihedron.read.tree import read_matlab
-
-        return read_matlab(path, choice)
-    return None

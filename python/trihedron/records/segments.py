@@ -13,6 +13,9 @@ from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 
+LEAST_POSE_S = 1.0
+"""A hand that hesitates stops for a few tenths of a second; an intended pose lasts a second or more."""
+
 
 @dataclass(frozen=True)
 class Pose:

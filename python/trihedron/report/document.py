@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
@@ -47,8 +48,8 @@ CONSEQUENCE = (
 """Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
 WITHIN = "Usable where these errors are acceptable: "
 """Verdict with warnings, before the errors."""
-CALIBRATES = "`trihedron calibrate LOG"
-"""Command of an action beside which a first step that calibrates is the same one."""
+_COMMAND = re.compile(r"`trihedron (\w+) LOG")
+"""A command on the same log; where an action and the first step have the same one, they are one step."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
 THEN_RUN = {
@@ -198,7 +199,8 @@ class Document:
             return action
         if first.code not in CONSEQUENCE:
             return then
-        if CALIBRATES in action and CALIBRATES in then.partition(".")[0]:
+        own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
+        if own is not None and first_step is not None and own[1] == first_step[1]:
             return action
         return f"{action} Then: {then[:1].lower()}{then[1:]}" if then else action
 

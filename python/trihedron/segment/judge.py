@@ -8,11 +8,12 @@ from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
+from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import Channels
 from trihedron.segment.floor import RangeEnd, is_cut
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
-from trihedron.segment.runs import MIN_POSE_S, Run, means_of
+from trihedron.segment.runs import Run, means_of
 
 CREEP_CHANCE = 1e-3
 """Probability that any steady pose of a log is called settling though none is."""
@@ -118,10 +119,10 @@ def judge_log(
     found: list[Finding] = []
     duration = recording.duration_s
     if not runs:
-        found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0))
+        found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0, least_s=LEAST_POSE_S))
         return found
     # Shorter ranges are the ends of moves.
-    turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(MIN_POSE_S)]
+    turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(LEAST_POSE_S)]
     if turns:
         total = sum(b - a for a, b in turns) * channels.step_s
         found.append(
@@ -129,8 +130,10 @@ def judge_log(
         )
     if poses[0].start / recording.rate_hz > 1.0 and recording.n_samples:
         found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_pose_s=_start_s(recording, poses[0])))
-    if len(poses) < POSES_FOR_NINE:
-        found.append(Finding.of(FindingCode.FEW_POSES, poses=len(poses), duration_s=duration, needed=POSES_FOR_NINE))
+    if (n := len(poses)) < POSES_FOR_NINE:
+        found.append(
+            Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=LEAST_POSE_S)
+        )
     return found
 
 

@@ -14,13 +14,13 @@ from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, Move, Pose, Recording, Segments
 from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
+from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity, range_ends
 from trihedron.segment.judge import judge_bias, judge_log, judge_runs, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
-    MIN_POSE_S,
     SWAY_RAD,
     EdgeNoise,
     Run,
@@ -100,7 +100,7 @@ def segment_blocks(
     if gravity is not None:
         drifting = drifting_blocks(channels, quiet, ranges_of(quiet), centre, activity.white_variance)
         quiet = cut_slow_motion(
-            channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_POSE_S)
+            channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(LEAST_POSE_S)
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
@@ -122,7 +122,7 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     noise = pool_mean_noise(channels, core, is_robust=True)
     edges = EdgeNoise.of(channels, noise)
     joined = join_quiet(channels, quiet, loose, noise)
-    steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, MIN_POSE_S)]
+    steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, LEAST_POSE_S)]
     steady = without_approaches(channels, steady)
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     other = set_down(channels, joined, loose, [*steady, *unsteady])

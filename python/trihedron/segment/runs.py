@@ -11,12 +11,11 @@ from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.quantiles import medians, quantile, quantiles
 from trihedron.ranges import Range, grown, ranges_of
+from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise
 
-MIN_POSE_S = 1.0
-"""A hand that hesitates stops for a few tenths of a second; an intended pose lasts a second or more."""
 SEEN_S = 0.8
 """Part of the shortest pose that is seen at the noise floor: its ends share their blocks with the moves."""
 SET_DOWN_S = 0.5
@@ -219,7 +218,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
     bias = (
         medians(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()])) if (steady) else None
     )
-    shortest, bump = channels.blocks(MIN_POSE_S), channels.blocks(BUMP_S)
+    shortest, bump = channels.blocks(LEAST_POSE_S), channels.blocks(BUMP_S)
     found: list[Run] = []
     for first, last in ranges_of(free):
         run = Run(first, last, (), True)

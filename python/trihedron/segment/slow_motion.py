@@ -10,9 +10,10 @@ from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.quantiles import medians
 from trihedron.ranges import Range, ranges_of
+from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.means import left_by_rounding
-from trihedron.segment.runs import CREEP_PART, MIN_POSE_S, SAME_POSE, SWAY_RAD, speed_of_moves
+from trihedron.segment.runs import CREEP_PART, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TILT_SIGMAS = 6.0
 """Standard errors of gravity by which a rotation that the gyro reads must differ from none to be a bias."""
@@ -42,7 +43,7 @@ def turning_blocks(
         # Inside the quiet range only: the move next to it is excluded.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
     bias, scatter = _densest(second[quiet])
-    long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_POSE_S)])
+    long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(LEAST_POSE_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * medians(nearest))

@@ -1,6 +1,10 @@
-"""Drift of a bias while a part warms up: its usual size, and the time constants tried."""
+"""Drift of a bias while a part warms up and with a logged temperature: usual sizes, time constants tried."""
 
 TYPICAL = (0.05, 4e-3)
 """Bias change of typical parts while they warm up, one sigma, accelerometer [m/s²] and gyro [rad/s]."""
+PER_KELVIN = (5e-3, 4e-4)
+"""Bias change of typical parts per kelvin, one sigma, likewise: half a mg and 0.02 °/s."""
+LEAST_SWING_K = 0.2
+"""A logged temperature that changes by less is not used: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
 """Time constants tried, as fractions of the recording: faster ones concern one or two poses, slower are a line."""

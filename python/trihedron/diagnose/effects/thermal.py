@@ -5,9 +5,10 @@ from typing import ClassVar
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import LEAST_SWING_K, Context
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.records.words import why_not
+from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN
 
 LEAST_RATE_RANGE = 0.3
 """Range of the rate of temperature over its largest value, below which it is confounded with a constant."""
@@ -59,15 +60,12 @@ class GyroThermalScale(ThermalScale):
 class ThermalBias(Thermal):
     """Bias linear or quadratic in temperature; with its rate of change, or with another branch while it cools."""
 
-    per_kelvin: ClassVar[float]
-    """Typical bias change per kelvin, one sigma, SI."""
-
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         """Quadratic, rate and hysteresis terms change the bias by a third of what the linear term does."""
         assert context.temperature is not None
-        swing = float(np.ptp(context.temperature))
-        beside = self.per_kelvin * swing / 3.0
-        by_name = {"bias_per_kelvin": self.per_kelvin, "bias_per_kelvin2": beside / swing**2, "half_gap": beside}
+        swing, per_kelvin = float(np.ptp(context.temperature)), PER_KELVIN[self.sensor]
+        beside = per_kelvin * swing / 3.0
+        by_name = {"bias_per_kelvin": per_kelvin, "bias_per_kelvin2": beside / swing**2, "half_gap": beside}
         if context.temperature_rate is not None:
             by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
         return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
@@ -95,18 +93,16 @@ def _varies(speed: FloatArray) -> bool:
 
 
 class AccelThermalBias(ThermalBias):
-    """Accelerometer bias: half a mg per kelvin."""
+    """Accelerometer bias."""
 
     id, sensor = "accel-thermal-bias", ACCELEROMETER
     confounded_with = ("accel-bias",)
     drifts_as = "accel-bias-drift"
-    per_kelvin = 0.005
 
 
 class GyroThermalBias(ThermalBias):
-    """Gyro bias: 0.02 °/s per kelvin."""
+    """Gyro bias."""
 
     id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
     drifts_as = "gyro-bias-drift"
-    per_kelvin = 4e-4

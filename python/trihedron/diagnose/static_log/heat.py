@@ -14,6 +14,7 @@ from trihedron.diagnose.effects.thermal import BRANCH_K_S
 from trihedron.diagnose.sample_evidence import VISIBLE
 from trihedron.diagnose.static_log.pieces import StaticPieces
 from trihedron.diagnose.static_log.process import DRIFT, SCATTER, STRENGTHS, WALK, BiasProcess, BiasReadings, maximum
+from trihedron.session.drift import LEAST_SWING_K
 
 SLOW = 0.01
 """p-value below which biases change slowly: false in 1 % of logs whose biases only scatter."""
@@ -88,8 +89,6 @@ def slow_change(readings: BiasReadings) -> SlowChange:
     )
 
 
-LEAST_SWING_K = 0.5
-"""A logged temperature that changes by less is not used."""
 MIN_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence, as among poses."""
 FOLDS = TEMPERATURE_BINS = 12

@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.filter_noise.left_over import PER_KELVIN, Left, beside_temperature, left_over, of_temperature
+from trihedron.estimate.filter_noise.left_over import Left, beside_temperature, left_over, of_temperature
 from trihedron.estimate.filter_noise.strengths import (
     PREFERRED,
     Fitted,
@@ -35,6 +35,7 @@ from trihedron.records.filter_noise import (
     StaticNoise,
 )
 from trihedron.records.reference import ReferenceMotion
+from trihedron.session.drift import PER_KELVIN
 
 ANGLE = Prior(
     np.append(np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0]), 0.0),
@@ -75,7 +76,7 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
     side = laid_beside(recording, motion, asked.gravity_m_s2)
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
-    stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN["gyroscope"])
+    stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN[1])
     _reject_short(stretches, motion)
     left = left_over(found, asked.horizons_s)
     of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
@@ -85,7 +86,7 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
         assert out[0].reference is not None
         white = out[0].reference.white.value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2, white)
-        more = beside_temperature(more, recording, PER_KELVIN["accelerometer"])
+        more = beside_temperature(more, recording, PER_KELVIN[0])
         of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
         out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
     return tuple(out)

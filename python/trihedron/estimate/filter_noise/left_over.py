@@ -11,6 +11,7 @@ from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.records import Recording
 from trihedron.records.filter_noise import Cause
+from trihedron.session.drift import LEAST_SWING_K
 
 Left = dict[float, dict[Cause, FloatArray]]
 """Mean squares (k,) [rad²] by horizon and cause."""
@@ -103,16 +104,12 @@ def left_of(S: FloatArray) -> FloatArray:
 # Bias proportional to a logged temperature: columns of a stretch, and its share of the error.
 
 
-PER_KELVIN = {"gyroscope": 4e-4, "accelerometer": 5e-3}
-"""Temperature coefficient of the bias [SI/K], 1 σ over parts, as in the session's temperature effects."""
 WIDE = 3.0
-"""Prior σ of the columns in units of ``PER_KELVIN``: a part may be worse than most."""
+"""Prior σ of the columns in units of the typical bias change per kelvin: a part may be worse than most."""
 KELVIN_SIZES = np.geomspace(1e-3, 2.0, 33)
 """Sizes of the temperature coefficient that are tried, in units of the prior σ."""
 GROUPS = 40
 """Groups of draws with similar K: the coefficients of a group use the strengths of its median draw."""
-LEAST_SWING_K = 0.3
-"""Least temperature range [K] that is used: a sensor's own thermometer has noise of some 0.01 K."""
 
 
 def beside_temperature(stretches: Sequence[Stretch], recording: Recording, per_kelvin: float) -> list[Stretch]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
+from trihedron.estimate.accelerometer.poses import ENTRIES
 from trihedron.estimate.kalman.per_axis import (
     check_innovations,
     consistency_findings,
@@ -39,9 +40,6 @@ def start_from_range(readings: npt.ArrayLike, gravity_m_s2: float) -> tuple[Floa
 
 
 NormFrame = Literal["lower", "symmetric"]
-
-ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
-"""Row and column in S of the filter's first six parameters."""
 
 MOST_RUNS = 50
 N_PARAMETERS = 9

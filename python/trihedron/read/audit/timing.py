@@ -97,6 +97,7 @@ GAP_STEPS = 1.5
 JITTER_STEPS = 0.03
 """Jitter, in steps, below which it is the clock's rounding and not reported."""
 SERIOUS_LOSS = 0.05
+"""Fraction of lost samples above which gaps make a log not to be trusted."""
 MUCH_JITTER = 0.2
 """Jitter, in steps, above which it is a warning: it affects a short rotation as much as a reading's noise does."""
 

@@ -38,7 +38,7 @@ ENTRIES = {
         "Set a wider range; the remaining poses are used.",
     ),
     (Code.NOT_STATIC, "", SERIOUS): Words(
-        "No pose of a second or more in {duration_s:.1f} s of log.",
+        "No pose of {least_s:.2g} s or more in {duration_s:.1f} s of log.",
         "The sensor was moving, or held in the hand, all the time; or the log is too short.",
         "Log again: put the case down for several seconds in each pose.",
         numbers=("poses",),
@@ -63,7 +63,7 @@ ENTRIES = {
     (Code.FEW_POSES, "", WARNING): Words(
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
-        "The log has few poses, or they were held for less than a second.",
+        "The log has few poses, or they were held for less than {least_s:.2g} s.",
         "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each; `trihedron segment LOG` shows what "
         "was found.",
         or_severity=SERIOUS,

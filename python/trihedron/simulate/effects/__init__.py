@@ -1,62 +1,24 @@
 """Effects of the diagnosis catalogue, simulated by their mechanism at a stated size, and read back as truth.
 
-``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. No formula is shared with an estimator.
+``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. No formula is shared with an estimator. Modules
+of this folder that have ``EFFECTS`` are found automatically; ``noted(scenario)`` of each yields those in a scenario.
 """
 
 import inspect
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any, Literal
+from types import MappingProxyType
+from typing import Any
 
 from trihedron.errors import InputError
+from trihedron.folders import modules_of
 from trihedron.sanitise import meant
-from trihedron.simulate.effects import experiment, found, sensor
-from trihedron.simulate.effects.found import Found, Size
-from trihedron.simulate.effects.sizes import Change
-from trihedron.simulate.effects.truth import effects_of
+from trihedron.simulate.effects.sizes import LENGTH, Effects, NotSimulatedError, Size, nothing
 from trihedron.simulate.scenario import Scenario
 
 __all__ = ["EFFECT_IDS", "diagnosed_sizes", "effects_of", "with_effect"]
 
-A: Literal["accelerometer"]
-G: Literal["gyroscope"]
-A, G = "accelerometer", "gyroscope"
-EFFECTS: dict[str, tuple[Change, Found]] = {
-    "accel-quadratic": (sensor.accel_quadratic, found.axes(k2="K2")),
-    "accel-cubic": (sensor.accel_cubic, found.axes(k3="K3")),
-    "accel-scale-asymmetry": (sensor.accel_asymmetry, found.axes(asymmetry="half_difference")),
-    "accel-hysteresis": (sensor.accel_hysteresis, found.hysteresis),
-    "accel-thermal-bias": (partial(sensor.thermal, A, "bias"), found.thermal_bias),
-    "accel-thermal-scale": (partial(sensor.thermal, A, "scale"), found.thermal_scale),
-    "gyro-thermal-bias": (partial(sensor.thermal, G, "bias"), found.thermal_bias),
-    "gyro-thermal-scale": (partial(sensor.thermal, G, "scale"), found.thermal_scale),
-    "accel-bias-drift": (partial(sensor.drift, A), found.drift),
-    "gyro-bias-drift": (partial(sensor.drift, G), found.drift),
-    "accel-bias-repeatability": (partial(sensor.bias_repeatability, A), found.one_sigma),
-    "gyro-bias-repeatability": (partial(sensor.bias_repeatability, G), found.axes(sigma="sigma")),
-    "gyro-g-sensitivity": (sensor.g_sensitivity, found.g_sensitivity),
-    "gyro-scale-nonlinearity": (sensor.gyro_nonlinearity, found.axes(c2="quadratic", c3="cubic")),
-    "gyro-saturation": (partial(sensor.saturation, G), found.limit),
-    "accel-saturation": (partial(sensor.saturation, A), found.limit),
-    "lever-arm": (sensor.lever_arm, found.axes(arm_m="r")),
-    "accel-size-effect": (sensor.size_effect, found.places),
-    # The gyro sampling later under the same timestamp is equivalent to the accelerometer being delayed.
-    "accel-gyro-time-offset": (experiment.time_offset, found.number("offset_s", "accelerometer_delay")),
-    "sensor-lag": (sensor.lag, found.lag),
-    "dropped-samples": (experiment.dropped, found.losses),
-    "timing-jitter": (experiment.jitter, found.number("jitter_s", "jitter")),
-    "earth-rate": (experiment.earth_rate, found.earth_rate),
-    "vibration-rectification": (experiment.rectification, found.rectification),
-    "periodic-interference": (sensor.interference, found.interference),
-    "quantisation": (sensor.quantisation, found.nothing),
-    "supply-sensitivity": (sensor.supply, found.nothing),
-    "disturbed-pose": (experiment.disturbed, found.nothing),
-    "turn-angle-error": (experiment.turn_errors, found.nothing),
-    "table-tilt": (experiment.table_tilt, found.nothing),
-    "axis-handedness": (sensor.handedness, found.nothing),
-}
-"""How each effect of the catalogue is added to a scenario, and its size from the parameters of a diagnosis."""
-
+GROUPS = [module for module in modules_of(__name__, __path__) if hasattr(module, "EFFECTS")]
+EFFECTS: Effects = {name: both for group in GROUPS for name, both in group.EFFECTS.items()}
 EFFECT_IDS: tuple[str, ...] = tuple(EFFECTS)
 """Ids of the diagnosis catalogue that can be simulated: all of them."""
 
@@ -83,6 +45,15 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
         raise InputError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None
 
 
+def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str, object]]:
+    """Every effect of the catalogue that a scenario contains, with its physical parameters."""
+    found: dict[str, dict[str, object]] = {}
+    for group in GROUPS:
+        for effect_id, parameters in group.noted(scenario):
+            found.setdefault(effect_id, {}).update(parameters)
+    return MappingProxyType({name: MappingProxyType(values) for name, values in found.items()})
+
+
 def diagnosed_sizes(
     effects: Sequence[Mapping[str, Any]], length_s: float | None = None
 ) -> tuple[list[tuple[str, Size]], dict[str, str]]:
@@ -96,12 +67,12 @@ def diagnosed_sizes(
         effect_id = str(effect["id"])
         values = {str(p["name"]): float(p["value"]) for p in effect["parameters"] if p["value"] is not None}
         if length_s is not None:
-            values[found.LENGTH] = length_s
+            values[LENGTH] = length_s
         variant = str(effect.get("model", {}).get("variant", ""))
-        _, of_diagnosis = EFFECTS.get(effect_id, (None, found.nothing))
+        _, of_diagnosis = EFFECTS.get(effect_id, (None, nothing))
         try:
             size = of_diagnosis(values, variant)
-        except found.NotSimulatedError as why:
+        except NotSimulatedError as why:
             left_out[effect_id] = str(why)
         else:
             out += [(effect_id, one) for one in (size if isinstance(size, list) else [size])]

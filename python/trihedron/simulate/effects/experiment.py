@@ -5,7 +5,19 @@ from dataclasses import replace
 from typing import TypeVar
 
 from trihedron.errors import InputError
-from trihedron.simulate.effects.sizes import Sensor, checked
+from trihedron.simulate.effects.sizes import (
+    SENSORS,
+    Effects,
+    Noted,
+    NotSimulatedError,
+    Parameters,
+    Sensor,
+    Size,
+    along,
+    checked,
+    nothing,
+    number,
+)
 from trihedron.simulate.motion.steps import Disturb, Motion, Pose, Step, Turn, Vibrate
 from trihedron.simulate.readout import Values, triple
 from trihedron.simulate.scenario import Loss, Scenario
@@ -93,3 +105,63 @@ def _each(motion: Motion, kind: type[Kind], change: Callable[[int, Kind], list[S
 def table_tilt(scenario: Scenario, tilt_deg: Sequence[float]) -> Scenario:
     motion: Motion = replace(scenario.motion, table_tilt_deg=(float(tilt_deg[0]), float(tilt_deg[1])))
     return replace(scenario, motion=motion)
+
+
+def diagnosed_losses(values: Parameters, _variant: str) -> Size:
+    losses = [
+        (float(name[len("lost_at_") : -1]), round(value))
+        for name, value in values.items()
+        if name.startswith("lost_at_") and round(value) > 0
+    ]
+    if not losses:
+        raise NotSimulatedError("no place of a loss is stated")
+    return {"losses": losses}
+
+
+def diagnosed_rectification(values: Parameters, variant: str) -> Size:
+    if variant == "gyro":
+        return {"sensor": "gyroscope", "coefficient": along(values, "gyro_bias_per_power")}
+    return {"sensor": "accelerometer", "coefficient": along(values, "accel_bias_per_power")}
+
+
+EFFECTS: Effects = {
+    # The gyro sampling later under the same timestamp is equivalent to the accelerometer being delayed.
+    "accel-gyro-time-offset": (time_offset, number("offset_s", "accelerometer_delay")),
+    "dropped-samples": (dropped, diagnosed_losses),
+    "timing-jitter": (jitter, number("jitter_s", "jitter")),
+    "earth-rate": (earth_rate, lambda values, _: {"latitude_deg": values["latitude"], "heading_deg": 0.0}),
+    "vibration-rectification": (rectification, diagnosed_rectification),
+    "disturbed-pose": (disturbed, nothing),
+    "turn-angle-error": (turn_errors, nothing),
+    "table-tilt": (table_tilt, nothing),
+}
+
+
+def noted(scenario: Scenario) -> Noted:
+    clock, place, motion = scenario.clock, scenario.environment, scenario.motion
+    for name in SENSORS:
+        if any(getattr(scenario, name).rectification):
+            yield "vibration-rectification", {name: getattr(scenario, name).rectification}
+    if clock.gyroscope_offset_s:
+        yield "accel-gyro-time-offset", {"offset_s": clock.gyroscope_offset_s}
+    if clock.losses or clock.loss_probability:
+        losses = tuple((loss.time_s, loss.n) for loss in clock.losses)
+        yield "dropped-samples", {"probability": clock.loss_probability, "restamped": clock.restamped, "losses": losses}
+    if clock.jitter_s or clock.rate_error or clock.timestamp_jitter_s:
+        errors = {"rate_error": clock.rate_error, "timestamps_s": clock.timestamp_jitter_s}
+        yield "timing-jitter", {"jitter_s": clock.jitter_s, **errors}
+    if place.earth_rate:
+        yield "earth-rate", {"latitude_deg": place.latitude_deg, "heading_deg": place.heading_deg}
+    if any(motion.table_tilt_deg):
+        yield "table-tilt", {"tilt_deg": motion.table_tilt_deg}
+    errors_deg = tuple(step.error_deg for step in motion.steps if isinstance(step, Turn))
+    if any(errors_deg):
+        yield "turn-angle-error", {"errors_deg": errors_deg}
+    pose, poses = -1, []
+    for before, step in zip((None, *motion.steps), motion.steps, strict=False):
+        if isinstance(step, Pose) and not isinstance(before, Disturb):
+            pose += 1
+        elif isinstance(step, Disturb):
+            poses.append(pose)
+    if poses:
+        yield "disturbed-pose", {"poses": tuple(poses)}

@@ -1,24 +1,48 @@
-"""Effects of the two sensors."""
+"""Effects of proof mass and sense mass, and of their places."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
-from trihedron.errors import InputError
-from trihedron.simulate.accelerometer import Hysteresis
-from trihedron.simulate.effects.sizes import (
-    Sensor,
-    checked,
-    electronics,
-    mass_response,
-    suspension,
-    with_response,
-)
-from trihedron.simulate.readout import Adc, Drift, Interference, Values, matrix3, triple
-from trihedron.simulate.scenario import Scenario, Temperature
+from trihedron.arrays import AXES
+from trihedron.simulate.accelerometer import Hysteresis, ProofMass
+from trihedron.simulate.effects.sizes import Effects, Noted, Parameters, Size, along, axes
+from trihedron.simulate.readout import NONE, Triple, Values, matrix3, triple
+from trihedron.simulate.scenario import Scenario
+
+# Parameters of suspension and bridge from the second and third order of a response (docs/simulation.md, eq. 3).
+
+
+# A suspension (s2, s3) with deflection d per unit input, read through the bridge, has the input-referred output
+# a + K2 a² + K3 a³ + ... with K2 = -s2 d and K3 = d² (1/4 - s3 + 2 s2²).
+def suspension(deflection: float, k2: float, k3: float) -> tuple[float, float]:
+    second = -k2 / deflection
+    return second, 0.25 + 2.0 * second**2 - k3 / deflection**2
+
+
+def response(deflection: float, second: float, third: float) -> tuple[float, float]:
+    return -second * deflection, deflection**2 * (0.25 - third + 2.0 * second**2)
+
+
+def with_response(mass: ProofMass, k2: Triple, k3: Triple) -> ProofMass:
+    gap, second, third = list(mass.gap_m), [0.0] * 3, [0.0] * 3
+    for k in range(3):
+        omega2 = (2.0 * math.pi * mass.resonance_hz[k]) ** 2
+        if k2[k] == 0.0 and k3[k] > 0.0:
+            # The bridge alone makes the cubic: the gap is chosen so that ξ = d a with d²/4 = K3.
+            gap[k] = 1.0 / (omega2 * 2.0 * math.sqrt(k3[k]))
+        else:
+            second[k], third[k] = suspension(1.0 / (omega2 * gap[k]), k2[k], k3[k])
+    return replace(mass, gap_m=triple(gap), second=triple(second), third=triple(third), reads_bridge=True)
+
+
+def mass_response(mass: ProofMass) -> tuple[Triple, Triple]:
+    if not mass.reads_bridge:
+        return NONE, NONE
+    pairs = [response(float(mass.deflection[k]), mass.second[k], mass.third[k]) for k in range(3)]
+    return triple([p[0] for p in pairs]), triple([p[1] for p in pairs])
 
 
 def accel_quadratic(scenario: Scenario, k2: Values) -> Scenario:
@@ -33,10 +57,6 @@ def accel_cubic(scenario: Scenario, k3: Values) -> Scenario:
     return replace(scenario, accelerometer=replace(accel, mass=with_response(accel.mass, k2, triple(k3))))
 
 
-def accel_asymmetry(scenario: Scenario, asymmetry: Values) -> Scenario:
-    return electronics(scenario, "accelerometer", asymmetry=triple(asymmetry))
-
-
 def accel_hysteresis(
     scenario: Scenario,
     offset_m_s2: Values = 0.0,
@@ -48,56 +68,32 @@ def accel_hysteresis(
     return replace(scenario, accelerometer=replace(scenario.accelerometer, hysteresis=memory))
 
 
-def _warmed(scenario: Scenario, warm_up_k: float, warm_up_tau_s: float, logged: bool) -> Scenario:
-    temperature = scenario.environment.temperature
-    if temperature.is_constant_reference:
-        temperature = Temperature(warm_up_k=warm_up_k, warm_up_tau_s=warm_up_tau_s, logged=logged)
-    else:
-        temperature = replace(temperature, logged=logged)
-    return replace(scenario, environment=replace(scenario.environment, temperature=temperature))
+def diagnosed_hysteresis(values: Parameters, variant: str) -> Size:
+    if variant == "creep":
+        return {"creep_fraction": along(values, "creep"), "creep_tau_s": values["time_constant"]}
+    return {"offset_m_s2": along(values, "offset"), "width_m_s2": values["half_width"]}
 
 
-def bias_repeatability(sensor: Sensor, scenario: Scenario, sigma: Values) -> Scenario:
-    return electronics(scenario, sensor, bias_repeatability=triple(sigma))
+def lever_arm(scenario: Scenario, arm_m: Values) -> Scenario:
+    arm = triple(arm_m)
+    return replace(scenario, accelerometer=replace(scenario.accelerometer, places_m=(arm, arm, arm)))
 
 
-def thermal(
-    sensor: Sensor,
-    kind: Literal["bias", "scale"],
-    scenario: Scenario,
-    per_k: Values,
-    per_k2: Values = 0.0,
-    warm_up_k: float = 12.0,
-    warm_up_tau_s: float = 120.0,
-    logged: bool = True,
-) -> Scenario:
-    thermal = getattr(scenario, sensor).electronics.thermal
-    thermal = replace(thermal, **{f"{kind}_per_k": triple(per_k), f"{kind}_per_k2": triple(per_k2)})
-    return _warmed(electronics(scenario, sensor, thermal=thermal), warm_up_k, warm_up_tau_s, logged)
+def size_effect(scenario: Scenario, places_m: Sequence[Values]) -> Scenario:
+    return replace(scenario, accelerometer=replace(scenario.accelerometer, places_m=matrix3(places_m)))
 
 
-def drift(
-    sensor: Sensor,
-    scenario: Scenario,
-    amplitude: Values = 0.0,
-    tau_s: float = 120.0,
-    change: Values = 0.0,
-    length_s: float = 300.0,
-) -> Scenario:
-    if not (tau_s > 0.0 and length_s > 0.0):
-        raise InputError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
-    drift = Drift(triple(amplitude), tau_s, triple(change), length_s)
-    if not (any(drift.amplitude) or any(drift.change)):
-        raise InputError("a drift needs an amplitude that dies away, or a change over length_s")
-    return electronics(scenario, sensor, drift=drift)
-
-
-def saturation(sensor: Sensor, scenario: Scenario, limit: Values) -> Scenario:
-    return electronics(scenario, sensor, saturation=triple(limit))
+def diagnosed_places(values: Parameters, _variant: str) -> Size:
+    rows = [tuple(values.get(f"r{j}{axis}-r1{axis}", 0.0) for axis in AXES) for j in (2, 3)]
+    return {"places_m": ((0.0, 0.0, 0.0), *rows)}
 
 
 def g_sensitivity(scenario: Scenario, matrix: Sequence[Values]) -> Scenario:
     return replace(scenario, gyroscope=replace(scenario.gyroscope, g_sensitivity=matrix3(matrix)))
+
+
+def diagnosed_g_sensitivity(values: Parameters, _variant: str) -> Size:
+    return {"matrix": tuple(tuple(values.get(f"G_{i}{j}", 0.0) for j in AXES) for i in AXES)}
 
 
 def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) -> Scenario:
@@ -116,51 +112,45 @@ def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) ->
     return replace(scenario, gyroscope=replace(scenario.gyroscope, sense_mode=mode))
 
 
-def lever_arm(scenario: Scenario, arm_m: Values) -> Scenario:
-    arm = triple(arm_m)
-    return replace(scenario, accelerometer=replace(scenario.accelerometer, places_m=(arm, arm, arm)))
+EFFECTS: Effects = {
+    "accel-quadratic": (accel_quadratic, axes(k2="K2")),
+    "accel-cubic": (accel_cubic, axes(k3="K3")),
+    "accel-hysteresis": (accel_hysteresis, diagnosed_hysteresis),
+    "lever-arm": (lever_arm, axes(arm_m="r")),
+    "accel-size-effect": (size_effect, diagnosed_places),
+    "gyro-g-sensitivity": (g_sensitivity, diagnosed_g_sensitivity),
+    "gyro-scale-nonlinearity": (gyro_nonlinearity, axes(c2="quadratic", c3="cubic")),
+}
 
 
-def size_effect(scenario: Scenario, places_m: Sequence[Values]) -> Scenario:
-    return replace(scenario, accelerometer=replace(scenario.accelerometer, places_m=matrix3(places_m)))
-
-
-def lag(scenario: Scenario, sensor: Sensor, lag_s: Values = 0.0, cutoff_hz: float = 0.0, order: int = 2) -> Scenario:
-    part = getattr(scenario, checked(sensor)).electronics
-    return electronics(
-        scenario, sensor, lag_s=triple(lag_s), filter=replace(part.filter, cutoff_hz=cutoff_hz, order=order)
-    )
-
-
-def interference(scenario: Scenario, sensor: Sensor, frequency_hz: float, amplitude: Values) -> Scenario:
-    part = getattr(scenario, checked(sensor)).electronics
-    return electronics(
-        scenario, sensor, interference=(*part.interference, Interference(frequency_hz, triple(amplitude)))
-    )
-
-
-def quantisation(
-    scenario: Scenario, sensor: Sensor, lsb: float = 0.0, dead_band: float = 0.0, missing_every: int = 0
-) -> Scenario:
-    """``lsb`` and ``dead_band`` are in raw units; ``lsb`` 0 keeps the ADC's own."""
-    part = getattr(scenario, checked(sensor))
-    adc: Adc = replace(part.adc, dead_band=dead_band, missing_every=missing_every, lsb=lsb or part.adc.lsb)
-    return replace(scenario, **{sensor: replace(part, adc=adc)})
-
-
-def supply(
-    scenario: Scenario, sensor: Sensor, ratiometric: float = 1.0, sag_v: float = 0.15, sag_tau_s: float = 100.0
-) -> Scenario:
-    supply = replace(scenario.environment.supply, sag_v=sag_v, sag_tau_s=sag_tau_s, logged=True)
-    scenario = replace(scenario, environment=replace(scenario.environment, supply=supply))
-    return electronics(scenario, sensor, ratiometric=ratiometric)
-
-
-def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
-    """``axis`` 1, 2 or 3 (X, Y, Z) points opposite to its documentation."""
-    if axis not in (1, 2, 3):
-        raise InputError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
-    part = getattr(scenario, checked(sensor))
-    S = np.array(part.S)
-    S[:, axis - 1] *= -1.0
-    return replace(scenario, **{sensor: replace(part, S=matrix3(S.tolist()))})
+def noted(scenario: Scenario) -> Noted:
+    accel = scenario.accelerometer
+    k2, k3 = mass_response(accel.mass)
+    # Rounding of the conversion leaves 1e-20 where the coefficient is 0.
+    if any(abs(v) > 1e-12 for v in k2):
+        yield "accel-quadratic", {"k2": k2}
+    if any(abs(v) > 1e-12 for v in k3):
+        yield "accel-cubic", {"k3": k3}
+    if accel.mass.moves:
+        yield "sensor-lag", {"proof_mass": (accel.mass.resonance_hz, accel.mass.quality)}
+    softer = (accel.mass.spring_per_k, accel.mass.gap_per_k)
+    if any(map(any, softer)) and not scenario.environment.temperature.is_constant_reference:
+        # Both reduce the scale; this is their contribution to the linear coefficient.
+        yield "accel-thermal-scale", {"mechanism_per_k": tuple(-a - b for a, b in zip(*softer, strict=True))}
+    memory = accel.hysteresis
+    if any(memory.offset_m_s2) or any(memory.creep_fraction):
+        yield "accel-hysteresis", {name: getattr(memory, name) for name in memory.__dataclass_fields__}
+    places = np.asarray(accel.places_m)
+    if places.any():
+        if np.ptp(places, axis=0).max() == 0.0:
+            yield "lever-arm", {"arm_m": accel.places_m[0]}
+        else:
+            yield "accel-size-effect", {"places_m": accel.places_m}
+    gyro, mode = scenario.gyroscope, scenario.gyroscope.sense_mode
+    if mode.bandwidth_hz:
+        yield "sensor-lag", {"sense_mode": (mode.bandwidth_hz, mode.quality)}
+    if any(mode.deflection_s_rad):
+        pairs = [response(mode.deflection_s_rad[k], mode.second[k], mode.third[k]) for k in range(3)]
+        yield "gyro-scale-nonlinearity", {"c2": triple([p[0] for p in pairs]), "c3": triple([p[1] for p in pairs])}
+    if any(any(row) for row in gyro.g_sensitivity):
+        yield "gyro-g-sensitivity", {"matrix": gyro.g_sensitivity}

@@ -1,58 +1,54 @@
-"""Sizes of effects as triples and matrices, and the electronics that several effects change."""
+"""Types of the modules of this folder, and sizes of effects from the parameters of a diagnosis."""
 
-import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal, TypeAlias
 
+from trihedron.arrays import AXES
 from trihedron.errors import InputError
-from trihedron.simulate.accelerometer import ProofMass
-from trihedron.simulate.readout import NONE, Triple, triple
+from trihedron.simulate.readout import Triple
 from trihedron.simulate.scenario import Scenario
 
 Sensor: TypeAlias = Literal["accelerometer", "gyroscope"]
+SENSORS: dict[Sensor, str] = {"accelerometer": "accel", "gyroscope": "gyro"}
+"""Sensors, and what ids of effects call them."""
 Change: TypeAlias = Callable[..., Scenario]
+"""Adds an effect to a scenario; its parameters after the scenario are the effect's."""
+Parameters: TypeAlias = Mapping[str, float]
+Size: TypeAlias = dict[str, Any]
+Found: TypeAlias = Callable[[Parameters, str], Size | list[Size]]
+"""Parameters that a diagnosis found and the variant of its model → arguments of ``Change``."""
+Effects: TypeAlias = dict[str, tuple[Change, Found]]
+"""By id: how an effect is added to a scenario, and its size from the parameters of a diagnosis."""
+Noted: TypeAlias = Iterator[tuple[str, dict[str, object]]]
+"""Ids of effects that a scenario contains, and their physical parameters."""
+LENGTH = "length of the session"
+"""Key, beside an effect's parameters, of the time over which a linear drift lasts, s."""
 
 
-def electronics(scenario: Scenario, sensor: Sensor, **changes: Any) -> Scenario:
-    part = getattr(scenario, checked(sensor))
-    return replace(scenario, **{sensor: replace(part, electronics=replace(part.electronics, **changes))})
+class NotSimulatedError(Exception):
+    """An accepted effect cannot be simulated; the message says why."""
+
+
+def axes(**symbols: str) -> Found:
+    """Sizes of the three axes by the diagnosis' symbols."""
+    return lambda values, _variant: {name: along(values, symbol) for name, symbol in symbols.items()}
+
+
+def number(name: str, symbol: str) -> Found:
+    """One size by the diagnosis' name of it."""
+    return lambda values, _variant: {name: values[symbol]}
+
+
+def nothing(_values: Parameters, _variant: str) -> Size:
+    raise NotSimulatedError("it belongs to that session or its report, not to an instrument that can be simulated")
+
+
+def along(values: Parameters, symbol: str) -> Triple:
+    x, y, z = (values.get(f"{symbol}_{axis}", 0.0) for axis in AXES)
+    return (x, y, z)
 
 
 def checked(sensor: str) -> str:
-    if sensor not in ("accelerometer", "gyroscope"):
+    if sensor not in SENSORS:
         raise InputError(f"sensor is 'accelerometer' or 'gyroscope', got {sensor!r}")
     return sensor
-
-
-# Parameters of suspension and bridge from the second and third order of a response (docs/simulation.md, eq. 3).
-
-
-# A suspension (s2, s3) with deflection d per unit input, read through the bridge, has the input-referred output
-# a + K2 a² + K3 a³ + ... with K2 = -s2 d and K3 = d² (1/4 - s3 + 2 s2²).
-def suspension(deflection: float, k2: float, k3: float) -> tuple[float, float]:
-    second = -k2 / deflection
-    return second, 0.25 + 2.0 * second**2 - k3 / deflection**2
-
-
-def response(deflection: float, second: float, third: float) -> tuple[float, float]:
-    return -second * deflection, deflection**2 * (0.25 - third + 2.0 * second**2)
-
-
-def with_response(mass: ProofMass, k2: Triple, k3: Triple) -> ProofMass:
-    gap, second, third = list(mass.gap_m), [0.0] * 3, [0.0] * 3
-    for k in range(3):
-        omega2 = (2.0 * math.pi * mass.resonance_hz[k]) ** 2
-        if k2[k] == 0.0 and k3[k] > 0.0:
-            # The bridge alone makes the cubic: the gap is chosen so that ξ = d a with d²/4 = K3.
-            gap[k] = 1.0 / (omega2 * 2.0 * math.sqrt(k3[k]))
-        else:
-            second[k], third[k] = suspension(1.0 / (omega2 * gap[k]), k2[k], k3[k])
-    return replace(mass, gap_m=triple(gap), second=triple(second), third=triple(third), reads_bridge=True)
-
-
-def mass_response(mass: ProofMass) -> tuple[Triple, Triple]:
-    if not mass.reads_bridge:
-        return NONE, NONE
-    pairs = [response(float(mass.deflection[k]), mass.second[k], mass.third[k]) for k in range(3)]
-    return triple([p[0] for p in pairs]), triple([p[1] for p in pairs])

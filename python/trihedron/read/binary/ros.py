@@ -1,7 +1,7 @@
 """ROS 1 bags, ROS 2 bags (folder, .db3, .mcap): messages of type sensor_msgs/Imu, read by rosbags."""
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,86 +9,19 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, errors_of_library, file_sha256
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes
+from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
-from trihedron.records import Finding
 from trihedron.records.progress import Progress
-from trihedron.records.words import Words, words
 
-
-@dataclass(frozen=True)
-class Stream:
-    """``count`` messages or rows of ``topic``; ``instance`` is "" where there is only one."""
-
-    topic: str
-    count: int
-    instance: str = ""
-
-    @property
-    def name(self) -> str:
-        """Topic and instance as text."""
-        return f"{self.topic} {self.instance}".strip()
-
-
-MOST_LISTED = 24
-"""Largest number of streams that are listed by name."""
-
-
-def listed(streams: list[Stream]) -> Words:
-    """The streams with their counts, at most ``MOST_LISTED``."""
-    named = [(stream.name, stream.count) for stream in streams[:MOST_LISTED]]
-    return words("streams", streams=named, has_more=len(streams) > MOST_LISTED)
-
-
-def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream:
-    """The chosen stream, or the only one.
-
-    Raises ``ReadError`` when there is no stream, none or several match the choice, or the matching one is empty.
-    """
-    if not streams:
-        raise ReadError(f"{path}: {what} without readings of an accelerometer or a gyro that are known here.")
-    fitting = [
-        s
-        for s in streams
-        if (choice.topic is None or s.topic.strip("/") == choice.topic.strip("/"))
-        and (choice.instance is None or s.instance == choice.instance)
-    ]
-    if not fitting:
-        asked = (("topic", choice.topic), ("instance", choice.instance))
-        wanted = " and ".join(f"{kind} {word}" for kind, word in asked if word)
-        raise ReadError(f"{path}: there is no {wanted} in {what}; it offers {listed(streams)}.")
-    filled = [s for s in fitting if s.count]
-    if not filled:
-        raise ReadError(f"{path}: 0 messages in {listed(fitting)}; the sensor was not recorded.")
-    if len(filled) > 1:
-        first = filled[0]
-        say = f"--topic {first.topic}" if len({s.topic for s in filled}) > 1 else ""
-        if len({s.instance for s in filled}) > 1:
-            say = f"{say} --instance {first.instance or 0}".strip()
-        raise ReadError(f"{path}: {what} offers {listed(filled)}; choose one, for example {say}.")
-    return filled[0]
-
-
-def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Finding, ...]:
-    """The finding that names which of several streams is read; empty where there is one."""
-    if len(streams) < 2:
-        return ()
-    from trihedron.read.devices import chosen
-
-    return (chosen(words("this-container", kind=kind), taken.name, listed(streams), 0),)
-
-
-def missing_package(path: Path, what: str, package: str) -> ReadError:
-    """The error for a library that is not installed."""
-    return ReadError(f"{path}: {what} is read by {package}, which is not installed: pip install {package}.")
-
-
+_SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}
+STARTS = tuple(_SUFFIXES)
 _IMU = "sensor_msgs/msg/Imu"
 _NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))
 _ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "received")
 
 
-def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+def read(path: Path, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:
     """The messages of one topic, or of an accelerometer's and a gyro's topic, with the timestamps of their headers.
 
     Raises ``ReadError`` when rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
@@ -98,7 +31,9 @@ def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None 
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise missing_package(path, "a ROS bag or MCAP file", "rosbags") from None
-    # rosbags recognises the format by the ending of the name, which may be another one.
+    # rosbags recognises the format by the ending of the name, which may be another one; a folder has none.
+    first = b"" if path.is_dir() else first_bytes(path, 7)
+    suffix = next((suffix for start, suffix in _SUFFIXES.items() if first.startswith(start)), "")
     with tempfile.TemporaryDirectory() as folder:
         named = path
         if suffix and path.suffix != suffix:
@@ -172,4 +107,6 @@ def _table(
     if not np.any(rows[:, 0] != 0) and not np.any(rows[:, 1] != 0):
         # No timestamps in the headers: those of the recording program are used.
         names, columns = ["time [s]", *names[2:8]], [columns[8], *columns[2:8]]
-    return Table(path, tuple(names), tuple(columns), sha256, findings=choice_note("bag", stream, streams))
+    return Table(
+        path, tuple(names), tuple(columns), sha256, findings=choice_note("bag", stream, streams), is_chosen=True
+    )

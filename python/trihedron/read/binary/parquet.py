@@ -3,18 +3,24 @@
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 
 from trihedron.arrays import FloatArray
+from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_polars, file_sha256, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
+
+STARTS = (b"PAR1",)
 
 
-def read_parquet(path: Path) -> Table:
+def read(path: Path, _choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
     """Numeric and time columns of a Parquet file; other columns are excluded with a finding."""
     reject_after_fork(path)
+    # The library for tables is large, and other formats do not need it.
+    import polars as pl
+
     with errors_of_polars(path, "this Parquet file is damaged or cut off", "; write it again"):
         n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
         check_memory(path, n_rows, len(pl.read_parquet_schema(path)))
@@ -34,4 +40,4 @@ def read_parquet(path: Path) -> Table:
             findings.append(Finding.of(FindingCode.COLUMN_LEFT_OUT, "type", column=name, kind=str(series.dtype)))
     if not columns or n_rows == 0:
         raise ReadError(f"{path}: the table has no rows of numbers; write it again.")
-    return Table(path, tuple(names), tuple(columns), file_sha256(path), findings=tuple(findings))
+    return (Table(path, tuple(names), tuple(columns), file_sha256(path), findings=tuple(findings)),)

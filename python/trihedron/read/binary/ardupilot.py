@@ -15,10 +15,12 @@ from trihedron.errors import InputError
 from trihedron.read.devices import Choice
 from trihedron.read.errors import errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, missing_package, pick
+from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
 
+STARTS = (b"\xa3\x95",)
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
 """Parameters of the corrections that the board applies to readings (the INS library of ArduPilot)."""
 _TYPES = ["PARM", "IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
@@ -31,7 +33,7 @@ _FIELDS = {
 _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 
 
-def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
+def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
     """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each with its own timestamps.
 
     Raises ``ReadError`` when pymavlink is not installed, the log is damaged, or contains several IMUs and none is
@@ -70,7 +72,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     # Readings of every message, ACC and GYR included, are logged after offset, scale and rotation to the board's axes.
     onboard = held.onboard("ardupilot", (int(taken.instance),) * 2, "body")
     notes = (*choice_note("log", taken, streams), *_skipped(said.getvalue()), *said_of(onboard))
-    common = Table(path, None, (), file_sha256(path), onboard=onboard)
+    common = Table(path, None, (), file_sha256(path), onboard=onboard, is_chosen=True)
     first = replace(_filled(common, messages[taken.topic, taken.instance]), findings=notes)
     if taken.topic == "IMU":
         return (first,)

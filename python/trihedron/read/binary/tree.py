@@ -19,16 +19,27 @@ import numpy.typing as npt
 
 from trihedron.read.columns import columns_or_none, sensor_of_file_name
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_line
+from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes, first_line
 from trihedron.read.memory import columns_table, frame_columns
-from trihedron.read.ros import Stream, choice_note, missing_package, pick
+from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Table
+from trihedron.records.progress import Progress
 
+STARTS = (b"\x89HDF", b"MATLAB")
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
 MIN_ROWS = 8
 
 
-def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
+def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
+    """The log of an HDF5 or MATLAB file, as :func:`_read_hdf5` and :func:`_read_matlab`."""
+    first = first_bytes(path, 126)
+    # Bytes 125 and 126 of a MATLAB file state whether HDF5 follows, whatever text precedes them.
+    is_hdf5_inside = first[124:126] in (b"\x00\x02", b"\x02\x00") or first.startswith(b"MATLAB 7.3")
+    is_matlab = first.startswith(b"MATLAB") and not is_hdf5_inside
+    return (_read_matlab if is_matlab else _read_hdf5)(path, choice)
+
+
+def _read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of an HDF5 or MATLAB 7.3 file; two tables where MATLAB saved one for each sensor.
 
     Raises ``ReadError`` when h5py is not installed, the file is damaged, or it is ambiguous which group to read.
@@ -63,7 +74,7 @@ pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protoc
 """Program that reads a file: SciPy trusts the sizes in it, and a wrong one ends the process in which it is read."""
 
 
-def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
+def _read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
     Raises ``ReadError`` when the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to
@@ -104,7 +115,7 @@ def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dic
     found: dict[str, Table] = {}
     for name, columns in named.items():
         with suppress(ReadError):  # lengths differ, or no numbers
-            table = replace(columns_table(str(path), columns), path=path)
+            table = replace(columns_table(str(path), columns), path=path, is_chosen=True)
             if columns_or_none(table) is not None:
                 found[name] = table
     return found
@@ -118,7 +129,7 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
     if not tables and len(single) == 1 and len(single[0]) >= MIN_ROWS:
         # One matrix: the roles of its columns follow from their number, or from --columns.
         columns = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in single[0].T)
-        return Table(path, None, columns, file_sha256(path))
+        return Table(path, None, columns, file_sha256(path), is_chosen=True)
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(

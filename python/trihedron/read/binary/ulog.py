@@ -20,11 +20,13 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
-from trihedron.read.ros import Stream, choice_note, missing_package, pick
+from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.records.onboard import Stage
+from trihedron.records.progress import Progress
 
+STARTS = (b"ULog",)
 SUFFIX = "_fifo"
 
 
@@ -57,7 +59,7 @@ _SENSORS: dict[str, Any] = {_RAW: ("accelerometer", "acc", "m/s^2"), _GYRO: ("gy
 _SKIP = {"timestamp", "timestamp_sample"}
 
 
-def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
+def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
     """The accelerometer's and the gyro's table of one instance, or the one table of ``sensor_combined``.
 
     Raw topics are read if they were logged at full rate (at least half as many rows as ``sensor_combined``), else
@@ -89,7 +91,8 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, offered, choice, "this log")
     onboard = _onboard(log, taken.topic, int(taken.instance or 0))
     findings = (*choice_note("log", taken, streams), *_losses(log), *said_of(onboard))
-    common = Table(path, None, (), file_sha256(path), clock=StatedClock(time=0, unit="us"), onboard=onboard)
+    clock = StatedClock(time=0, unit="us")
+    common = Table(path, None, (), file_sha256(path), clock=clock, onboard=onboard, is_chosen=True)
     if taken.topic == _COMBINED:
         return (replace(_filled(common, data[(_COMBINED, 0)], ""), findings=findings),)
     i = int(taken.instance)
