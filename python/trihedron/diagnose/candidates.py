@@ -141,6 +141,8 @@ SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
 """Iterations of size and shape: the second changes them by a tenth of what the first does."""
+SAME_COLUMNS = 3e-3
+"""Relative change of columns below which they are not computed again: sizes are known to some per cent."""
 STEP_LOG = 0.02
 """Half-step of the numerical derivative by the logarithm of a shape parameter."""
 
@@ -181,6 +183,30 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     if final is None:
         return term
     return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=value * min(sigma, 10.0)))
+
+
+def renewed(model: Hypothesis) -> Hypothesis:
+    """The hypothesis with columns that its own motion gives: those of the search were computed from readings that
+    contained the effect, and with the S that was fitted without it."""
+    for _ in range(N_RESHAPED):
+        terms = [_renewed(model, term) for term in model.terms]
+        if all(new is old for new, old in zip(terms, model.terms, strict=True)):
+            break
+        model = again(model, terms)
+    return model
+
+
+def _renewed(model: Hypothesis, term: Term) -> Term:
+    """A term with its columns computed from the motion of a hypothesis; the same one where they hardly change."""
+    known = term.variant
+    if term.effect.is_local or known.shape:
+        return term
+    for made in term.effect.variants(model.context):
+        if (made.label, made.names, made.scale) == (known.label, known.names, known.scale):
+            pairs = zip(vars(made.distortion).values(), vars(known.distortion).values(), strict=True)
+            change = max(float(np.linalg.norm(a - b) / np.linalg.norm(a)) for a, b in pairs if a is not None)
+            return replace(term, variant=made) if change > SAME_COLUMNS else term
+    return term
 
 
 def with_shapes(model: Hypothesis) -> Hypothesis:

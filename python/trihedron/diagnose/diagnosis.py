@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
 from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
-from trihedron.diagnose.candidates import with_shapes
+from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import DirectEffect
@@ -156,9 +156,10 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     biases, asked = bias_strengths(found.related.model, alpha)
     notify(0.9, "checking the unexplained part")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
+    numbers = with_shapes(renewed(found.model))
     answer = Answer(
-        predicted, bare, found, with_shapes(found.model), biases, observed.seen, judged.fitted, asked, known, domains
-    )
+        predicted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
+    )  # fmt: skip
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.rejected | (sought - named))
     remaining = with_relations(accounted_for(answer, remaining), found.related)
