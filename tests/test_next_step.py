@@ -50,6 +50,8 @@ MY_LOG = "'my log.csv' --rate 50"
             "`trihedron verify FILE OTHER_LOG`; `trihedron apply FILE LOG`.",
             f"`trihedron verify cal.json OTHER_LOG`; `trihedron apply cal.json {MY_LOG}`.",
         ),
+        # One of several logs by its name is read as it was.
+        ([], "`trihedron diagnose 'my log.csv'`", f"`trihedron diagnose {MY_LOG} --latitude 59.9`"),
         # The place and a reference go to commands that take them.
         (
             [(note_reference, "motion.csv")],

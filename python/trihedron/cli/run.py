@@ -148,8 +148,10 @@ def _filled(command: str) -> str:
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
     log = " ".join(filter(None, (_now().log, *more)))
     given = [word for word in _now().typed if word not in _now().excluded]
-    if verb in _WITH_PLACE and _NAMES_A_LOG.search(command) and _now().place:
-        return f"{command[:-1]} {_now().place}`"
+    if verb in _WITH_PLACE and _NAMES_A_LOG.search(command):
+        named = shlex.split(command.strip("`"))[2:]
+        options = next((shlex.join(words[len(named) :]) for words in _now().logs if words[: len(named)] == named), "")
+        return f"`{' '.join(filter(None, (command.strip('`'), options, _now().place)))}`"
     same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
     same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
