@@ -11,6 +11,7 @@ import trihedron
 from trihedron.api.calibrating import calibrate
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.errors import InputError
+from trihedron.records import FindingCode
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -89,6 +90,14 @@ def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_
     assert "Gyroscope" not in str(alone)
     with pytest.raises(ValueError, match="gyro alone"):
         trihedron.calibrate(replace(recording, accelerometer=None), gravity_m_s2=9.80665)
+
+
+def test_a_log_of_one_orientation_contradicts_nothing_and_verifies_nothing(scenario, result):
+    still, _ = simulate(replace(scenario, motion=hand_session(n_poses=1, pose_s=60.0)), 12)
+    verified = trihedron.verify(result, still)
+    assert FindingCode.NOT_TESTED in {one.code for one in verified.findings}
+    assert " ".join(str(verified).split()).partition("tested on")[2].count("Not contradicted") == 1
+    assert "Use the calibration" not in str(verified)
 
 
 def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_beyond_the_gyros_range(scenario, result):

@@ -91,6 +91,7 @@ def verify_calibration(
             *worse,
             *_bias_findings(calibration.gyroscope, rest, is_alone=not beyond_noise),
             *shift_findings(parameters),
+            *_untested(calibration, own, segments),
         ),
     )
 
@@ -106,6 +107,19 @@ def norm_error(
     noise = np.sum((jacobian[:, 9:] @ sensor.S) ** 2 * variance, axis=1)
     model = np.einsum("ni,ij,nj->n", jacobian, sensor.covariance, jacobian)
     return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
+
+
+def _untested(calibration: Calibration, own: Calibration | None, segments: Segments) -> Iterator[Finding]:
+    """Finding where the log does not determine a sensor by itself: an error of the file may not show in it."""
+    determined = {
+        name
+        for name, sensor in (() if own is None else own.sensors)
+        if sensor.observability is not None and sensor.observability.rank >= sensor.observability.n_parameters
+    }
+    sensors = [name for name, _ in calibration.sensors if name not in determined]
+    if sensors:
+        poses, moves = segments.n_poses, len(segments.moves)
+        yield Finding.of(FindingCode.NOT_TESTED, sensors=sensors, poses=poses, moves=moves)
 
 
 class _Changed(NamedTuple):

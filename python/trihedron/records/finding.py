@@ -138,6 +138,7 @@ class FindingCode(str, Enum):
     CALIBRATION_SHIFT = "calibration-shift"
     WORSE_THAN_UNCALIBRATED = "worse-than-uncalibrated"
     LIMIT_EXCEEDED = "limit-exceeded"
+    NOT_TESTED = "not-tested"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
     # noise

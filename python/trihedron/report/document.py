@@ -23,6 +23,7 @@ CONSEQUENCE = (
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
+    FindingCode.NOT_TESTED,
     FindingCode.POSES_VIBRATE,
     FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,

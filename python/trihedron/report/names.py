@@ -36,6 +36,7 @@ FINDINGS = {
     "filter-noise-unsettled": "search not settled",
     "gravity-defaulted": "gravity not given",
     "held-out-worse": "tilt error after rotations above noise",
+    "not-tested": "parameters that this log does not test",
     "non-finite": "rows without time",
     "reference-apart": "reference deviates in a part of the log",
     "reference-misfit": "parts of the log disagree",
@@ -45,7 +46,7 @@ FINDINGS = {
     "turn-not-a-multiple": "turn excluded",
 }
 """Warnings in words, where the code is no phrase of the field."""
-SENSOR = re.compile(r"\bthe (accelerometer|gyro)", re.IGNORECASE)
+SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)
 
 
 def axis_in_print(name: str) -> str:
@@ -69,7 +70,7 @@ def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
     """Warnings of one code by name, with the sensors that their sentences name, or else their number:
     ``clipping (accelerometer and gyro)``, ``outlier pose (3)``."""
     name = finding_in_print(code)
-    named = {found[1].lower() for one in sentences if (found := SENSOR.search(one))}
+    named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
     if named and not SENSOR.search(name):
         return f"{name} ({listed(sorted(named))})"
     return name if len(sentences) == 1 else f"{name} ({len(sentences)})"

@@ -59,6 +59,7 @@ def verification_report(
         headlines=headlines_of(v),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         next_step=use_in_words(v, "the calibration"),
+        stated_level="usable" if _of_uncertainty(v) else None,
     )
 
 
@@ -74,9 +75,14 @@ def above_noise(v: Verification) -> list[Finding]:
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
-    verified = f"Verified: errors are within noise and uncertainty{_of_uncertainty(v)}"
+    word = "Not contradicted" if _of_uncertainty(v) or _is_untested(v) else "Verified"
+    verified = f"{word}: errors are within noise and uncertainty{_of_uncertainty(v)}"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
+
+
+def _is_untested(v: Verification) -> bool:
+    return any(finding.code is FindingCode.NOT_TESTED for finding in v.findings)
 
 
 def _of_uncertainty(v: Verification) -> str:
@@ -94,7 +100,7 @@ def use_in_words(v: Verification, what: str) -> str:
     above = above_noise(v)
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
-    use = f"Use {what}: {USES}." if v.is_passed else ""
+    use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
     return above[0].action if above else use
 
 

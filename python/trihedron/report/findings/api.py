@@ -76,6 +76,12 @@ _VERIFIED = {
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few rotations}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
     ),
+    (Code.NOT_TESTED, "", WARNING): Words(
+        "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
+        "determine them.",
+        "Few orientations or rotations: an error of the calibration that shows in others passes.",
+        "Record 9 or more poses in different orientations, with rotations between them, and verify on that log.",
+    ),
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
