@@ -60,6 +60,13 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
     assert relative < 5e-4
     with pytest.raises(ValueError, match="5 turns were stated and 6 were found"):
         calibrate(recorded(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
+    # The moves between poses show the sense of the turns, the readings about one axis that of each.
+    turned = calibrate(recorded(f, w, rate), gravity_m_s2=G, turns_deg=[-angle for angle in stated])
+    said = [one for one in turned.findings if one.code is FindingCode.LEFT_HANDED and one.severity.value == "serious"]
+    assert any("contradict the sense of the turns" in one.seen for one in said)
+    one_way = [abs(angle) for angle in stated]
+    with pytest.raises(ValueError, match="turned the other way in turn 2, 4, 6"):
+        calibrate(recorded(f, w, rate), gravity_m_s2=G, turns_deg=one_way)
 
 
 def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():

@@ -24,6 +24,7 @@ from trihedron.estimate.gyroscope.turn_angles import SCALE_TOLERANCE, TurnAngleU
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
+from trihedron.estimate.verification import sense_findings
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -185,7 +186,8 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
         return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
     missing = tuple(missing_samples(recording, segments, median(relative)))
-    return (*unless_seen(fitted, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
+    of_gyro = (*scale_findings(gyro.S, recording.gyroscope_unit), *sense_findings(calibration, recording, segments))
+    return (*unless_seen(fitted, missing), *of_gyro, *missing)
 
 
 def _as_they_weigh(segments: Segments, calibration: Calibration) -> Found:

@@ -169,6 +169,19 @@ def _worse_than_none(
     ]
 
 
+def sense_findings(calibration: Calibration, recording: Recording, segments: Segments) -> Iterator[Finding]:
+    """Finding where the moves of the log itself contradict the sense of the stated turns that a gyro was fitted to."""
+    gyro = calibration.gyroscope
+    if gyro is None or gyro.method != "turns" or not segments.moves:
+        return
+    stated, other = (
+        _carried(calibration, replace(gyro, S=sign * gyro.S), recording, segments).angle_deg for sign in (1.0, -1.0)
+    )
+    if _is_larger(stated, other):
+        rms, rms_other = rms_of(stated), rms_of(other)
+        yield Finding.of(FindingCode.LEFT_HANDED, "turns-reversed", rms_deg=rms, rms_other_deg=rms_other)
+
+
 def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray, *, is_alone: bool) -> Iterator[Finding]:
     """Finding where the gyro bias differs by more than ``FAR_BEYOND`` σ, of the poses' scatter and stated uncertainty.
 

@@ -156,12 +156,34 @@ def nominal_matrix(
     stated = scale_of_stated(measured, turns)
     if stated is not None:
         return stated
+    _require_one_sense(measured, turns)
     if nominal_scale is not None:
         return scale_matrix(nominal_scale)
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
         return unit * np.eye(3)
     raise TurnAngleUnknownError
+
+
+def _require_one_sense(measured: MeasuredTurns, turns: Sequence[Turn]) -> None:
+    """Raise ``InputError`` where readings of stated turns about one axis have other signs than the turns."""
+    raw, wrong = measured.turned(), []
+    first: dict[int, int] = {}
+    for k, turn in enumerate(turns):
+        if turn.angle_rad:
+            known = first.setdefault(turn.axis, k)
+            before = turns[known]
+            stated = turn.angle_rad * (before.angle_rad or 0.0) * float(np.dot(turn.direction, before.direction))
+            if stated * float(raw[k] @ raw[known]) < 0.0:
+                wrong.append(k)
+    if wrong:
+        angles = [-(t.angle_rad or 0.0) if k in wrong else t.angle_rad or 0.0 for k, t in enumerate(turns)]
+        said = ",".join(f"{math.degrees(angle):g}" for angle in angles)
+        numbers = ", ".join(str(k + 1) for k in wrong)
+        raise InputError(
+            f"the gyro turned the other way in turn {numbers} than the stated angles say: as it read them they are "
+            f"--turns {said}"
+        )
 
 
 def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:

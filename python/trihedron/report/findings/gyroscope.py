@@ -111,6 +111,13 @@ _MOVES = {
         "`trihedron diagnose` puts single losses back.",
         or_severity=SERIOUS,
     ),
+    (Code.LEFT_HANDED, "turns-reversed", SERIOUS): Words(
+        "The moves between poses contradict the sense of the turns: the tilt error after them is {rms_deg:.3g}° rms, "
+        "and {rms_other_deg:.3g}° with all turns reversed.",
+        "The accelerometer's axes form a left-handed triad as documented, or the turns were stated the other way "
+        "round.",
+        "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
+    ),
     (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
         "The tilt error after rotations exceeds noise: a support gives way after the moves, or samples are lost "
         "without a trace in these timestamps. Up to {lost_share:.2g %} of the samples could be missing; every turn, "
