@@ -13,6 +13,7 @@ import numpy as np
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.quiet import look
 from trihedron.errors import InputError
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
@@ -130,6 +131,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     followed = thermally_corrected(known, recording)
     if followed is None:
         followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
+    findings = (*findings, *static_force(followed[0], recording.rate_hz, known.gravity_m_s2))
     return replace(
         recording,
         accelerometer=followed[0],
@@ -139,6 +141,21 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
         source=f"{recording.source}, calibrated",
         findings=findings,
     )
+
+
+FAR_FROM_GRAVITY = 0.2
+"""Relative difference of the corrected |f| at rest from gravity that is no error of a calibration: before one, MEMS
+parts are within 10 % of their data sheet."""
+
+
+def static_force(force: FloatArray | None, rate_hz: float, gravity_m_s2: float) -> tuple[Finding, ...]:
+    """A finding with the median |f| of corrected readings (n, 3) in quiet windows: serious far from gravity."""
+    windows = None if force is None else look({"accelerometer": force}, rate_hz)
+    if windows is None:
+        return ()
+    norm = float(np.median(np.linalg.norm(windows.quiet_mean("accelerometer"), axis=1)))
+    case = "far" if abs(norm / gravity_m_s2 - 1.0) > FAR_FROM_GRAVITY else ""
+    return (Finding.of(FindingCode.STATIC_FORCE, case, norm_m_s2=norm, gravity_m_s2=gravity_m_s2),)
 
 
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:

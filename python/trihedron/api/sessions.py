@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCali
 from trihedron.records.progress import Progress
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
-from trihedron.records.sessions import By, Session
+from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
@@ -124,6 +124,8 @@ def calibrate_sessions(
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
     findings = (*_doubts(results, sessions), *model.findings)
+    if by != "device":
+        findings = (*several_devices(model.changes, "calibrated"), *findings)
     model = replace(model, calibration=replace(model.calibration, findings=findings), findings=findings)
     return SessionsResult(model, tuple(results))
 
@@ -162,9 +164,13 @@ def of_several_units(results: Sequence[CalibrationResult]) -> tuple[Finding, ...
     alike = [one for k, one in enumerate(results) if _unfit(one, results[:k]) is None]
     if len(alike) < 2:
         return ()
-    changes = changes_among([sessions_of(alike, [""] * len(alike))], alpha=ALPHA)
+    return several_devices(changes_among([sessions_of(alike, [""] * len(alike))], alpha=ALPHA))
+
+
+def several_devices(changes: Sequence[Change], case: Literal["", "calibrated"] = "") -> tuple[Finding, ...]:
+    """A finding for every misalignment that changed."""
     return tuple(
-        Finding.of(FindingCode.SEVERAL_DEVICES, parameter=one.id, amount=amount_of(one))
+        Finding.of(FindingCode.SEVERAL_DEVICES, case, parameter=one.id, amount=amount_of(one))
         for one in changes
         if one.significant and one.id in GEOMETRY
     )

@@ -133,6 +133,7 @@ class FindingCode(str, Enum):
     OUTSIDE_VALID_RANGE = "outside-valid-range"
     TEMPERATURE_MISSING = "temperature-missing"
     # apply
+    STATIC_FORCE = "static-force"
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     CALIBRATION_SHIFT = "calibration-shift"

@@ -24,6 +24,7 @@ CONSEQUENCE = (
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
     FindingCode.NOT_TESTED,
+    FindingCode.SEVERAL_DEVICES,
     FindingCode.POSES_VIBRATE,
     FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,
@@ -53,6 +54,8 @@ _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 """A command on the same log; where an action and the first step have the same one, they are one step."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
+INSTEAD = (*IN_A_NEW_LOG, FindingCode.SEVERAL_DEVICES)
+"""Findings whose action takes the place of the use of the result."""
 THEN_RUN = {
     **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
@@ -196,7 +199,7 @@ class Document:
         action = action_in_words(first)
         if action.startswith("If ") and then:
             return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
-        if first.severity is Severity.SERIOUS or first.code in IN_A_NEW_LOG:
+        if first.severity is Severity.SERIOUS or first.code in INSTEAD:
             return action
         if first.code not in CONSEQUENCE:
             return then

@@ -112,6 +112,14 @@ _USE = {
         "Only the accelerometer was logged, or only its columns were found.",
         "Log both sensors.",
     ),
+    (Code.STATIC_FORCE, "", NOTE): Words(
+        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s²; gravity is {gravity_m_s2:.4g} m/s².",
+    ),
+    (Code.STATIC_FORCE, "far", SERIOUS): Words(
+        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s², but gravity {gravity_m_s2:.4g} m/s².",
+        "The calibration is of another device, or the log in other units than it was made for.",
+        "Check that calibration and log belong together: `trihedron verify CALIBRATION LOG`.",
+    ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
         "Its own recording had this fault, which concerns everything the calibration is applied to.",
@@ -247,6 +255,11 @@ _MANY_RECORDINGS = {
         "The {parameter:ids} differs between the recordings: {amount}.",
         "Recordings of different units; in one unit the axes keep their directions from session to session.",
         "Diagnose the recordings of one unit together; what recordings of different units share is of the design.",
+    ),
+    (Code.SEVERAL_DEVICES, "calibrated", WARNING): Words(
+        "The {parameter:ids} differs between the recordings: {amount}.",
+        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Calibrate the recordings of each unit by themselves: common parameters of several units fit none of them.",
     ),
     **{
         (Code.PARAMETERS_CHANGED, f"{parameter}-{kind}", WARNING): Words(
