@@ -186,8 +186,8 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
 
 
 def renewed(model: Hypothesis) -> Hypothesis:
-    """The hypothesis with columns that its own motion gives: those of the search were computed from readings that
-    contained the effect, and with the S that was fitted without it."""
+    """The hypothesis with the columns of its own motion, for effects of the true motion: those of the search were
+    computed from readings that contained the effect, and with the S that was fitted without it."""
     for _ in range(N_RESHAPED):
         terms = [_renewed(model, term) for term in model.terms]
         if all(new is old for new, old in zip(terms, model.terms, strict=True)):
@@ -199,7 +199,7 @@ def renewed(model: Hypothesis) -> Hypothesis:
 def _renewed(model: Hypothesis, term: Term) -> Term:
     """A term with its columns computed from the motion of a hypothesis; the same one where they hardly change."""
     known = term.variant
-    if term.effect.is_local or known.shape:
+    if not term.effect.is_of_true_motion:
         return term
     for made in term.effect.variants(model.context):
         if (made.label, made.names, made.scale) == (known.label, known.names, known.scale):

@@ -91,6 +91,9 @@ class Effect:
     temperature is not the bias at 25 °C."""
     drifts_as: ClassVar[str] = ""
     """Id of the effect that replaces it where its channel is not logged: without a temperature it is a bias drift."""
+    is_of_true_motion: ClassVar[bool] = False
+    """Whether its columns are functions of the true motion, not of the reading: derivatives of the reading invert a
+    low-pass."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose only: its gain may come from one fold of the cross-validation, and it may be
     accepted once for each of several poses."""

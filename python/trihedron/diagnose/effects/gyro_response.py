@@ -41,6 +41,7 @@ class GyroScaleNonlinearity(Effect):
     id = "gyro-scale-nonlinearity"
     needs_moves = True
     applies_elsewhere = True
+    is_of_true_motion = True
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         # 1 % of the fastest rate.
