@@ -160,6 +160,8 @@ def _filled(command: str) -> str:
 
 def _on_a_new_log() -> str:
     """The command as typed, with its output, on other logs in place of those that were read."""
+    if _now().typed[0] == "report":
+        return "trihedron calibrate NEW_LOG"  # a calibration file: saved results have their commands
     new: dict[str, str] = {}
     for k, words in enumerate(_now().logs, start=1):
         which = f"_{k}" if len(_now().logs) > 1 else ""

@@ -13,7 +13,7 @@ from trihedron.cli.output import check_outputs, leave, say, write_report
 from trihedron.cli.run import name_log
 
 if TYPE_CHECKING:
-    from trihedron.records import Recording, Truth
+    from trihedron.records import Finding, Recording, Truth
 
 
 def serve_recording(
@@ -115,11 +115,17 @@ def simulate(
     _check_endings(output, truth)
     read_from = (None if scenario is None else Path(scenario), like, calibration)
     check_outputs(output, truth, force=force, report=report, inputs=read_from)
+    beside = ""
+    findings: tuple[Finding, ...] = ()
     if like is not None and calibration is not None:
+        from trihedron.api.applying import doubted
         from trihedron.files.calibration import read_calibration
+        from trihedron.records.recording import as_arguments
 
         repeated = LogSource(**asdict(how), log=like).read()
-        recording, known = twin(repeated, read_calibration(calibration), seed)
+        of_unit = read_calibration(calibration)
+        recording, known = twin(repeated, of_unit, seed)
+        beside, findings = as_arguments(repeated.source), (*repeated.findings, *doubted(of_unit))
     else:
         recording, known = run(str(scenario), seed)
     if output is not None:
@@ -132,16 +138,13 @@ def simulate(
         from trihedron.files.log import truth_document
         from trihedron.report.simulation import simulation_report
 
-        write_report(simulation_report(recording, known), lambda: truth_document(known), report, force=force)
+        document = simulation_report(recording, known, beside, findings)
+        write_report(document, lambda: truth_document(known), report, force=force)
     if serve is not None:
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     _show(output, recording, known)
-    if calibration is not None:
-        from trihedron.api.applying import doubted
-        from trihedron.files.calibration import read_calibration
-
-        leave((*repeated.findings, *doubted(read_calibration(calibration))))
+    leave(findings)
 
 
 def _check_endings(output: Path | None, truth: Path | None) -> None:

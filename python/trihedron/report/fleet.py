@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import BoolArray
+from trihedron.records.finding import FindingCode
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
 from trihedron.report.axes import TRIAD
@@ -21,6 +22,7 @@ from trihedron.report.sessions import change_in_words, found_or_limit, repeated_
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
 BY_FILE = "`... --serial '([^/]+)$'`: one unit a file"
+RATE_ASSUMED = FindingCode.RATE_ASSUMED.value
 VERDICTS = {
     "consistent": "no missing effect is detectable",
     "missing-physics": "physics beyond the linear model",
@@ -110,10 +112,13 @@ def _named(devices: list[str]) -> str:
 
 def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
     usable = [log for log in summary.logs if _is_usable(log)]
-    again = [f"{_called(log, summary)}{_why(log)}" for log in summary.logs if not _is_usable(log)]
+    unusable = [log for log in summary.logs if not _is_usable(log)]
+    rates = [_called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
+    again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if RATE_ASSUMED not in log.serious]
     opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
     steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
-    steps += [f"record again {_first(again)}"] if again else []
+    steps += [f"give --rate for {_first(rates)}"] if rates else []
+    steps += [f"record again, if it was to be a calibration: {_first(again)}"] if again else []
     steps += [f"see what effects gain in {_first(opened)}: `trihedron diagnose` each"] if opened else []
     steps += [f"look at {_first(strays)}"] if strays else []
     steps += ["use each device's own calibration (folder calibrations)"] if usable else []

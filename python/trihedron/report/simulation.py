@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import AXES
-from trihedron.records import Recording, TermName, Truth
+from trihedron.records import Finding, Recording, TermName, Truth
 from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
 from trihedron.report.segments import truth_chart
@@ -19,8 +20,14 @@ ON_A_FACE = 0.99
 """Cosine of the largest angle (8°) from the vertical of a face on which a case stands."""
 
 
-def simulation_report(recording: Recording, truth: Truth) -> Document:
-    """Lay out a simulation: its motion, the effects switched on, the true parameters."""
+def simulation_report(
+    recording: Recording, truth: Truth, repeated: str = "", findings: tuple[Finding, ...] = ()
+) -> Document:
+    """Lay out a simulation: its motion, the effects switched on, the true parameters.
+
+    ``repeated`` is the recording of which it is the digital twin, as an argument, ``findings`` those on that recording
+    and its calibration.
+    """
     n = len(truth.effects)
     effects = f"{how_many(n, 'effect')} beyond the linear model" if n else "no effect beyond the linear model"
     poses, moves = how_many(len(truth.poses), "pose"), how_many(len(truth.moves), "move")
@@ -31,18 +38,20 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
         ("motion", f"{poses}, {moves}"),
     )
+    what = f"{poses} and {moves} of an instrument with {effects}. The truth below is not in the log."
     caption = "The simulated log; shaded where the body was truly static."
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=f"{poses} and {moves} of an instrument with {effects}. The truth below is not in the log.",
+        verdict=verdict_of(findings, what, what.rstrip("."), "NOT TO BE TRUSTED"),
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
+            *((Section("Findings", (findings_block(findings),)),) if findings else ()),
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
-        next_step=_next_step(truth),
+        next_step=_next_step(truth, repeated),
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
@@ -51,8 +60,10 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
     )
 
 
-def _next_step(truth: Truth) -> str:
+def _next_step(truth: Truth, repeated: str) -> str:
     """What the log is for."""
+    if repeated:
+        return f"Compare the recording with its digital twin: `trihedron diagnose {repeated} --against LOG`."
     if len(truth.poses) == len(truth.segments):
         return "Identify the noise of the log: `trihedron allan LOG`; compare with the truth (--truth FILE keeps it)."
     asked = f"`trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} -o calibration.json`"
