@@ -9,7 +9,9 @@ _LOOK = (
     "`trihedron diagnose LOG` tests which effects explain the error."
 )
 _ADD_POSES = "Add poses with {advice:numbered}."
-_FACES_OR_POSES = "{are_faces:?These are six faces of a case: calibrate with --method faces, or add|Add} poses with "
+_FACES_OR_POSES = (
+    "{are_faces:?These are six faces of a case: run `trihedron calibrate LOG --method faces`. Or add|Add} poses with "
+)
 _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {

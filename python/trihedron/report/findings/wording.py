@@ -173,5 +173,7 @@ def _plural(noun: str) -> str:
 
 
 def opening(text: str) -> str:
-    """The first clause of a text, without a full stop."""
-    return re.split(r"(?<=\D)\. (?=[A-Z])|; ", text, maxsplit=1)[0].rstrip(".")
+    """The first clause of a text, without a full stop; what is in parentheses is not cut."""
+    ends = (found.start() for found in re.finditer(r"(?<=\D)\. (?=[A-Z])|; ", text))
+    end = next((at for at in ends if text.count("(", 0, at) == text.count(")", 0, at)), len(text))
+    return text[:end].rstrip(".")
