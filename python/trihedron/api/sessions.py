@@ -22,7 +22,7 @@ from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCali
 from trihedron.records.progress import Progress
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
-from trihedron.records.sessions import By, Change, Session
+from trihedron.records.sessions import GEOMETRY, By, Change, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
@@ -34,8 +34,6 @@ LEFT_BY_S_AND_B = (
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.GYRO_BIAS_DRIFT,
 )
-GEOMETRY = ("accel-misalignment", "gyro-misalignment", "triad-alignment")
-"""Ids of parameters that the package and the board fix."""
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
 resolution of 0.1 to 0.5 °C."""

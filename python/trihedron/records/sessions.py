@@ -47,6 +47,8 @@ PARAMETERS: tuple[Parameter, ...] = (
 )
 """Order of every parameter vector: 9 of the accelerometer, 9 of the gyro, 3 of the rotation between them. A scale is
 the natural logarithm of raw units per SI unit: differences of it are relative."""
+GEOMETRY = ("accel-misalignment", "gyro-misalignment", "triad-alignment")
+"""Ids of parameters that the package and the board fix: they differ between devices."""
 
 
 @dataclass(frozen=True, eq=False)

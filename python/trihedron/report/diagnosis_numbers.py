@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
+from trihedron.records.sessions import GEOMETRY
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
@@ -99,6 +100,12 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     more = [f"{left} more"] if left > 0 else []
     more += [f"{how_many(quieter, 'figure')} of noise and sampling"] if quieter else []
     return [*numbers[:MOST_NUMBERS], *named, *more]
+
+
+def of_another_device(diagnosis: Diagnosis, model: str) -> str:
+    """Advice where a calibration file, the ``model``, differs in what the package fixes; else empty."""
+    differs = model.endswith(".json") and any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
+    return "Check that the calibration is of this device: its axes have other directions. " if differs else ""
 
 
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:

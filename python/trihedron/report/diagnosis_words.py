@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut, not_explained
 from trihedron.records.finding import FindingCode
 from trihedron.report.calibration import errors_in_words
-from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
+from trihedron.report.diagnosis_numbers import differing_in_short, n_differing, of_another_device
 from trihedron.report.document import Headline, Level, action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print, variable_in_print
@@ -132,7 +132,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         steps.append(
             f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`."
             if improved
-            else f"Take over {said}: {_taken_by(model)}."
+            else f"{of_another_device(diagnosis, model)}Take over {said}: {_taken_by(model)}."
         )
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
