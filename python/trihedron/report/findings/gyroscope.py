@@ -5,7 +5,8 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 _CONTRADICTING = "rotations that contradict each other, or a start far from the truth."
 _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
-    "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity."
+    "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity; or samples "
+    "that were lost without a trace in the timestamps."
 )
 _BIAS_CHANGES = "warm-up, bias drift, or a bias that depends on attitude (g-sensitivity)."
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
