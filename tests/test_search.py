@@ -98,6 +98,15 @@ def test_a_long_delay_is_a_delay_of_that_length():
         assert effect.share is None or 0.0 <= effect.share <= 1.0
 
 
+def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
+    """Columns of the readings, which contain the effect, gave a cubic of 8 σ beside it."""
+    effects = diagnosed("gyro-scale-nonlinearity", 3, c2=[0.0, 0.02, 0.0]).effects
+    found = next(one for one in effects if one.id == "gyro-scale-nonlinearity")
+    sizes = {one.name: one for one in found.parameters}
+    assert abs(sizes["quadratic_y"].value - 0.02) < 4.0 * sizes["quadratic_y"].std
+    assert all(abs(one.value) < 4.0 * one.std for name, one in sizes.items() if name.startswith("cubic"))
+
+
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
     recording, truth = simulated("gyro-scale-nonlinearity", 3, 16, c3=(3e-3, -3e-3, 3e-3))
     # The gyro's bias is another in every pose.
