@@ -303,6 +303,8 @@ def _with_time_constant(
         decay = np.exp(-x / tau)
         change = decay - decay.mean()
         length[i], share[i] = np.linalg.norm(change), decay.mean()
+        if length[i] == 0.0:
+            continue  # all blocks are long after the move
         reading[i], slope[i] = (change @ upward.mean[blocks, 0], change @ x) / length[i]
     used = length > 0.0
     n, dof = int(used.sum()), int(used.sum()) - 3
