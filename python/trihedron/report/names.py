@@ -36,14 +36,21 @@ FINDINGS = {
     "filter-noise-unsettled": "search not settled",
     "gravity-defaulted": "gravity not given",
     "held-out-worse": "tilt error after rotations above noise",
+    "log-drift": "drift over the log",
+    "log-jump": "jumps of the level",
+    "log-motion": "motion or vibration in the log",
     "not-tested": "parameters that this log does not test",
     "non-finite": "rows without time",
     "reference-apart": "reference deviates in a part of the log",
     "reference-misfit": "parts of the log disagree",
     "reference-of-itself": "reference in the log's own file",
+    "spectrum-low-pass": "low-pass in the spectrum",
+    "spectrum-unexplained": "spectrum unlike the fitted terms",
+    "table-tilt": "faces that contradict each other",
     "time-duplicate": "equal timestamps",
     "time-unit-detected": "time unit uncertain",
     "turn-not-a-multiple": "turn excluded",
+    "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
 SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.files.calibration import plain
-from trihedron.records.plan import ExperimentPlan, PosePlan
+from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan
 from trihedron.report.chart import Chart, Line, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.numbers import MINUS, plain_number
@@ -17,6 +17,8 @@ from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2,
 ALL_NUMBERS = 9
 """Number of parameters of a triad: scales, angles and biases."""
 FEWEST_SETS = 2
+LEAST_WORTH = 0.01
+"""Uncertainty of a scale from which an experiment adds little: data sheets state 1 to 3 % without one."""
 
 
 def plan_report(plan: ExperimentPlan) -> Document:
@@ -33,8 +35,9 @@ def plan_report(plan: ExperimentPlan) -> Document:
             f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
         verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's "
-        f"scale to {_percent(turns.scale)}.",
+        f"scale to {_percent(turns.scale)}{_beside_moves(plan)}.",
         is_trustworthy=True,
+        stated_level="usable" if best is None or max(best.scale, turns.scale) > LEAST_WORTH else "good",
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
         next_step=_next_step(plan),
@@ -74,11 +77,25 @@ def _enough(best: PosePlan | None) -> str:
     )
 
 
-def _next_step(plan: ExperimentPlan) -> str:
-    """How to record the poses, and what to do between them for the gyro: the moves that determine it best."""
-    step = "Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses."
+def _best_moves(plan: ExperimentPlan) -> MovePlan | None:
+    """The moves that determine the gyro best; None where none determine all of it."""
     moves = min(plan.moves, key=lambda one: (-one.rank, one.scale), default=None)
-    if moves is None or moves.rank < ALL_NUMBERS:
+    return moves if moves is not None and moves.rank == ALL_NUMBERS else None
+
+
+def _beside_moves(plan: ExperimentPlan) -> str:
+    """That moves between poses give more than turns, whose angle is too uncertain."""
+    moves = _best_moves(plan)
+    if moves is None or moves.scale >= plan.turns.scale:
+        return ""
+    return f", {moves.n_moves} moves between poses to {_percent(moves.scale)}: turn between poses instead"
+
+
+def _next_step(plan: ExperimentPlan) -> str:
+    """How to record the poses, and what to do between them for the gyro."""
+    step = "Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses."
+    moves = _best_moves(plan)
+    if moves is None:
         return step
     return (
         f"{step} For the gyro, turn the sensor between them about each level axis in turn, {moves.name}: "
