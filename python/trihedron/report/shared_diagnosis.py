@@ -69,7 +69,7 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         stated_level="bad" if doubted else "usable" if found.effects or alone else "good",
         headlines=(
             Headline("recordings", str(len(found.diagnoses)), "", f"{len(alone)} with effects of their own"),
-            Headline("shared effects", str(len(own)), "", "of the instrument"),
+            Headline("shared effects", str(len(own)), "", f"of the {owner}"),
         ),
         lead=_lead(found, names),
         next_step=_next_step(found, own, list(doubted)),
