@@ -33,13 +33,13 @@ from trihedron.records.filter_noise import (
     StaticNoise,
     TiltCheck,
 )
+from trihedron.records.noise import LEAST_S
 from trihedron.units import rate_to_si
 
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 HORIZONS_S = (1.0, 10.0, 60.0)
 BAND_PART = 0.25
 """Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
-SHORTEST_REST_S = 20.0
 FILE_PART = 1.1
 """Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
 CONSISTENT = (1.0, 9.0)
@@ -121,7 +121,7 @@ def filter_noise(
             why = (
                 "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)"
                 if rate_to_si(recording.gyroscope_unit) is None
-                else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
+                else f"the sensor is not static in it for {LEAST_S:.0f} s"
             )
             remedy = (
                 "for static values run `trihedron allan` on a static log of ten minutes or more"
@@ -172,7 +172,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
         return None
     longest = max(segments.poses, key=lambda pose: pose.stop - pose.start)
     at = slice(longest.start, longest.stop)
-    if recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < SHORTEST_REST_S:
+    if recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < LEAST_S:
         return None
     part = Recording.from_arrays(
         recording.time_s[at],
