@@ -101,6 +101,9 @@ def identify_noise(
             f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {FEWEST_READINGS} are "
             "needed, an hour or more is useful"
         )
+    heat = None if temperature_degc is None else as_readings(temperature_degc)
+    if heat is not None and heat.shape != (n, 1):
+        raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, heat.shape))}")
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
@@ -124,8 +127,8 @@ def identify_noise(
                 )
             )
         findings += _motion(seen, rate_hz)
-        if temperature_degc is not None:
-            findings += _heated(seen, np.asarray(temperature_degc, dtype=np.float64))
+        if heat is not None:
+            findings += _heated(seen, heat[:, 0])
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))
     return Noise(
