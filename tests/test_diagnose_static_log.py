@@ -41,6 +41,7 @@ def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named()
     assert {t.domain for t in d.domains} >= {"static-gyro", "static-accel", "within-static"}
     assert not any(t.disagrees for t in d.remaining)
     document = diagnosis_report(d)
+    assert "`trihedron allan LOG`" in document.next_step
     words = {row[0]: row[1] for row in document.sections[0].blocks[0].rows}
     assert words["gyro rate in static poses"] == words["gravity error in static poses"] == "not judged"
     assert words["noise within static poses"] == "agrees"
@@ -87,6 +88,14 @@ def test_a_hum_in_a_static_log_is_named():
     d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert [e.id for e in d.effects] == ["periodic-interference"]
     assert d.effects[0].parameters[0].value == pytest.approx(17.3, abs=1e-3)
+
+
+@pytest.mark.parametrize(("lasts_s", "is_for_noise"), [(6, False), (30, True)])
+def test_only_a_log_long_enough_for_noise_is_sent_to_allan(lasts_s, is_for_noise):
+    log = recording(*still(100 * lasts_s, 100.0, 42))
+    advice = [" ".join(one.action for one in trihedron.check(log).findings)]
+    advice.append(diagnosis_report(trihedron.diagnose(log, gravity_m_s2=9.8)).next_step)
+    assert ["allan" in one for one in advice] == [is_for_noise] * 2
 
 
 def test_a_log_in_motion_names_nothing():

@@ -19,8 +19,9 @@ from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, 
 from trihedron.estimate.filter_noise.stretches import bias_steps
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording
-from trihedron.records.filter_noise import Bounded, StaticNoise
+from trihedron.records.filter_noise import Bounded, Share, StaticNoise
 from trihedron.records.reference import ReferenceMotion
+from trihedron.units import AccelerationUnit, RateUnit
 
 EUROC = Path(__file__).parents[2] / "shared" / "data" / "euroc"
 N, K, SLOW, TAU = 2e-4, 3e-5, 2e-3, 6.0
@@ -146,6 +147,41 @@ def test_an_n_with_a_wide_interval_is_a_warning(found):
     assert FindingCode.FILTER_NOISE_UNCERTAIN not in {one.code for one in found.findings}
     wide = replace(found.sensors[0], N=Bounded(N, N / 2.0, 2.0 * N))
     assert FindingCode.FILTER_NOISE_UNCERTAIN in {one.code for one in noticed([wide])}
+
+
+def test_a_limit_of_n_and_an_error_that_is_the_references_are_warnings(found):
+    limit = replace(found.sensors[0], N=Bounded(0.0, 0.0, 4.0 * N, True))
+    assert any("upper limit" in one.seen for one in noticed([limit]))
+    for share, is_named in ((0.97, True), (0.8, False)):
+        of_reference = (Share("reference", 10.0, Bounded(share, share - 0.1, 1.0)),)
+        said = noticed([replace(found.sensors[0], shares=of_reference)])
+        assert any("what little remains" in one.seen for one in said) is is_named
+
+
+def test_a_horizon_longer_than_the_log_has_no_shares():
+    log, truth = before_a_tracker(5, 45)
+    shares = trihedron.filter_noise(log, reference=truth, gravity_m_s2=G).sensors[0].shares
+    assert {one.horizon_s for one in shares} == {1.0, 10.0}
+
+
+def test_a_warning_about_n_stands_in_the_file_as_on_the_screen(found):
+    gyro = replace(found.sensors[0], N=Bounded(N / 2.0, 0.45 * N, 0.55 * N), static=None)
+    said = next(one for one in noticed([gyro]) if one.code is FindingCode.FILTER_NOISE_BELOW_QUIETEST)
+    text = filter_noise_text(replace(both(found), findings=(said,)), "kalibr")
+    (line,) = [row for row in text.splitlines() if row.startswith("# warning:")]
+    assert f"by {gyro.quietest:.3g} in the filter" in line.replace("e-0", "e-")
+    assert text.isascii()
+
+
+def test_what_a_log_lacks_is_said_at_once():
+    t = np.arange(6000) / 100.0
+    swing = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.1 * t])
+    moving = Recording.from_arrays(
+        t, swing + np.array([0.0, 0.0, G]), swing, gyroscope_unit="counts", accelerometer_unit="m/s^2"
+    )
+    still = replace(resting(3), accelerometer_unit=AccelerationUnit.COUNTS, gyroscope_unit=RateUnit.COUNTS)
+    with pytest.raises(ValueError, match=r"not static in it for 20 s.*reference.*the static log is in counts"):
+        trihedron.filter_noise(moving, static=trihedron.allan(still))
 
 
 def test_an_n_below_the_noise_of_the_quietest_second_is_a_warning(found):

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from contextlib import redirect_stdout
 from dataclasses import replace
 
@@ -46,6 +47,7 @@ def files(log):
 
 def test_the_table_names_every_term_and_the_files_hold_the_same(files):
     out = files["txt"].read_text(encoding="utf-8")
+    assert "export CALIBRATION" not in out  # a static log has none
     for words in ("angle random walk", "bias instability", "accelerometer_noise_density", "best averaging time"):
         assert words in out
     document = json.loads(files["json"].read_text())
@@ -67,6 +69,12 @@ def test_the_terms_come_back_from_the_written_curve_alone(files, capsys):
     table = files["csv"]
     assert main(["allan", str(table), "--curve"]) == 1
     assert "--samples" in capsys.readouterr().err
+    in_counts = table.with_name("counts.csv")
+    in_counts.write_text(re.sub(r"\[[^]]*\]", "[counts]", table.read_text()))
+    assert main(["allan", str(in_counts), "--curve", "--samples", "180000"]) == 0
+    advice = capsys.readouterr().out
+    assert "--gyro-unit UNIT" in advice
+    assert "lsb" not in advice.partition("Result")[0]
     assert main(["allan", str(table), "--curve", "--samples", "180000", "--json"]) == 0
     axes = json.loads(capsys.readouterr().out)["axes"]
     for axis in axes:

@@ -7,8 +7,13 @@ from scipy.stats import chi2
 from noise_coverage import in_time
 from noise_series import series
 from trihedron.estimate.noise.identify import identify_noise
+from trihedron.estimate.noise.selection import binned
+from trihedron.estimate.noise.spectrum import Ordinates
+from trihedron.files.noise import noise_figures
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName
+from trihedron.report.noise import noise_report
+from trihedron.report.noise_files import noise_record
 
 RATE = 100.0
 
@@ -106,6 +111,48 @@ def test_a_log_that_moves_is_not_to_be_trusted(white, tilt, is_moving):
     force += white * np.sqrt(RATE) * rng.normal(size=(n, 3))
     found = identify_noise(force, RATE, names=("accel x", "accel y", "accel z"))
     assert any(f.code is FindingCode.LOG_MOTION and f.severity is Severity.SERIOUS for f in found.findings) is is_moving
+
+
+def of_imu(rng, n, walk=1e-4, up=(0.0, 0.0, 9.81)):
+    """An accelerometer at rest and its names for identify_noise."""
+    x = np.column_stack([series(rng, n, 10.0, N=1e-3, K=walk) for _ in range(3)]) + up
+    return x, {"names": ["accel x", "accel y", "accel z"], "units": ["m/s^2"] * 3}
+
+
+@pytest.mark.parametrize(("per_kelvin", "is_followed"), [(0.02, True), (0.0, False)])
+def test_a_bias_that_follows_a_logged_temperature_is_named(per_kelvin, is_followed):
+    x, named = of_imu(np.random.default_rng(11), 36_000)
+    temperature = 25.0 + 20.0 * np.sin(np.linspace(0.0, 5.0, len(x)))
+    x[:, 1] += per_kelvin * (temperature - 25.0)
+    # Logged once a second, and the ends left out by hand: half of the log is enough.
+    temperature[np.arange(len(x)) % 10 > 0] = np.nan
+    found = identify_noise(x, 10.0, **named, temperature_degc=temperature, exclude_s=[(0.0, 1800.0)])
+    said = [one.seen for one in found.findings if one.code is FindingCode.TEMPERATURE_DRIVEN]
+    assert [("accel Y" in one, "accel X" in one) for one in said] == ([(True, False)] if is_followed else [])
+    assert found.has_slow_noise_only is not is_followed
+    text, figures = str(noise_report(found)), noise_figures(noise_record(found))[0]
+    assert ("N alone" in text) is is_followed
+    # What a filter's file gets as K is an upper limit then, and N is what it was.
+    assert not figures["accelerometer"].N.is_limit
+    assert figures["accelerometer"].K.is_limit or not is_followed
+
+
+def test_a_unit_that_is_turned_over_during_the_log_is_named_with_the_stretch_to_keep():
+    x, named = of_imu(np.random.default_rng(12), 18_000)
+    x[12_000:] += (9.81, 0.0, -9.81)
+    (said,) = [one for one in identify_noise(x, 10.0, **named).findings if one.code is FindingCode.LOG_TURNED]
+    stop_s = said.numbers["stop_s"]
+    assert 1150.0 < stop_s <= 1200.0
+    assert said.action.endswith(f"with --exclude {stop_s:.0f}:.")
+    whole = identify_noise(x, 10.0, **named, exclude_s=[(stop_s, np.inf)])
+    assert whole.has_slow_noise_only
+
+
+def test_a_log_too_short_for_what_its_filter_leaves_is_refused_with_a_length():
+    one = np.linspace(0.1, 1.0, 10)
+    band = Ordinates(one, one, one, one, one, np.arange(10), 100, 0.01, 1)
+    with pytest.raises(ValueError, match=r"1 s are too short.* record 20 s or more"):
+        binned([band], 0.05)
 
 
 def test_a_periodic_line_is_found_with_its_amplitude(quiet):

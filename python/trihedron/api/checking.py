@@ -9,6 +9,7 @@ from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_sta
 from trihedron.api.reading import AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
+from trihedron.records.noise import least_length_s
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
@@ -46,7 +47,12 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     recording = recording_of(recording)
     segments = segment(recording, progress=progress)
     duration_s = float(recording.time_s[-1] - recording.time_s[0])
-    static = Finding.of(FindingCode.NOT_FIT, "static-log", duration_s=duration_s)
+    least_s = least_length_s(recording.rate_hz)
+    static = (
+        Finding.of(FindingCode.NOT_FIT, "static-log", duration_s=duration_s)
+        if duration_s >= least_s
+        else Finding.of(FindingCode.NOT_FIT, "short-static-log", duration_s=duration_s, least_s=least_s)
+    )
     # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)

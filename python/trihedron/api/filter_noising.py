@@ -25,6 +25,7 @@ from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise, read_noise_findings
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
+    RANKED_S,
     BiasModel,
     Bounded,
     FilterNoise,
@@ -33,17 +34,21 @@ from trihedron.records.filter_noise import (
     StaticNoise,
     TiltCheck,
 )
+from trihedron.records.noise import LEAST_S, NOT_OF_THE_SENSOR
 from trihedron.units import rate_to_si
 
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 HORIZONS_S = (1.0, 10.0, 60.0)
 BAND_PART = 0.25
 """Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
-SHORTEST_REST_S = 20.0
 FILE_PART = 1.1
 """Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
 CONSISTENT = (1.0, 9.0)
 """Acceptable NEES (3 expected, within a factor of three): outside, the covariance misleads a filter."""
+IN_COUNTS = (
+    "the static log is in counts: give the JSON of `trihedron allan LOG` with --calibration FILE, or with --gyro-lsb "
+    "and --accel-lsb, the sizes of a count"
+)
 UNCERTAIN = math.sqrt(CONSISTENT[1] / CONSISTENT[0])
 """Upper over lower end of N's interval whose every N leaves the NEES, which goes with N⁻², within those limits."""
 
@@ -108,6 +113,8 @@ def filter_noise(
         static = allan(read(static))
     segments = None if static is not None and reference is not None else _segments(recording)
     own = None if segments is None else _of_rest(recording, segments)
+    if reference is None and own is None:
+        raise InputError(_no_noise(recording, segments, static))
     known = _static(static) if static is not None else _sensors(own)
     findings = (*recording.findings, *_doubts(static), *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
@@ -117,21 +124,7 @@ def filter_noise(
         sensors = beside_reference(recording, motion, asked)
         source, findings = motion.source, (*findings, *motion.findings, *noticed(sensors))
     else:
-        if own is None:
-            why = (
-                "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)"
-                if rate_to_si(recording.gyroscope_unit) is None
-                else f"the sensor is not static in it for {SHORTEST_REST_S:.0f} s"
-            )
-            remedy = (
-                "for static values run `trihedron allan` on a static log of ten minutes or more"
-                if static is None
-                else "static values alone are those of `trihedron allan`"
-            )
-            raise InputError(
-                f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
-                f"beside it (--reference); {remedy}."
-            )
+        assert own is not None
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
@@ -159,6 +152,25 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
         )
 
 
+def _no_noise(recording: Recording, segments: Segments | None, static: Noise | str | os.PathLike[str] | None) -> str:
+    """All that is missing where a log shows no noise of its own; with a reference counts do."""
+    is_static = _longest_rest(recording, segments) is not None
+    why = (
+        "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)"
+        if is_static and rate_to_si(recording.gyroscope_unit) is None
+        else f"the sensor is not static in it for {LEAST_S:.0f} s"
+    )
+    remedy = "; for static values run `trihedron allan` on a static log of ten minutes or more"
+    if static is not None:
+        remedy = "; static values alone are those of `trihedron allan`"
+        if isinstance(static, Noise) and not _sensors(static):
+            remedy = f", and {IN_COUNTS}"
+    return (
+        f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
+        f"beside it (--reference){remedy}."
+    )
+
+
 def _segments(recording: Recording) -> Segments | None:
     try:
         return segment(recording)
@@ -166,13 +178,19 @@ def _segments(recording: Recording) -> Segments | None:
         return None
 
 
+def _longest_rest(recording: Recording, segments: Segments | None) -> slice | None:
+    """Samples of the longest static interval; None where it is shorter than ``LEAST_S``."""
+    poses = () if segments is None else segments.poses
+    longest = max(poses, key=lambda pose: pose.stop - pose.start, default=None)
+    if longest is None or recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < LEAST_S:
+        return None
+    return slice(longest.start, longest.stop)
+
+
 def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
     """Noise of the longest static interval; None where none is long enough."""
-    if not segments.poses:
-        return None
-    longest = max(segments.poses, key=lambda pose: pose.stop - pose.start)
-    at = slice(longest.start, longest.stop)
-    if recording.time_s[longest.stop - 1] - recording.time_s[longest.start] < SHORTEST_REST_S:
+    at = _longest_rest(recording, segments)
+    if at is None:
         return None
     part = Recording.from_arrays(
         recording.time_s[at],
@@ -206,19 +224,18 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         )
     known = _sensors(given)
     if not known:
-        raise InputError(
-            f"{given.source}: the static log is in counts; give the JSON of `trihedron allan LOG` with --calibration "
-            "FILE, or with --gyro-lsb and --accel-lsb, the sizes of a count."
-        )
+        raise InputError(f"{given.source}: {IN_COUNTS}.")
     return known
 
 
 def _doubts(static: Noise | str | os.PathLike[str] | None) -> tuple[Finding, ...]:
-    """Serious findings on the static log."""
+    """Serious findings on the static log, and those of what is in its K beside noise."""
     if static is None:
         return ()
     said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
-    return tuple(finding for finding in said if finding.severity is Severity.SERIOUS)
+    return tuple(
+        finding for finding in said if finding.severity is Severity.SERIOUS or finding.code in NOT_OF_THE_SENSOR
+    )
 
 
 def _bounded(figure: NoiseFigure) -> Bounded:
@@ -254,10 +271,18 @@ def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     for one in sensors:
         if not one.is_settled:
             out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
-        if not one.N.is_limit and one.N.upper > one.N.lower * UNCERTAIN:
+        if one.N.is_limit:
+            out.append(Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", sensor=one.sensor, upper=one.N.upper))
+        elif one.N.upper > one.N.lower * UNCERTAIN:
             lower, upper, value = one.N.lower, one.N.upper, one.N.value
             said = Finding.of(
                 FindingCode.FILTER_NOISE_UNCERTAIN, sensor=one.sensor, in_file=value, lower=lower, upper=upper
+            )
+            out.append(said)
+        elif (mostly := _mostly_reference(one)) is not None:
+            share, horizon_s = mostly
+            said = Finding.of(
+                FindingCode.FILTER_NOISE_UNCERTAIN, "reference", sensor=one.sensor, share=share, horizon_s=horizon_s
             )
             out.append(said)
         if one.static is None:
@@ -287,6 +312,16 @@ def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
                 )
             )
     return tuple(out)
+
+
+def _mostly_reference(one: SensorFilterNoise) -> tuple[float, float] | None:
+    """Share of the reference's own error and horizon [s], where it is so large that N and K off by ``UNCERTAIN`` change
+    the whole error by less; over the horizon nearest ``RANKED_S``."""
+    shares = [
+        (abs(s.horizon_s - RANKED_S), s.share.filter_value, s.horizon_s) for s in one.shares if s.cause == "reference"
+    ]
+    _, share, horizon_s = min(shares, default=(0.0, 0.0, 0.0))
+    return (share, horizon_s) if share > UNCERTAIN**2 * (1.0 - share) else None
 
 
 def _uncalibrated(one: SensorFilterNoise) -> tuple[float, float] | None:

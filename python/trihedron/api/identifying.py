@@ -14,7 +14,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import InputError
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit
+from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit, temperature_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
@@ -99,6 +99,7 @@ def allan(
         exclude_s=exclude_s,
         automatic=automatic,
         clusters=clusters,
+        temperature_degc=temperature_of(recording),
         source=recording.source,
     )
     # Findings about the log come before those about its noise.

@@ -10,7 +10,7 @@ from trihedron.documents import read_json
 from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
 from trihedron.records.finding import Finding
-from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import NOT_OF_THE_SENSOR, GaussMarkov, NoiseAxis, NoiseTerm, TermName
 from trihedron.records.plain import from_plain
 
 MEANT = "name a file written by `trihedron allan --json`"
@@ -25,7 +25,7 @@ class NoiseFileError(InputError):
 def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], float]:
     """White density and random walk of each sensor (root mean square of its axes), and the rate [Hz] of the static log.
 
-    For a term that was not detected the value is the upper limit from the log.
+    For a term that was not detected, and for K with temperature or a turn in it, the value is an upper limit.
 
     Raises ``InputError`` when the file is missing or is not what ``trihedron allan --json`` writes, or its readings
     are not in SI.
@@ -40,8 +40,9 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
     """
     try:
         axes = document["axes"]
+        is_limit = any(one["code"] in NOT_OF_THE_SENSOR for one in document.get("findings", ()))
         out = {
-            sensor: SensorNoise(_figure(axes, unit, "N"), _figure(axes, unit, "K"))
+            sensor: SensorNoise(_figure(axes, unit, "N"), _figure(axes, unit, "K", is_limit=is_limit))
             for unit, sensor in _SENSORS.items()
             if any(axis["unit"] == unit for axis in axes)
         }
@@ -106,10 +107,10 @@ def _term(symbol: TermName, said: dict[str, Any]) -> NoiseTerm:
     return NoiseTerm(symbol=symbol, is_present=bool(said["present"]), **figures)
 
 
-def _figure(axes: list[dict[str, Any]], unit: str, term: str) -> NoiseFigure:
+def _figure(axes: list[dict[str, Any]], unit: str, term: str, *, is_limit: bool = False) -> NoiseFigure:
     terms = [axis["terms"][term] for axis in axes if axis["unit"] == unit]
     if all(t["present"] for t in terms):
-        return NoiseFigure(_rms([float(t["value"]) for t in terms]))
+        return NoiseFigure(_rms([float(t["value"]) for t in terms]), is_limit)
     return NoiseFigure(_rms([max(float(t["limit"]), float(t["value"])) for t in terms]), is_limit=True)
 
 

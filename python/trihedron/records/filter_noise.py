@@ -11,6 +11,8 @@ Cause = Literal["static", "vibration", "bias", "temperature", "calibration", "g-
 CAUSES: tuple[Cause, ...] = ("static", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
 """Noise as in static intervals, vibration, bias drift, its part that follows a logged temperature,
 errors of S, errors by g-sensitivity, the reference's own error."""
+RANKED_S = 10.0
+"""Horizon [s] by which causes are ranked: longer than a camera is blind, shorter than a bias drifts."""
 
 
 @dataclass(frozen=True)

@@ -148,6 +148,7 @@ class FindingCode(str, Enum):
     LOG_DRIFT = "log-drift"
     LOG_MOTION = "log-motion"
     LOG_TOO_SHORT = "log-too-short"
+    LOG_TURNED = "log-turned"
     TEMPERATURE_DRIVEN = "temperature-driven"
     SPECTRAL_LINE = "spectral-line"
     SPECTRUM_LOW_PASS = "spectrum-low-pass"

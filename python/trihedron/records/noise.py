@@ -11,10 +11,20 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
+
+FEWEST_READINGS, LEAST_S = 512, 20.0
+"""Fewest readings for the separation of noise terms, and least length of a log whose terms are of use."""
+NOT_OF_THE_SENSOR = (FindingCode.TEMPERATURE_DRIVEN, FindingCode.LOG_TURNED)
+"""Findings of a log whose slow changes are not noise: B, K and R are upper limits of the sensor's own."""
+
+
+def least_length_s(rate_hz: float) -> float:
+    """Least length [s] of a static log for its noise terms."""
+    return max(LEAST_S, FEWEST_READINGS / rate_hz)
 
 
 class TermName(str, Enum):
@@ -270,6 +280,11 @@ class Noise(Presented):
             if axis.name == name:
                 return axis
         raise KeyError(f"no axis {name!r}; there are {', '.join(axis.name for axis in self.axes)}")
+
+    @property
+    def has_slow_noise_only(self) -> bool:
+        """Whether slow changes are noise: neither temperature nor a turn of the unit is in B, K and R."""
+        return not any(finding.code in NOT_OF_THE_SENSOR for finding in self.findings)
 
     @property
     def is_trustworthy(self) -> bool:

@@ -3,10 +3,10 @@
 from pathlib import PurePath
 from shlex import quote
 
-from trihedron.records import Calibration, Finding, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut, not_explained
-from trihedron.records.finding import FindingCode
+from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing, of_another_device
 from trihedron.report.document import Headline, Level, action_in_words
@@ -120,7 +120,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return _dependent(diagnosis) or (keep if diagnosis.parameters else use)
     if diagnosis.verdict == "not-testable":
         record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
-        return f"{record}; the noise of this log: `trihedron allan LOG`."
+        log = getattr(diagnosis, "recording", None)
+        is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
+        return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "unexplained":
         experiments = [one.experiment for one in diagnosis.relations if one.experiment]
         again = "Record again: what returns belongs to the sensor, what does not to the session."

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.records.filter_noise import Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
+from trihedron.records.filter_noise import RANKED_S, Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
 from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
@@ -206,8 +206,8 @@ def _percent(one: Bounded) -> str:
 
 
 def _ranked(one: SensorFilterNoise) -> list[Share]:
-    """Shares at ten seconds (or the nearest horizon), the largest first, upper limits last."""
-    near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - 10.0))
+    """Shares at ``RANKED_S`` (or the nearest horizon), the largest first, upper limits last."""
+    near = min({share.horizon_s for share in one.shares}, key=lambda h: abs(h - RANKED_S))
     return sorted(
         (s for s in one.shares if s.horizon_s == near), key=lambda s: (s.share.is_limit, -s.share.filter_value)
     )

@@ -19,10 +19,14 @@ _NO_UNIT = (
     "The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
-NEXT = """Take N, B, K into a filter: `trihedron export CALIBRATION --to kalibr --noise NOISE.json -o imu.yaml`, with \
-NOISE.json of `... --json NOISE.json`; average for no longer than the best averaging time."""
+LINES = "(section Kalibr, in `... --full` and in --report)"
+NEXT = f"Take N, B, K into a filter {LINES}; average for no longer than the best averaging time."
+N_ALONE = f"Take N alone into a filter {LINES}."
+IN_SLOW_NOISE = {FindingCode.TEMPERATURE_DRIVEN: "the temperature", FindingCode.LOG_TURNED: "a turn of the unit"}
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
+SAY_UNITS = "State the unit of the deviations, for terms in SI: `... --gyro-unit UNIT --accel-unit UNIT`."
+"""For a curve, which has no counts."""
 BEYOND = "beyond the log"
 """An averaging time at which the fitted sum still falls."""
 MOST_ROWS = 12
@@ -43,7 +47,6 @@ def noise_report(
         facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))
     facts += _coloured(noise)
     groups = _groups(noise)
-    has_units = all(customary(TermName.WHITE, axis.unit) for axis in noise.axes)
     tables: list[Block] = [Facts(tuple(facts))]
     for unit, axes in groups:
         tables += [_terms_table(axes, unit), _answers_table(axes, unit)]
@@ -56,7 +59,7 @@ def noise_report(
         is_trustworthy=noise.is_trustworthy,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
-        next_step=(NEXT if has_units else SAY_COUNTS) if noise.is_trustworthy else "",
+        next_step=_next(noise) if noise.is_trustworthy else "",
         sections=(
             Section("Result", tuple(tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
@@ -73,7 +76,17 @@ def _usable(noise: Noise) -> str:
     """The verdict with warnings: how far white noise is determined, on the worst axis."""
     white = [axis.terms[TermName.WHITE] for axis in noise.axes]
     sigma = max((one.sigma / one.value for one in white if one.is_present), default=0.0)
-    return f"Usable: white noise N to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)" if sigma else "Usable"
+    causes = " and ".join(words for code, words in IN_SLOW_NOISE.items() if any(f.code is code for f in noise.findings))
+    said = f"white noise N{' alone,' if causes else ''} to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)"
+    return "Usable" + (f": {said}" if sigma else "") + (f": B, K and R contain {causes}" if causes else "")
+
+
+def _next(noise: Noise) -> str:
+    """Use of the terms; what is missing for terms in SI, or for those of slow noise."""
+    if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
+        return SAY_UNITS if any(f.code is FindingCode.CURVE_ALONE for f in noise.findings) else SAY_COUNTS
+    actions = [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]
+    return " ".join([N_ALONE, *actions]) if actions else NEXT
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
@@ -263,6 +276,8 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
             values = [axis.value(term) for axis in axes]
             if all(axis.terms[term].is_present for axis in axes):
                 words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"
+                if term is TermName.RATE_RANDOM_WALK and not noise.has_slow_noise_only:
+                    per += ", upper limit: it contains temperature or a turn"
             else:
                 limit = math.sqrt(float(np.mean([max(a.terms[term].limit, a.value(term)) ** 2 for a in axes])))
                 words, per = f"{limit:.2g}", f"{per}, upper limit on an axis"

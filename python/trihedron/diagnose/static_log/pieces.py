@@ -10,6 +10,7 @@ from trihedron.diagnose.context import TEMPERATURE_WINDOW_S, smoothed_slope
 from trihedron.diagnose.static_log.process import BiasReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
+from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 
 N_PIECES = 80
 """Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and fast."""
@@ -22,12 +23,10 @@ QUIET_QUANTILE, LOUD = 0.2, 4.0
 changes by a factor of two over a hundred kelvin."""
 TURNS_RAD = 0.02
 """Angle between the halves of a moving piece, at least: a bias that drifts by 0.1 g in a log causes a tenth of it."""
-SAME_POSE_RAD = 0.12
-"""Angle below which pieces have one orientation (7°): a bias that drifts by 0.1 g turns the force by less."""
 MOSTLY_STILL = 0.6
 """Share of a log that must be static: in one that moves, slow motion would count as static."""
-LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
-"""Share and number of pieces below which an orientation is handling."""
+FEWEST_OF_POSE = 4
+"""Number of pieces below which an orientation is handling."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,10 +150,13 @@ def _sensor(
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
     tilt = None if is_gyro else asked.gravity_m_s2 * np.array([1.0, white_rad * np.sqrt(BLOCK_S)])
-    warm = of_temperature(stretches, found, asked.horizons_s)
+    # Of a horizon longer than every stretch nothing is seen.
+    longest_s = max(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
+    horizons = [h for h in asked.horizons_s if h <= longest_s]
+    warm = of_temperature(stretches, found, horizons)
     shares = tuple(
         share
-        for h in asked.horizons_s
+        for h in horizons
         for share in shares_over(
             {**parts_of(draws, h, tilt, turned_alike(stretches, h)), **left.get(h, {}), **warm.get(h, {})}, h
         )
@@ -297,7 +300,7 @@ def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
     step_s = float(np.median(np.diff(stretches[0].time_s)))
     alike = []
     for ahead in range(max(1, round(horizon_s / step_s)) + 1):
-        pairs = [(one.attitude[ahead:], one.attitude[: len(one.attitude) - ahead]) for one in stretches]
+        pairs = [(one.attitude[ahead:], one.attitude[: max(len(one.attitude) - ahead, 0)]) for one in stretches]
         starts = sum(len(later) for later, _ in pairs)
         alike.append(sum(float(np.sum(later * before)) for later, before in pairs) / (3.0 * max(starts, 1)))
     return np.array(alike)

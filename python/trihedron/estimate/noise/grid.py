@@ -48,6 +48,12 @@ def readings_of(
     return _with_gaps(together, recording), tuple(names), tuple(units)
 
 
+def temperature_of(recording: Recording) -> FloatArray | None:
+    """The logged temperature (n,) on the same grid, if there is one."""
+    logged = recording.temperature_degc
+    return None if logged is None else _with_gaps(logged[:, None], recording)[:, 0]
+
+
 def _with_gaps(readings: FloatArray, recording: Recording) -> FloatArray:
     steps = np.diff(recording.time_s) * recording.rate_hz
     late = np.flatnonzero(steps > 1.5)

@@ -19,6 +19,7 @@ from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_b
 from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import (
     Event,
+    other_orientation,
     readout,
     repeated_rows,
     shaken,
@@ -26,81 +27,16 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
+from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import Noise, NoiseAxis
-
-# Warm-up of the bias: an exponential approach, separated from a random walk by likelihood.
-MEANS = 64
-"""Number of means of equal length for the test: their noise is white noise and a random walk."""
-LEAST = 32
-"""Fewest of them with readings."""
-WALKS = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 29)])
-"""Random walk variances from mean to mean that are tried, in units of the white variance of a mean."""
-TIMES = np.geomspace(0.02, 0.5, 15)
-"""Time constants that are tried, in lengths of the log: a slower warm-up is like a straight line or a walk."""
-EARNED = 20.0
-"""Least rise of twice the log-likelihood, with the search over time constants. Of 900 logs without a warm-up, 450 of
-them with a walk, four reach 16."""
-
-
-@dataclass(frozen=True)
-class WarmUp:
-    """A bias that changes by ``size`` over the log, as 1 - exp(-t/``time_s``)."""
-
-    size: float
-    time_s: float
-
-    def at(self, t: FloatArray) -> FloatArray:
-        """(n,) bias relative to its final value, at times (n,) [s] after the first reading."""
-        return -self.size * np.exp(-t / self.time_s)
-
-
-def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:
-    """The warm-up of readings ``x`` (n,), NaN where missing; ``None`` where a straight line with a random walk and
-    white noise of any strength explains them as well."""
-    n = len(x) // MEANS
-    if n < 1:
-        return None
-    blocks = x[: n * MEANS].reshape(MEANS, n)
-    count = np.isfinite(blocks).sum(axis=1)
-    held = 2 * count >= n
-    if np.count_nonzero(held) < LEAST:
-        return None
-    y = np.nansum(blocks[held], axis=1) / count[held]
-    t = (np.flatnonzero(held) + 0.5) / MEANS
-    walk = MEANS * np.minimum.outer(t, t)
-    columns = np.column_stack([y, np.ones_like(t), t, np.exp(-t[:, None] / TIMES)])
-    without, tried = [], []
-    for strength in WALKS:
-        factor = np.linalg.cholesky(np.eye(len(t)) + strength * walk)
-        white = np.linalg.solve(factor, columns)
-        constant = -float(np.sum(np.log(np.diag(factor))))
-        without.append(constant + _fitted(white[:, :3])[0])
-        for k, time in enumerate(TIMES):
-            likelihood, weight = _fitted(white[:, [0, 1, 2, 3 + k]])
-            tried.append((constant + likelihood, weight, float(time)))
-    best, weight, time = max(tried)
-    if 2.0 * (best - max(without)) < EARNED:
-        return None
-    return WarmUp(-weight, time * MEANS * n / rate_hz)
-
-
-def _fitted(white: FloatArray) -> tuple[float, float]:
-    """Log-likelihood of whitened means (first column) regressed on the other columns, free scale; last coefficient."""
-    weight, _, _, _ = np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)
-    left = float(np.sum((white[:, 0] - white[:, 1:] @ weight) ** 2))
-    k = len(white)
-    return float(-0.5 * k * np.log(max(left, 1e-300) / k)), float(weight[-1])
-
+from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
 
 ACCELEROMETER = ("accel x", "accel y", "accel z")
 """Names of the channels that show gravity."""
 MOST_DISTURBED = 0.25
 """Largest share of an axis that is excluded automatically."""
-SHORTEST = 512
-"""Fewest readings for the separation of noise terms."""
 
 
 def identify_noise(
@@ -112,6 +48,7 @@ def identify_noise(
     exclude_s: Sequence[tuple[float, float]] = (),
     automatic: bool = True,
     clusters: Sequence[int] | None = None,
+    temperature_degc: npt.ArrayLike | None = None,
     source: str = "memory",
 ) -> Noise:
     """Identify the noise terms of every channel of a static log by maximum likelihood (docs/noise.md, section 3).
@@ -130,6 +67,8 @@ def identify_noise(
         Exclude impacts and intervals of vibration, and start a new level at each step; each is a finding.
     clusters : (k,) of int, optional
         Readings per cluster of the Allan curve.
+    temperature_degc : (n,), optional
+        Temperature of the sensor, NaN where missing: where slow changes follow it, a finding says so.
     source : str
         Name of the log, for reports.
 
@@ -157,11 +96,14 @@ def identify_noise(
     units = tuple(units) or ("",) * channels
     if len(names) != channels or len(units) != channels:
         raise InputError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
-    if n < SHORTEST:
+    if n < FEWEST_READINGS:
         raise InputError(
-            f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {SHORTEST} are "
+            f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {FEWEST_READINGS} are "
             "needed, an hour or more is useful"
         )
+    heat = None if temperature_degc is None else as_readings(temperature_degc)
+    if heat is not None and heat.shape != (n, 1):
+        raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, heat.shape))}")
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
@@ -185,6 +127,8 @@ def identify_noise(
                 )
             )
         findings += _motion(seen, rate_hz)
+        if heat is not None:
+            findings += _heated(seen, heat[:, 0])
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))
     return Noise(
@@ -252,8 +196,36 @@ def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
     triad = [one.column for one in seen if one.blank.name in ACCELEROMETER]
     if len(triad) < len(ACCELEROMETER):
         return []
-    turn = turn_of_gravity(np.column_stack(triad), rate_hz)
-    return [] if turn is None else [Finding.of(FindingCode.LOG_MOTION, "turns", turn_rad=turn[0], every_s=turn[1])]
+    force = np.column_stack(triad)
+    turn = turn_of_gravity(force, rate_hz)
+    if turn is not None:
+        return [Finding.of(FindingCode.LOG_MOTION, "turns", turn_rad=turn[0], every_s=turn[1])]
+    other = other_orientation(force, rate_hz)
+    if other is None:
+        return []
+    turn_rad, start, stop = other
+    said = Finding.of(
+        FindingCode.LOG_TURNED, turn_rad=turn_rad, start_s=start / rate_hz, stop_s=stop / rate_hz, is_first=start == 0,
+        is_last=stop == len(force),
+    )  # fmt: skip
+    return [said]
+
+
+def _heated(seen: Sequence[_Screened], temperature: FloatArray) -> list[Finding]:
+    """Finding for axes whose slow changes are mostly those of the temperature (n,)."""
+    there = np.isfinite(temperature)
+    if not there.any():
+        return []
+    heat = np.interp(np.arange(len(temperature)), np.flatnonzero(there), temperature[there])
+    share = [share_of_temperature(one.column, heat, [0.5 * (e.start + e.stop) for e in one.steps]) for one in seen]
+    axes = [one.blank.name for one, part in zip(seen, share, strict=True) if part > MOSTLY]
+    if not axes:
+        return []
+    used = heat[np.isfinite([one.column for one in seen]).any(axis=0)]
+    said = Finding.of(
+        FindingCode.TEMPERATURE_DRIVEN, "noise", low_degc=used.min(), high_degc=used.max(), share=max(share), axes=axes
+    )
+    return [said]
 
 
 def _identified(seen: _Screened, rate_hz: float, curve: AllanCurve, channel: int) -> NoiseAxis:

@@ -11,9 +11,11 @@ import numpy as np
 from scipy.special import chdtri
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.static_axes import adc_step
+from trihedron.ranges import edges_of
+from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""
@@ -118,18 +120,46 @@ def turn_of_gravity(x: FloatArray, rate_hz: float) -> tuple[float, float] | None
     Scatter at one level throughout is no event, but a sensor that is carried turns. White noise would halve the turn
     between means four times as long, motion would not.
     """
-    size = max(math.ceil(rate_hz * MEANS_S), len(x) // MEANS)
+    size = _mean_size(x, rate_hz)
     if len(x) // size < FEWEST_MEANS:
         return None
     turn, shorter = _turn(x, size), _turn(x, max(size // 4, 1))
     return (turn, size / rate_hz) if turn > max(TURN_RAD, math.sqrt(0.5) * shorter) else None
 
 
+def other_orientation(x: FloatArray, rate_hz: float) -> tuple[float, int, int] | None:
+    """Angle [rad] between gravity in most of an accelerometer's readings ``x`` (n, 3) and in the others, and the
+    longest stretch ``[start, stop)`` of the former; ``None`` for a log of one orientation."""
+    size = _mean_size(x, rate_hz)
+    up, at = _directions(x, size)
+    if len(up) < FEWEST_MEANS:
+        return None
+    near = up @ up.T > math.cos(SAME_POSE_RAD)
+    most = near[near.sum(axis=1).argmax()]
+    if np.count_nonzero(~most) < max(LEAST_SHARE * len(up), 2.0):
+        return None
+    centre = up[most].mean(axis=0)
+    cosine = float(np.median(up[~most] @ centre)) / float(np.linalg.norm(centre))
+    first, last = max(edges_of(most).tolist(), key=lambda run: run[1] - run[0])
+    # The turn may reach into the first and last means of the stretch.
+    start, stop = (0 if first == 0 else at[first + 1] * size), (len(x) if last == len(up) else at[last - 1] * size)
+    return math.acos(min(max(cosine, -1.0), 1.0)), int(start), int(stop)
+
+
+def _mean_size(x: FloatArray, rate_hz: float) -> int:
+    return max(math.ceil(rate_hz * MEANS_S), len(x) // MEANS)
+
+
+def _directions(x: FloatArray, size: int) -> tuple[FloatArray, IntArray]:
+    """Directions of means of ``size`` rows, and the number of each."""
+    mean, _, count = _core.block_statistics(x, size)
+    held = np.flatnonzero(count > 0)
+    return mean[held] / np.linalg.norm(mean[held], axis=1, keepdims=True), held
+
+
 def _turn(x: FloatArray, size: int) -> float:
     """Median angle between the directions of neighbouring means of ``size`` rows."""
-    mean, _, count = _core.block_statistics(x, size)
-    up = mean[count > 0] / np.linalg.norm(mean[count > 0], axis=1, keepdims=True)
-    return float(np.median(np.linalg.norm(np.diff(up, axis=0), axis=1)))
+    return float(np.median(np.linalg.norm(np.diff(_directions(x, size)[0], axis=0), axis=1)))
 
 
 def _mean(values: FloatArray) -> float:

@@ -13,6 +13,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
+from trihedron.records.noise import LEAST_S
 
 EVIDENCE = 8.0
 """Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
@@ -70,7 +71,11 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
         pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
     frequency = np.concatenate([band.frequency_hz[p] for band, p in zip(bands, pick, strict=True)])
     if len(frequency) == 0:
-        raise InputError(f"no spectral ordinate lies below {highest_hz} Hz")
+        lasts_s = max(band.length * band.step_s for band in bands)
+        raise InputError(
+            f"{lasts_s:.3g} s are too short: low-pass filter and periodic lines leave nothing of the spectrum for "
+            f"noise terms; record {LEAST_S if lasts_s < LEAST_S else 4.0 * lasts_s:.0f} s or more, an hour is useful"
+        )
     order = np.argsort(frequency, kind="stable")
 
     def gather(of_band: Callable[[Ordinates], FloatArray]) -> FloatArray:

@@ -7,6 +7,7 @@ from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, number
 from trihedron.files.formats.noise_keys import COVARIANCES, KEYS, Figures, si_rows
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
+from trihedron.records.finding import Severity
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def _of_axes(sensor: SensorFilterNoise) -> tuple[float, ...]:
 
 
 def _beside(found: FilterNoise) -> Sequence[str]:
-    """Comments: each sensor's values with their intervals, and those of the static log."""
+    """Comments: each sensor's values with their intervals, those of the static log, and warnings about them."""
     out = []
     for one in found.sensors:
         units = (f"{one.unit}/sqrt(Hz)", f"{one.unit}/sqrt(s)")
@@ -147,6 +148,8 @@ def _beside(found: FilterNoise) -> Sequence[str]:
             out.append(f"{word}{one.sensor}: N {_said(N)} {units[0]}, K {_said(K)} {units[1]}")
         if one.axes_N:
             out.append(f"{one.sensor} N of X, Y, Z: {', '.join(_said(axis) for axis in one.axes_N)}")
+    warned = (f for f in found.findings if f.severity is Severity.WARNING and f.code.value.startswith("filter-noise"))
+    out += [f"warning: {f.seen} {f.action}".replace("\N{MINUS SIGN}", "-") for f in warned]
     return out
 
 

@@ -60,7 +60,7 @@ def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
     """A comment with the unit (and whether the figure is an upper limit), then ``name: value``."""
     said = f"# {unit}"
     if figure.is_limit:
-        said = f"# {name} [{unit}] is an upper limit: none of it was seen"
+        said = f"# {name} [{unit}] is an upper limit"
     return [said, f"{name}: {number(figure.value)}"]
 
 
@@ -77,7 +77,7 @@ def si_rows(figures: Figures, names: tuple[str, ...]) -> list[str]:
 def limits(options: ExportOptions) -> list[str]:
     """A sentence for each figure that is an upper limit."""
     return [
-        f"{name} {term} is an upper limit: it was not seen in the static log."
+        f"{name} {term} is an upper limit from the static log."
         for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise))
         if noise is not None
         for term, figure in (("N", noise.N), ("K", noise.K))

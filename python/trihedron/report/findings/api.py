@@ -44,6 +44,13 @@ _CALIBRATE = {
         "For noise: `trihedron allan LOG`; for drift and temperature: `trihedron diagnose LOG`. For S and b record 18 "
         "or more poses of 3 to 5 s in different directions.",
     ),
+    (Code.NOT_FIT, "short-static-log", SERIOUS): Words(
+        "This is a static log of {duration_s:.3g} s: one or two orientations do not determine S and b, and it is too "
+        "short for noise.",
+        "A log that was stopped early, or before the sensor was turned.",
+        "For S and b record 18 or more poses of 3 to 5 s in different directions; for noise {least_s:.0f} s or more, "
+        "an hour is useful.",
+    ),
     (Code.NOT_FIT, "few-orientations", NOTE): Words(
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
         "A static log, a chamber log or a table that does not move.",

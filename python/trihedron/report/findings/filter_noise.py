@@ -18,7 +18,8 @@ ENTRIES = {
         "{quietest:.3g}.",
         "A reference computed with this unit's own readings (a filter or smoother) repeats part of their noise; or "
         "that second contains vibration.",
-        "Give a static log of the unit with --static STATIC; until then use {quietest:.3g} in a filter.",
+        "Give a static log of the unit with --static STATIC; until then replace N {in_file:.3g} of the {sensor} by "
+        "{quietest:.3g} in the filter.",
     ),
     (Code.FILTER_NOISE_NOT_SEPARATED, "", NOTE): Words(
         "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
@@ -52,6 +53,18 @@ ENTRIES = {
         "The reference's own error, or a residual calibration error, is larger than the sensor's noise.",
         "Give a static log of the unit (--static STATIC), a better reference or a longer log; for a filter that "
         "must not be too sure replace N {in_file:.3g} of the {sensor} by {upper:.3g}.",
+    ),
+    (Code.FILTER_NOISE_UNCERTAIN, "limit", WARNING): Words(
+        "N of the {sensor} was not measured: {upper:.3g} is an upper limit, and may be several times too large.",
+        "The reference's own error is larger than the sensor's noise.",
+        "Give a static log of the unit (--static STATIC) or a better reference; with the limit in it a filter "
+        "is too cautious.",
+    ),
+    (Code.FILTER_NOISE_UNCERTAIN, "reference", WARNING): Words(
+        "Over {horizon_s:.3g} s the reference's own error is {share:.0f %} of the {sensor}'s error: N and K come from "
+        "what little remains.",
+        "The reference is less accurate than the sensor over this time.",
+        "Give a better reference, or a static log of the unit (--static STATIC).",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",

@@ -37,6 +37,19 @@ _LOG = {
         "Its N, B and K are those of the motion; record a static log, or compare the motion with a reference: "
         "`trihedron noise LOG --reference FILE`.",
     ),
+    (Code.TEMPERATURE_DRIVEN, "noise", WARNING): Words(
+        "The temperature runs from {low_degc:.0f} to {high_degc:.0f} °C and explains up to {share:.0f %} of the slow "
+        "changes of {axes:axes}: B, K and R contain it.",
+        "biases follow the temperature.",
+        "For B, K and R log at a constant temperature; `trihedron diagnose LOG` fits it.",
+    ),
+    (Code.LOG_TURNED, "", WARNING): Words(
+        "The unit was turned by {turn_rad:.2g !deg}°, and B, K and R contain the turn; the longest stretch "
+        "in one direction is {start_s:.0f} to {stop_s:.0f} s.",
+        "it was turned over, or its support tilted, during a log that should be static.",
+        "For B, K and R take one direction alone, with"
+        "{is_first:?| --exclude :{start_s:.0f}}{is_last:?| --exclude {stop_s:.0f}:}.",
+    ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
         "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
