@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 
 import trihedron
-from formats.session import G, session
+from hand_made_sessions import G, motion
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 HEADER = "t,ax,ay,az,gx,gy,gz"
-
-
-def motion(rate_hz=100.0, seed=1, n_poses=10):
-    made = session(np.random.default_rng(seed), rate_hz, n_poses)
-    return made.time_s, made.force, made.rate
 
 
 def written(path, *columns, header=HEADER, remark=""):
