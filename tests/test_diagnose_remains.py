@@ -213,16 +213,3 @@ def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     # What only the model has is no footnote of the recording.
     tried = [Candidate("periodic-interference", 0.4, True)]
     assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ
-
-
-def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(31)
-    # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
-    few = Scenario(hand_session(9, pose_s=4.0, layout=11), "few", accel, gyro, profile.clock)
-    recording, _ = simulate(few, 3)
-    plain = Scenario(hand_session(9, pose_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
-    found = trihedron.diagnose(recording, against=simulate(plain, 4)[0], gravity_m_s2=9.80665)
-    assert not [one.id for one in found.effects]
-    assert found.parameters
-    assert found.verdict == "parameters-differ"
