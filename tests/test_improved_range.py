@@ -47,7 +47,7 @@ def clipped():
 
 
 @pytest.fixture(scope="module")
-def improved(clipped, tmp_path_factory):
+def improved(clipped, without_corners, tmp_path_factory):
     folder = tmp_path_factory.mktemp("range")
     given, better = folder / "ideal.toml", folder / "better.toml"
     given.write_text(IDEAL)
