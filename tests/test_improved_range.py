@@ -23,6 +23,7 @@ from trihedron.simulate import (
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.twin import unclipped
 
+pytestmark = pytest.mark.usefixtures("without_corners")
 G = 9.80665
 LIMIT_DEG_S = 150.0
 IDEAL = """# A perfect sensor.
@@ -47,7 +48,7 @@ def clipped():
 
 
 @pytest.fixture(scope="module")
-def improved(clipped, without_corners, tmp_path_factory):
+def improved(clipped, tmp_path_factory):
     folder = tmp_path_factory.mktemp("range")
     given, better = folder / "ideal.toml", folder / "better.toml"
     given.write_text(IDEAL)
