@@ -161,12 +161,7 @@ def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, cap
     empty = tmp_path / "words.csv"
     empty.write_text("nothing,here\n")
     assert "words.csv" in rejected(empty, capsys)
-    rng = np.random.default_rng(3)
-    rows = np.column_stack([np.arange(2000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (2000, 6))])
-    still = tmp_path / "still.csv"
-    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
-    still.write_text(head + "\n".join(",".join(f"{v:.6g}" for v in row) for row in rows) + "\n")
-    said = rejected(still, capsys)
+    said = rejected(made_once() / "static.csv", capsys)
     assert "the simulated recording cannot be calibrated" in said
     assert "pose" in said
 
