@@ -85,6 +85,10 @@ def test_the_format_is_told_by_the_content_and_not_by_the_name(tmp_path, extensi
     parquet = tmp_path / f"table{extension}"
     pl.DataFrame(table, schema=HEADER.strip().split(",")).write_parquet(parquet)
     assert_same(read_recording(parquet), table)
+    array = tmp_path / f"array{extension}"
+    with array.open("wb") as stream:
+        np.save(stream, table)
+    assert_same(read_recording(array), table)
 
 
 def test_comments_and_blank_lines_between_rows_are_passed_over_and_lines_still_counted(tmp_path):

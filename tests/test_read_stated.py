@@ -91,7 +91,7 @@ def test_whole_seconds_and_nanoseconds_belong_together_above_a_row_of_units(tmp_
     clock = [f"{1730650831 + int(t)},{round(t % 1 * 1e9)}" for t in T]
     log = written(tmp_path / "log.csv", clock, f"secs,nsecs,{NAMES}\n-,-,m/s^2,m/s^2,m/s^2,rad/s,rad/s,rad/s")
     recording = read_recording(log)
-    np.testing.assert_allclose(recording.time_s, T, atol=1e-6)
+    np.testing.assert_allclose(recording.time_s, T, atol=1e-9)
     assert recording.start_epoch_s == 1730650831
 
 
