@@ -26,8 +26,8 @@ from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from blind_trial.draw import grade_profile, moves_of, rows
-from blind_trial.sizes import ON_A_TABLE, SIZES, Session
+from blind_trial.draw import grade_profile, rows
+from blind_trial.sizes import SIZES
 from trials import command_line, sealed, tried, within
 from trihedron.diagnose.effects import catalogue
 from trihedron.files.log import write_recording
@@ -39,10 +39,6 @@ KINDS = (
     "same", "nominal", "other-unit", "accel-bias", "gyro-bias", "accel-scale", "gyro-scale", "accel-misalignment",
     "gyro-misalignment", "triad-alignment", "gravity", "missing", "surplus", "both", "noise", "resolution",
 )  # fmt: skip
-NOT_PAIRED = {
-    *ON_A_TABLE, "disturbed-pose", "dropped-samples", "timing-jitter", "axis-handedness", "earth-rate", "lever-arm",
-    "accel-saturation", "gyro-saturation", "quantisation", "supply-sensitivity",
-}  # fmt: skip
 IS_TOO = {"accel-size-effect": ("lever-arm",)}
 """Three accelerometers drawn at three places lie, in their mean, away from the centre of rotation."""
 GROUPS = (
@@ -126,8 +122,8 @@ def make(pair: Pair) -> tuple[Recording, Recording, float, dict[str, Any]]:
     sim = Scenario(motion_s, "simulation", sim_a, sim_g, profile.clock)
     effect = ""
     if pair.kind in ("missing", "surplus", "both"):
-        effect = str(rng.choice([e for e in SIZES if e not in NOT_PAIRED]))
-        size = SIZES[effect](rng, 1.0, Session(profile, accel, moves_of(motion_r)))
+        effect = str(rng.choice(list(SIZES)))
+        size = SIZES[effect](rng, profile)
         if pair.kind != "surplus":
             real = with_effect(real, effect, **size)
         if pair.kind != "missing":

@@ -64,7 +64,6 @@ def one(trial):
     sigma = np.sqrt(np.diag(found.gyroscope.covariance))
     z = {
         "gyro S": (found.gyroscope.S - A).ravel() / sigma[:9],
-        **turned_or_not(found, trial.unit.M),
         "gyro b": (found.gyroscope.b + A @ trial.unit.c) / sigma[9:],
     }
     if trial.walked is not None or trial.unit.g_sensitivity is None:
@@ -85,19 +84,6 @@ def one(trial):
         z["lever arm"] = (found.lever_arm.value - trial.arm) / found.lever_arm.std
     has = () if trial.unit.g_sensitivity is None else ("gyro-g-sensitivity",)
     return z, {name: e.score for name, e in found.effects.items()}, has
-
-
-def turned_or_not(found, M):
-    """z of S by what its error is: a turn of all axes, which the mean error of a body's truth is too, and the rest."""
-    wrong = (found.gyroscope.S @ M).ravel() - np.eye(3).ravel()
-    J = np.kron(np.eye(3), M.T)
-    cov = J @ found.gyroscope.covariance[:9, :9] @ J.T
-    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-    unit = np.eye(9).reshape(9, 3, 3)
-    rest = np.stack([0.5 * (unit[:, i, j] + unit[:, j, i]) for i, j in pairs])
-    turn = np.stack([0.5 * (unit[:, i, j] - unit[:, j, i]) for i, j in pairs if i != j])
-    parts = {"  its turn": turn, "  the rest": rest}
-    return {name: by @ wrong / np.sqrt(np.diag(by @ cov @ by.T)) for name, by in parts.items()}
 
 
 def bias_over_time(trial, found, A):

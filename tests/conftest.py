@@ -29,3 +29,14 @@ def real_data() -> Path:
 def few_simulations(monkeypatch):
     """Improved scenarios are aimed by two simulations and not by eight: enough where their files are what is tested."""
     monkeypatch.setattr("trihedron.api.driving.N_SEEDS", 2)
+
+
+@pytest.fixture(scope="module")
+def without_corners():
+    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_poses.py has them."""
+    from trihedron.records.channel_facts import LowPass
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("trihedron.estimate.noise.poses.low_passes", lambda s, _: [LowPass(None, 100.0)] * len(s))
+        patch.setattr("trihedron.channel_facts.static_axes.undisturbed", lambda spectrum, _: spectrum)
+        yield

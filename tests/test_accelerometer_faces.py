@@ -102,7 +102,6 @@ def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_calle
 
 
 SIGMA = 0.0003
-FACES = np.array([1, -1, 2, -2, 3, -3])
 
 
 def on_a_table(rng, tilt, headings):
@@ -110,7 +109,7 @@ def on_a_table(rng, tilt, headings):
     S_a = (np.eye(3) + 0.01 * rng.normal(size=(3, 3))) * 100.0
     b_a = rng.normal(size=3) * 30.0
     values, up = [], []
-    for face in FACES:
+    for face in SIX:
         axis, sign = abs(int(face)) - 1, np.sign(face)
         first = rng.uniform(0.0, 2.0 * np.pi)
         for heading in headings:

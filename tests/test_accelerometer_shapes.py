@@ -16,10 +16,15 @@ from trihedron.simulate.effects import with_effect
 G = 9.81
 
 
-def linear_fit(up, bent, sigma):
-    """(residual, parameters) of the nine parameters that |f| of a pose is linear in, by plain least squares."""
+def design_of(up):
+    """(n, 9) what |f| of a pose changes by with each of the nine parameters, which it is linear in."""
     pairs = [(j, k) for j in range(3) for k in range(j + 1)]
-    design = G * np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)])
+    return G * np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)])
+
+
+def linear_fit(up, bent, sigma):
+    """(residual, parameters) by plain least squares."""
+    design = design_of(up)
     found, *_ = np.linalg.lstsq(design / sigma[:, None], bent / sigma, rcond=None)
     return bent - design @ found, found
 
@@ -84,8 +89,7 @@ def errors(rng, n, name):
     else:
         scattered = scattered + SHAPES[name](up) @ rng.normal(size=3) * BENDS
     residual, found = linear_fit(up, scattered, sigma)
-    pairs = [(j, k) for j in range(3) for k in range(j + 1)]
-    white = np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)]) * G / sigma[:, None]
+    white = design_of(up) / sigma[:, None]
     chi2 = float(np.sum((residual / sigma) ** 2)) / (n - 9)
     alone = chi2 * np.diag(np.linalg.inv(white.T @ white))
     added = covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), G)

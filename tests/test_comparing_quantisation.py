@@ -8,14 +8,14 @@ import pytest
 from scipy.stats import binom
 
 import trihedron
+from diagnosed_session import unit_of
 from trihedron.api import improving
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of
 from trihedron.comparison.quantisation import quantisation_noise, white_and_quantisation
 from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.estimate.noise.poses import noise_of_poses
-from trihedron.simulate import NoiseTerms, Scenario, hand_session, make_noise, simulate
-from trihedron.simulate.profiles import profile_by_name
+from trihedron.simulate import NoiseTerms, hand_session, make_noise, simulate
 
 RATE = 100.0
 N = 1e-3
@@ -57,12 +57,11 @@ def test_a_difference_is_said_of_the_axis_that_has_it_and_nothing_where_both_are
 
 
 def test_an_improved_scenario_takes_white_and_quantisation_noise_from_one_fit():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(4)
-    white = float(gyro.noise.N[0])
+    unit = unit_of(hand_session(16, pose_s=3.0, layout=3), 4)
+    white = float(unit.gyroscope.noise.N[0])
     Q = 2.0 * white / (2.0 * RATE**0.5)
-    loud = replace(gyro, noise=replace(gyro.noise, Q=(Q, 0.0, 0.0)))
-    recording, _ = simulate(Scenario(hand_session(16, pose_s=3.0, layout=3), "unit", accel, loud, profile.clock), 1)
+    loud = replace(unit.gyroscope, noise=replace(unit.gyroscope.noise, Q=(Q, 0.0, 0.0)))
+    recording, _ = simulate(replace(unit, gyroscope=loud), 1)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
     fit = model_of_calibration(own.calibration)
     both = improving.white_and_quantisation_of(sampled_of(recording, own.segments.poses, fit), "gyroscope")

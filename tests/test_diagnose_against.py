@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
+from diagnosed_session import unit_of
 from small_session import SCENARIO, G, made_once
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
@@ -22,6 +23,7 @@ from trihedron.simulate import Scenario, hand_session, scenario_by_name, simulat
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
 
+pytestmark = pytest.mark.usefixtures("without_corners")
 RNG = np.random.default_rng(5)
 
 
@@ -95,24 +97,15 @@ def test_one_number_that_moves_leaks_into_no_other_group(group):
     assert said == {group}
 
 
-@pytest.fixture(scope="module")
-def unit():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(77)
-    # The wider range, which hand moves do not leave.
-    return profile, accel, replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
+def unit(seed):
+    return unit_of(hand_session(12, pose_s=2.5, layout=seed), 77, is_wide=True)
 
 
-def log(profile, accel, gyro, layout, seed, effect=None, **size):
-    scenario = Scenario(hand_session(12, pose_s=2.5, layout=layout), "pair", accel, gyro, profile.clock)
-    return simulate(scenario if effect is None else with_effect(scenario, effect, **size), seed)[0]
-
-
-def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
-    profile, accel, gyro = unit
-    known = trihedron.calibrate(log(profile, accel, gyro, 1, 1), gravity_m_s2=9.80665)
-    moved = replace(gyro, b=(gyro.b[0], gyro.b[1], gyro.b[2] - np.radians(0.31)))
-    found = trihedron.diagnose(log(profile, accel, moved, 2, 2), calibration=known)
+def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift():
+    known = trihedron.calibrate(simulate(unit(1), 1)[0], gravity_m_s2=9.80665)
+    later = unit(2)
+    moved = replace(later.gyroscope, b=tuple(later.gyroscope.b - np.radians([0.0, 0.0, 0.31])))
+    found = trihedron.diagnose(simulate(replace(later, gyroscope=moved), 2)[0], calibration=known)
     assert found.verdict == "parameters-differ"
     assert {p.id for p in found.parameters if p.significant} == {"gyro-bias"}
     z = next(p for p in found.parameters if p.id == "gyro-bias" and p.name == "z")
@@ -123,14 +116,24 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift(unit):
     assert found.updated is not None
 
 
-def test_an_effect_that_only_the_simulation_has_is_surplus(unit):
-    profile, accel, gyro = unit
-    simulated = log(profile, accel, gyro, 3, 3, "accel-quadratic", k2=(3e-4, -2e-4, 2e-4))
-    found = trihedron.diagnose(log(profile, accel, gyro, 5, 5), against=simulated, gravity_m_s2=9.80665)
+def test_an_effect_that_only_the_simulation_has_is_surplus():
+    simulated = simulate(with_effect(unit(3), "accel-quadratic", k2=(3e-4, -2e-4, 2e-4)), 3)[0]
+    found = trihedron.diagnose(simulate(unit(5), 5)[0], against=simulated, gravity_m_s2=9.80665)
     assert found.verdict == "missing-physics"
     assert [(e.side, e.id) for e in found.effects] == [("model", "accel-quadratic")]
     assert not any(p.significant for p in found.parameters)
     assert "which the recording lacks" in " ".join(str(found).split())  # wherever its lines break
+
+
+def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():
+    # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
+    recording, _ = simulate(unit_of(hand_session(9, pose_s=4.0, layout=11), 31), 3)
+    profile = profile_by_name("mpu")
+    plain = Scenario(hand_session(9, pose_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
+    found = trihedron.diagnose(recording, against=simulate(plain, 4)[0], gravity_m_s2=9.80665)
+    assert not [one.id for one in found.effects]
+    assert found.parameters
+    assert found.verdict == "parameters-differ"
 
 
 def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve(tmp_path, capsys):
@@ -158,12 +161,7 @@ def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, cap
     empty = tmp_path / "words.csv"
     empty.write_text("nothing,here\n")
     assert "words.csv" in rejected(empty, capsys)
-    rng = np.random.default_rng(3)
-    rows = np.column_stack([np.arange(2000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (2000, 6))])
-    still = tmp_path / "still.csv"
-    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
-    still.write_text(head + "\n".join(",".join(f"{v:.6g}" for v in row) for row in rows) + "\n")
-    said = rejected(still, capsys)
+    said = rejected(made_once() / "static.csv", capsys)
     assert "the simulated recording cannot be calibrated" in said
     assert "pose" in said
 
@@ -180,7 +178,7 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
 
 def test_gravity_is_that_of_the_scenario_unless_given():
     """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
-    at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=12, pose_s=2.0, move_s=1.0))
+    at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=9, pose_s=2.0, move_s=1.0))
     at_the_pole = replace(at_the_pole, environment=replace(at_the_pole.environment, gravity_m_s2=9.832))
     found = trihedron.diagnose(simulate(at_the_pole, 5)[0], against=at_the_pole)
     assert found.calibration.gravity_m_s2 == 9.832

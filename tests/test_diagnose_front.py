@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import trihedron
+from diagnosed_session import unit_of
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
@@ -35,10 +36,8 @@ K2 = (3e-4, -2e-4, 2e-4)
 GRAVITY = ("--gravity", "9.80665")
 
 
-def scenario(seed=1, layout=1, n_poses=18):
-    profile = profile_by_name("mpu")
-    accelerometer, gyroscope = profile.unit(seed)
-    return Scenario(hand_session(n_poses, layout=layout), "session", accelerometer, gyroscope, profile.clock)
+def scenario(layout=1, n_poses=18):
+    return unit_of(hand_session(n_poses, layout=layout))
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from trihedron.comparison.slow import correlation_times
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
-from trihedron.records.channel_facts import LowPass
 
 RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
 POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
@@ -52,17 +51,11 @@ def log(
     return sampled(made, POSES, numbers())
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _without_corners():
-    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_poses.py has them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trihedron.estimate.noise.poses.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
-        patch.setattr("trihedron.channel_facts.static_axes.undisturbed", lambda spectrum, _: spectrum)
-        yield
+pytestmark = pytest.mark.usefixtures("without_corners")
 
 
 @pytest.fixture(scope="module")
-def real(_without_corners):
+def real(without_corners):  # noqa: ARG001
     return log(1)
 
 

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +9,7 @@ import polars as pl
 import pytest
 
 import trihedron
-from diagnosed_session import simulated
+from diagnosed_session import nearest_pose, simulated, unit_of
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.context import Context
@@ -21,13 +20,11 @@ from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.records import Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
 from trihedron.records.domains import HeldOut
 from trihedron.segment import resegment, segment_recording
-from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.profiles import profile_by_name
 
 
 def _with_gyro_bias(seed, bias):
@@ -136,11 +133,7 @@ def session(lean_rad, scatter_rad_s, seed=1):
         force[here] += (1.0 - np.exp(-since / 2.0))[:, None] * (to_raw[0] @ np.cross(up, direction))
         turning = (np.exp(-since / 2.0) / 2.0)[:, None] * direction + rng.normal(size=3) * scatter_rad_s
         rate[here] += turning @ to_raw[1].T
-    timestamps = recording.time_s
-    log = Recording(
-        time_s=timestamps, rate_hz=recording.rate_hz, accelerometer=force, gyroscope=rate,
-        accelerometer_unit=recording.accelerometer_unit, gyroscope_unit=recording.gyroscope_unit,
-    )  # fmt: skip
+    log = replace(recording, accelerometer=force, gyroscope=rate)
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
@@ -178,22 +171,16 @@ def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share
 
 
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(7)
-    gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
-    motion = hand_session(20, pose_s=4.0, layout=5)
-    plain = Scenario(motion, "unit", accel, gyro, profile.clock)
+    plain = unit_of(hand_session(20, pose_s=4.0, layout=5), 7, is_wide=True)
     # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
     size = np.radians(0.1)
     flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
     recording = simulate(flawed, 11)[0]
     # Zeros of the gyro that are others in every pose, in its raw unit.
     rng = np.random.default_rng(3)
-    rates = np.array(recording.gyroscope)
     poses = trihedron.segment(recording).poses
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(poses)], len(rates)]
-    for first, last in pairwise(edges):
-        rates[first:last] += 0.03 * 65.5 * rng.standard_normal(3)
+    bias = 0.03 * 65.5 * rng.standard_normal((len(poses), 3))
+    rates = recording.gyroscope + bias[nearest_pose(poses, recording.n_samples)]
     found = trihedron.diagnose(replace(recording, gyroscope=rates), gravity_m_s2=9.80665)
     assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
     assert found.verdict == "missing-physics"
@@ -213,16 +200,3 @@ def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     # What only the model has is no footnote of the recording.
     tried = [Candidate("periodic-interference", 0.4, True)]
     assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ
-
-
-def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(31)
-    # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
-    few = Scenario(hand_session(9, pose_s=4.0, layout=11), "few", accel, gyro, profile.clock)
-    recording, _ = simulate(few, 3)
-    plain = Scenario(hand_session(9, pose_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
-    found = trihedron.diagnose(recording, against=simulate(plain, 4)[0], gravity_m_s2=9.80665)
-    assert not [one.id for one in found.effects]
-    assert found.parameters
-    assert found.verdict == "parameters-differ"

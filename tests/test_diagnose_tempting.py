@@ -8,20 +8,15 @@ import pytest
 import trihedron
 from confidence import design
 from confidence.sensor import recorded
-from trihedron.simulate import Environment, Scenario, Temperature, hand_session, profile_by_name, simulate, with_effect
+from diagnosed_session import unit_of
+from trihedron.simulate import Environment, Temperature, hand_session, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
 
 
 def session(grade="mpu", seed=1, n_poses=20, pose_s=3.5, move_s=2.0):
-    profile = profile_by_name(grade)
-    accelerometer, gyroscope = profile.unit(seed)
-    if grade == "mpu":
-        # The ±500 °/s range: no move runs into its end by accident.
-        wide = tuple(tuple(2.0 * v for v in row) for row in gyroscope.S)
-        gyroscope = replace(gyroscope, S=wide)
     motion = hand_session(n_poses, pose_s=pose_s, move_s=move_s, first_pose_s=10.0, layout=seed)
-    return Scenario(motion, "session", accelerometer, gyroscope, profile.clock)
+    return unit_of(motion, seed, grade, is_wide=grade == "mpu")
 
 
 def diagnosed(scenario, seed=1, **how):

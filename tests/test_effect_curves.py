@@ -5,14 +5,13 @@ import inspect
 import re
 import textwrap
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagnosed_session import diagnosed
+from diagnosed_session import diagnosed, nearest_pose, simulated
 from trihedron.api.diagnosing import diagnose
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
@@ -25,8 +24,6 @@ from trihedron.report.effects.catalogue import CATALOGUE, REASONS
 from trihedron.report.effects.page import page
 from trihedron.report.findings.wording import places
 from trihedron.report.text import to_text
-from trihedron.simulate import Scenario, hand_session, simulate
-from trihedron.simulate.profiles import profile_by_name
 
 G = 9.80665
 
@@ -183,14 +180,9 @@ DEG = np.pi / 180.0
 
 def session(seed, n_poses=30):
     """A healthy session: log, truth, (n,) number of the pose that a sample is nearest to, and how many there are."""
-    profile = profile_by_name("adis")
-    accelerometer, gyroscope = profile.unit(seed)
-    log, truth = simulate(
-        Scenario(hand_session(n_poses, layout=seed), "", accelerometer, gyroscope, profile.clock), seed
-    )
-    poses = [(p.start, p.stop) for p in truth.segments if p.kind != "move"]
-    middles = [(a[1] + b[0]) / 2 for a, b in pairwise(poses)]
-    return log, truth, np.searchsorted(middles, np.arange(log.n_samples)), len(poses)
+    log, truth = simulated(seed=seed, n_poses=n_poses, grade="adis")
+    poses = [part for part in truth.segments if part.kind != "move"]
+    return log, truth, nearest_pose(poses, log.n_samples), len(poses)
 
 
 def added(log, truth, of_rate):

@@ -216,8 +216,6 @@ def test_ros_covariances_are_those_of_one_message():
     np.testing.assert_allclose(np.reshape(document["linear_acceleration_covariance"], (3, 3)), np.eye(3) * 4e-6 * 200)
     np.testing.assert_allclose(np.reshape(document["angular_velocity_covariance"], (3, 3)), np.eye(3) * 1e-8 * 200)
     assert document["orientation_covariance"][0] == -1.0
-    with pytest.raises(ValueError, match="--noise"):
-        export_calibration(calibration("si"), "ros")
 
 
 RAW = ExportOptions(current_parameters="none")

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import trihedron
+from diagnosed_session import unit_of
 from trihedron.api.driving import MovedAlike, bias_in_moves
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
 from trihedron.simulate import (
     NoiseTerms,
-    Scenario,
     Smoother,
     hand_session,
     low_pass_like,
@@ -22,7 +22,6 @@ from trihedron.simulate import (
     simulate,
 )
 from trihedron.simulate.noise import bias_in_moves as straying
-from trihedron.simulate.profiles import profile_by_name
 
 RATE = 100.0
 
@@ -73,14 +72,13 @@ def test_a_zero_that_strays_in_moves_is_nothing_at_rest():
     assert ends.std(axis=0) == pytest.approx([0.1, 0.2, 0.0], rel=0.14)
 
 
+def straying_by(scenario, bias):
+    gyro = scenario.gyroscope
+    return replace(scenario, gyroscope=replace(gyro, electronics=replace(gyro.electronics, bias_in_moves=bias)))
+
+
 def session(seed, strays=0.0):
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
-    electronics = replace(gyro.electronics, bias_in_moves=(strays,) * 3)
-    scenario = Scenario(
-        hand_session(20, pose_s=3.0, layout=8), "unit", accel, replace(gyro, electronics=electronics), profile.clock
-    )
+    scenario = straying_by(unit_of(hand_session(20, pose_s=3.0, layout=8), 5, is_wide=True), (strays,) * 3)
     return scenario, simulate(scenario, seed)[0]
 
 
@@ -98,9 +96,7 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     found = bias_in_moves(clean, own)
     # Twenty moves, each of two angles: known to a sixth; four of those, and what the poses add.
     assert found == pytest.approx((2e-3,) * 3, rel=0.6)
-    electronics = replace(clean.gyroscope.electronics, bias_in_moves=found)
-    better = replace(clean, gyroscope=replace(clean.gyroscope, electronics=electronics))
-    again = bias_in_moves(better, own)
+    again = bias_in_moves(straying_by(clean, found), own)
     # Alike within a twentieth, or a small step is left.
     assert again is None or again == pytest.approx(found, rel=0.15)
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.

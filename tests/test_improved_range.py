@@ -9,21 +9,21 @@ import pytest
 import tomllib
 
 import trihedron
+from diagnosed_session import simulated, unit_of
 from trihedron.api import driving
 from trihedron.api.improving import _mean_drift, improve
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.simulate import (
     Drift,
-    Scenario,
     diagnosed_sizes,
     hand_session,
     read_scenario,
     simulate,
 )
-from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.twin import unclipped
 
+pytestmark = pytest.mark.usefixtures("without_corners")
 G = 9.80665
 LIMIT_DEG_S = 150.0
 IDEAL = """# A perfect sensor.
@@ -41,12 +41,10 @@ b = [0, 0, 0]  # none
 @pytest.fixture(scope="module")
 def clipped():
     """A recording whose gyro ends at ±150 °/s of its ADC in several moves, with noise of its own."""
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    code = round(math.radians(LIMIT_DEG_S) / gyro.S[0][0])
-    gyro = replace(gyro, adc=replace(gyro.adc, low=-float(code), high=float(code)))
-    scenario = Scenario(hand_session(12, pose_s=2.5, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
-    return code, simulate(scenario, 11)[0]
+    unit = unit_of(hand_session(12, pose_s=2.5, move_s=1.6, layout=8), 5)
+    code = round(math.radians(LIMIT_DEG_S) / unit.gyroscope.S[0][0])
+    adc = replace(unit.gyroscope.adc, low=-float(code), high=float(code))
+    return code, simulate(replace(unit, gyroscope=replace(unit.gyroscope, adc=adc)), 11)[0]
 
 
 @pytest.fixture(scope="module")
@@ -132,11 +130,8 @@ def test_a_straight_drift_of_a_session_whose_length_nobody_says_is_left_out():
 
 
 def test_b_beside_a_warm_up_is_the_mean_of_the_session_and_a_scenario_adds_it_back():
-    profile = profile_by_name("mpu")
-    accel, gyro = profile.unit(5)
-    healthy = Scenario(hand_session(24, layout=5), "unit", accel, gyro, profile.clock)
     size = {"amplitude": (0.08, -0.1, 0.06), "tau_s": 60.0}
-    recording, truth = simulate(with_effect(healthy, "accel-bias-drift", **size), seed=5)
+    recording, truth = simulated("accel-bias-drift", 5, **size)
     found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
     assert "accel-bias-drift" in [one.id for one in found.effects]
     poses = found.segments

@@ -20,10 +20,7 @@ from trihedron.simulate import (
     scenario_by_name,
     simulate,
 )
-from twins_kalman import DIVIDING_HEAD_ANGLES_DEG
-
-S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
-B_TRUE = (0.2, -0.3, 0.1)
+from twins_kalman import B_TRUE, DIVIDING_HEAD_ANGLES_DEG, S_TRUE
 
 
 @pytest.fixture(scope="module")

@@ -17,22 +17,14 @@ from trihedron.read import ReadError, read_pose_table
 from trihedron.records import AxisNoise, FindingCode, PoseTable
 from trihedron.segment import segment_recording
 from trihedron.simulate import Accelerometer, NoiseTerms, Scenario, dividing_head, simulate
-from twins_kalman import DIVIDING_HEAD_ANGLES_DEG, normalised_error_squared
-
-GRAVITY = 9.80665
-S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.99]])
-B_TRUE = np.array([0.2, -0.3, 0.1])
-
-
-def head_session(seed):
-    accelerometer = Accelerometer(S=tuple(map(tuple, S_TRUE)), b=tuple(B_TRUE), noise=NoiseTerms(N=(0.005,) * 3))
-    recording = simulate(Scenario(motion=dividing_head(), accelerometer=accelerometer), seed=seed)[0]
-    return recording, segment_recording(recording)
+from twins_kalman import B_TRUE, DIVIDING_HEAD_ANGLES_DEG, GRAVITY, S_TRUE, normalised_error_squared
 
 
 @pytest.fixture(scope="module")
 def head():
-    return head_session(1)
+    accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(0.005,) * 3))
+    recording = simulate(Scenario(motion=dividing_head(), accelerometer=accelerometer), seed=1)[0]
+    return recording, segment_recording(recording)
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,12 @@ import pytest
 from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand
+from diagnosed_session import unit_of
 from trihedron import calibrate
 from trihedron.estimate.gyroscope.lost_samples import could_be_remade, missing_samples
 from trihedron.records import FindingCode, Severity
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
 
 STEP_S = 0.01
 ROWS = np.arange(60_000)
@@ -67,10 +66,9 @@ def test_a_clock_of_its_own_rules_losses_out():
 
 def session(share, seed, move_s=2.0, grade="mpu"):
     """A session at 100 Hz from which a share of all rows is missing, numbered anew."""
-    scenario = _of(
-        profile_by_name(grade), hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed), "s", seed
+    log, _ = simulate(
+        unit_of(hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed), seed, grade), seed
     )
-    log, _ = simulate(scenario, seed)
     kept = np.random.default_rng(seed).random(log.n_samples) >= share
     return replace(
         log, time_s=np.arange(kept.sum()) / 100.0, accelerometer=log.accelerometer[kept], gyroscope=log.gyroscope[kept],

@@ -63,11 +63,3 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
         assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)
         mine, theirs = axis.terms[TermName.BIAS_INSTABILITY], logged.terms[TermName.BIAS_INSTABILITY]
         assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
-
-
-def test_a_tactical_grade_unit_shows_white_noise_only(real_data, tmp_path):
-    curve = noise_of_curve(gyroscopes_of(real_data, "ln200_av.csv", tmp_path))
-    assert [axis.name for axis in curve.axes] == ["Gyro. X", "Gyro. Y", "Gyro. Z"]
-    for axis in curve.axes:
-        assert axis.value("N") == pytest.approx(1.15e-5, rel=0.07)
-        assert not axis.terms[TermName.BIAS_INSTABILITY].is_present

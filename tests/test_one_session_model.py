@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosed_session import simulated
+from diagnosed_session import nearest_pose, simulated
 from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
@@ -93,13 +93,6 @@ def fitted_to(recording, gravity):
     calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     obs = observe(recording, segments)
     return tune_noise(obs, start_state(obs, calibration), None), calibration
-
-
-def scattered(readings, segments, sigma_raw, rng):
-    """Readings with a bias of its own in every pose, carried from pose to pose in the middle of each move."""
-    edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), len(readings)]
-    offset = np.repeat(sigma_raw * rng.standard_normal((len(edges) - 1, 3)), np.diff(edges), axis=0)
-    return readings + offset
 
 
 def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data):
@@ -190,10 +183,12 @@ def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))
         force_scale = np.cbrt(abs(np.linalg.det(truth.accelerometer_S)))
+        of_pose = rng.standard_normal((2, segments.n_poses, 3))
+        bias = of_pose[:, nearest_pose(segments.poses, recording.n_samples)]
         moved = replace(
             recording,
-            gyroscope=scattered(recording.gyroscope, segments, np.radians(0.05) / scale, rng),
-            accelerometer=scattered(recording.accelerometer, segments, 3e-3 / force_scale, rng),
+            gyroscope=recording.gyroscope + np.radians(0.05) / scale * bias[0],
+            accelerometer=recording.accelerometer + 3e-3 / force_scale * bias[1],
         )
         found = calibrate(moved, segments=segment_recording(moved), gravity_m_s2=truth.gravity_m_s2).calibration
         pairs = ((found.accelerometer, truth.accelerometer_S), (found.gyroscope, truth.gyroscope_S))

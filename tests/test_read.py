@@ -85,17 +85,10 @@ def test_the_format_is_told_by_the_content_and_not_by_the_name(tmp_path, extensi
     parquet = tmp_path / f"table{extension}"
     pl.DataFrame(table, schema=HEADER.strip().split(",")).write_parquet(parquet)
     assert_same(read_recording(parquet), table)
-
-
-def test_numpy_files_give_the_numbers_that_were_saved(tmp_path):
-    table = readings()
-    np.save(tmp_path / "a.npy", table)
-    assert_same(read_recording(tmp_path / "a.npy"), table)
-    np.savez(tmp_path / "b.npz", t_s=table[:, 0], acc=table[:, 1:4], gyr=table[:, 4:])
-    assert_same(read_recording(tmp_path / "b.npz"), table)
-    fields = np.rec.fromarrays(list(table.T), names="t_s,ax,ay,az,gx,gy,gz")
-    np.save(tmp_path / "c.npy", np.asarray(fields))
-    assert_same(read_recording(tmp_path / "c.npy"), table)
+    array = tmp_path / f"array{extension}"
+    with array.open("wb") as stream:
+        np.save(stream, table)
+    assert_same(read_recording(array), table)
 
 
 def test_comments_and_blank_lines_between_rows_are_passed_over_and_lines_still_counted(tmp_path):
@@ -241,22 +234,6 @@ def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
         read_recording(path, accelerometer_unit="furlong")
     with pytest.raises(ReadError, match="not a time unit"):
         read_recording(path, time_unit="fortnight")
-
-
-def test_seconds_and_nanoseconds_in_two_columns_are_one_clock(tmp_path):
-    table = readings(250)
-    rows = [
-        f"{1600000000 + i // 100},{(i % 100) * 10_000_000}," + ",".join(map(repr, map(float, table[i, 1:])))
-        for i in range(250)
-    ]
-    names = "header.stamp.secs,header.stamp.nsecs"
-    for topic in ("linear_acceleration", "angular_velocity"):
-        names += "".join(f",{topic}.{axis}" for axis in "xyz")
-    path = tmp_path / "ros.csv"
-    path.write_text(names + "\n" + "\n".join(rows) + "\n")
-    recording = read_recording(path)
-    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=1e-9)
-    assert recording.start_epoch_s == 1600000000
 
 
 def test_a_counter_that_starts_again_from_zero_is_continued(tmp_path):

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from formats.table import LAYOUTS, read_layout, verdict
+from hand_made_sessions import motion
 from makers.structured import documents, drive
-from test_read_in_silence import motion
 from trihedron.read import ReadError, read_recording
 from trihedron.read.merge import merge, resample
 from trihedron.records import FindingCode, Severity

@@ -141,25 +141,6 @@ def test_kim_is_even_behind_stamps_of_5_ms_ticks(real_data):
     )
 
 
-def test_openaxes_is_even_behind_stamps_of_arrival(real_data):
-    recording = read_recording(real_data / "openaxes" / "bmi160.csv")
-    # Its sample counter (in log_imu9.csv, not in this file) says 23 725 rows and none lost: T = 9.99428 ms.
-    assert recording.sampling.is_even
-    assert recording.sampling.n_lost == 0
-    assert recording.sampling.period_s == pytest.approx(9.99428e-3, abs=1e-7)
-    assert FindingCode.TIME_GAP not in codes(recording)
-    np.testing.assert_allclose(np.diff(recording.time_s), 9.99428e-3, rtol=1e-4)
-
-
-def test_xsens_trackers_were_sampled_when_they_say(real_data):
-    # Steps of 7.5 and 10 ms are ticks of 400 Hz at which samples were taken: the turns say so.
-    recording = read_recording(real_data / "dual_xsens" / "imu_a_45_1.csv")
-    assert not recording.sampling.is_even
-    assert recording.sampling.followed == pytest.approx(1.0, abs=0.15)
-    assert FindingCode.TIMESTAMPS_KEPT in codes(recording)
-    assert set(np.round(1e3 * np.diff(recording.time_s), 3)) == {7.5, 10.0}
-
-
 @pytest.mark.parametrize("name", ["allan_curves/adis_av.csv", "analog6dof/viconRot1.csv"])
 def test_a_table_that_is_no_log_is_refused_by_its_columns(real_data, name):
     with pytest.raises(ReadError, match="no accelerometer and no gyro columns recognised among"):

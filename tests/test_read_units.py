@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-import formats.session
 import trihedron
+from hand_made_sessions import motion
 from test_read import HEADER, codes, finding, write
 from trihedron.read import read_recording
 from trihedron.read.names import parse_name
@@ -17,9 +17,7 @@ RATE_HZ = 100.0
 
 
 def session(n_poses=6, turn_s=1.0):
-    """time [s] (n,), specific force [m/s^2] (n, 3), rate [rad/s] (n, 3): poses joined by random turns."""
-    made = formats.session.session(np.random.default_rng(3), RATE_HZ, n_poses, turn_s)
-    return made.time_s, made.force, made.rate
+    return motion(RATE_HZ, 3, n_poses, turn_s)
 
 
 def saved(path, time_s, force, rate, header=HEADER):

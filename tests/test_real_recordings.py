@@ -169,6 +169,22 @@ def model(S, b):
     return Calibration(sensor, None, np.zeros((12, 12)), "case", 9.7974, "given", extensions=MappingProxyType({}))
 
 
+@pytest.mark.parametrize("run", [2, 3])
+def test_phone_holds_agree_with_the_published_sections(real_data, run):
+    folder = real_data / "phone"
+    published = json.loads((folder / "published_results.json").read_text())[f"static_sections_rec{run}_samples"]
+    acceleration, rate = (next(folder.glob(f"rec_{run}_*{what}.csv")) for what in ("Acceleration", "AngularVelocity"))
+    segments = trihedron.segment(trihedron.read(accelerometer_path=acceleration, gyroscope_path=rate))
+    agreement = [
+        max((min(h.stop, b) - max(h.start, a)) / (max(h.stop, b) - min(h.start, a)) for h in segments.poses)
+        for a, b in published
+    ]
+    # Marked by hand, some with up to three seconds given away at an end; a pose of this very quiet sensor loses its
+    # settling, up to a third of it.
+    assert np.median(agreement) > 0.9
+    assert min(agreement) > 0.6
+
+
 def test_phone_verification_says_which_published_result_is_wrong(real_data):
     """Both published models and ours, verified on a recording of corners that none was made from (ours: rec_3)."""
     folder = real_data / "phone"
@@ -245,22 +261,3 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
         # Back through the calibration: the reference angle, within the drift of the bias over 5 s.
         assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
-
-
-@pytest.fixture(scope="module")
-def mimu(real_data):
-    """Device 7 calibrated on one session, and another session of it."""
-    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", instance=7) for n in (2, 3))
-    return trihedron.calibrate(first, gravity_m_s2=9.8184).calibration, other
-
-
-def test_a_scale_off_by_a_twentieth_or_a_bias_by_5_degrees_a_second_fails_on_another_session(mimu):
-    right, other = mimu
-    gyro, accelerometer = right.gyroscope, right.accelerometer
-    scaled = replace(
-        right,
-        gyroscope=replace(gyro, S=1.05 * gyro.S, b=1.05 * gyro.b),
-        accelerometer=replace(accelerometer, S=1.05 * accelerometer.S, b=1.05 * accelerometer.b),
-    )
-    turning = replace(right, gyroscope=replace(gyro, b=gyro.b + math.radians(5.0)))
-    assert [trihedron.verify(one, other).is_passed for one in (right, scaled, turning)] == [True, False, False]

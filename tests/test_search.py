@@ -8,7 +8,7 @@ import polars
 import pytest
 
 import trihedron
-from diagnosed_session import diagnosed, simulated
+from diagnosed_session import diagnosed, nearest_pose, simulated
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
@@ -110,11 +110,9 @@ def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
     recording, truth = simulated("gyro-scale-nonlinearity", 3, 16, c3=(3e-3, -3e-3, 3e-3))
     # The gyro's bias is another in every pose.
-    rng, zero = np.random.default_rng(3), np.zeros_like(recording.gyroscope)
-    starts = [part.start for part in truth.segments if part.kind == "pose"]
-    for start, stop in zip(starts, [*starts[1:], len(zero)], strict=True):
-        zero[start:stop] = rng.normal(size=3) * 0.07 * 131.0
-    moved = replace(recording, gyroscope=recording.gyroscope + zero)
+    poses = [part for part in truth.segments if part.kind == "pose"]
+    bias = 0.07 * 131.0 * np.random.default_rng(3).normal(size=(len(poses), 3))
+    moved = replace(recording, gyroscope=recording.gyroscope + bias[nearest_pose(poses, recording.n_samples)])
     names = [effect.id for effect in trihedron.diagnose(moved, gravity_m_s2=truth.gravity_m_s2).effects]
     # The scatter may stray between poses as far as moves show: without its cost it explained the moves alone.
     assert names[0] == "gyro-scale-nonlinearity"

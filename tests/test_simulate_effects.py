@@ -279,13 +279,6 @@ def test_a_coarse_converter_rounds_and_a_ratiometric_one_follows_its_supply():
     assert np.abs(sagging.supply_v - truth.supply_v).max() <= 0.0005 + 1e-9
 
 
-def test_a_dead_band_sleeps_around_zero_input():
-    recording, truth = both("quantisation", sensor="gyroscope", dead_band=0.3)
-    asleep = np.abs(truth.angular_rate_rad_s) < 0.3
-    assert not recording.gyroscope[asleep].any()
-    assert np.array_equal(recording.gyroscope[~asleep], truth.angular_rate_rad_s[~asleep])
-
-
 def test_a_pushed_pose_moves_and_comes_back():
     recording, truth = both("disturbed-pose", poses=[2], tilt_deg=1.0)
     (push,) = [s for s in truth.segments if s.kind == "disturbance"]

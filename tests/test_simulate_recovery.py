@@ -36,15 +36,6 @@ def test_calibration_of_the_linear_noiseless_instrument_recovers_the_truth(rate_
     assert np.abs(gyro.b - truth.gyroscope_b).max() < gyro_tolerance
 
 
-def test_without_noise_the_direct_form_returns_the_truth():
-    recording, truth = simulate(scenario_by_name("linear-noiseless"), seed=4)
-    f = recording.accelerometer @ truth.accelerometer_S.T + truth.accelerometer_b
-    w = recording.gyroscope @ truth.gyroscope_S.T + truth.gyroscope_b
-    # 16-bit counts of 1e-16 relative: 20 m/s² · 1e-15.
-    assert np.abs(f - truth.specific_force_m_s2).max() < 1e-12
-    assert np.abs(w - truth.angular_rate_rad_s).max() < 1e-12
-
-
 def test_switching_one_term_leaves_every_other_sample_by_sample():
     scenario = scenario_by_name("linear-noiseless")
     noisy = replace(scenario, gyroscope=replace(scenario.gyroscope, noise=NoiseTerms(N=(1e-4, 0, 0))))

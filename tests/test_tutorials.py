@@ -146,7 +146,3 @@ def test_capture_in_python_runs_as_shown(tmp_path, monkeypatch, capsys):
     exec(python_of("capture.md"), {})
     assert len(capsys.readouterr().out.splitlines()) > 0
     assert trihedron.read("log.csv").n_samples == 300
-
-
-def test_every_kind_of_reader_has_a_tutorial():
-    assert {path.stem for path in TUTORIALS} >= {"desk", "vio", "drone", "navigation", "laboratory"}

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import trihedron
+from diagnosed_session import simulated
 from trihedron.records import Pose, Recording, Segments
 from trihedron.session.static_lines import means_beside_lines
-from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
 
 RATE_HZ = 100.0
 SIGMA = 0.02
@@ -73,7 +71,7 @@ def session(seed, shaken_share, gain, rate_line):
 
     The truth's own poses are shaken from end to end, at a frequency that is no whole number of cycles of any.
     """
-    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(18, layout=seed), "session", seed), seed)
+    recording, truth = simulated(seed=seed, n_poses=18, grade="tactical")
     rng = np.random.default_rng(seed)
     force, rate, t = recording.accelerometer.copy(), recording.gyroscope.copy(), recording.time_s
     rests = [part for part in truth.segments if part.kind == "pose"]

@@ -47,7 +47,7 @@ SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
 @pytest.fixture(scope="module")
-def names(tmp_path_factory):
+def names(tmp_path_factory, without_corners):  # noqa: ARG001
     """What the script leaves, its sessions shorter than they are printed."""
     script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
     session = 'kind = "hand"\\n'

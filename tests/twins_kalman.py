@@ -3,6 +3,8 @@
 import numpy as np
 
 GRAVITY = 9.80665
+S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.99]])
+B_TRUE = np.array([0.2, -0.3, 0.1])
 ARTICLE_CONSTANTS = np.array(
     [
         [0.032002, -0.0017435, 7.4811e-5, -2.5865],

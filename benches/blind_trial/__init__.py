@@ -1,1 +1,1 @@
-"""Blind trial of the diagnosis: recordings with a sealed flaw (draw, foreign), and how answers are scored."""
+"""Blind trials on the simulator: recordings with a sealed answer (draw, foreign, sizes), and their scores."""

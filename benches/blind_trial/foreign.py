@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from blind_trial.sizes import sample_noise
 from trihedron.records import Recording
 from trihedron.records.truth import Truth
 from trihedron.simulate import Scenario
+from trihedron.simulate.profiles import Profile
 from trihedron.simulate.readout import sense_axes
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,14 +32,14 @@ class Foreign:
     signal: Signal
 
     def added_to(
-        self, log: Recording, truth: Truth, scenario: Scenario, session: Any, rng: np.random.Generator, scale: float
+        self, log: Recording, truth: Truth, scenario: Scenario, profile: Profile, rng: np.random.Generator
     ) -> Recording:
         """The log of an instrument that also does this; readings are rounded to the LSB again."""
         part = getattr(scenario, self.sensor)
         directions, gain = sense_axes(part.S, self.sensor)
         motion = truth.angular_rate_rad_s if self.sensor == "gyroscope" else truth.specific_force_m_s2
-        noise = session.sample_noise[self.sensor] / np.sqrt(5.0 * scenario.clock.rate_hz)
-        extra = scale * self.signal(truth, motion @ directions.T, noise, rng)
+        noise = sample_noise(profile)[self.sensor] / np.sqrt(5.0 * scenario.clock.rate_hz)
+        extra = self.signal(truth, motion @ directions.T, noise, rng)
         raw = getattr(log, self.sensor)
         if part.adc.lsb > 0.0:
             # What an ADC has rounded already would round less than half a step away: nothing would be added.

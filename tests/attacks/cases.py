@@ -22,7 +22,6 @@ LONGEST_S = 10
 LONGEST_WORK_S = 60
 """Of ``HEAVY`` commands, where they do their work: a demonstration, a diagnosis of every log of a folder."""
 PATIENCE = 6
-Files = dict[str, str]
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
 
 

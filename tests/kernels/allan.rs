@@ -3,19 +3,11 @@
 use proptest::prelude::*;
 use trihedron::allan::tiles::{Difference, Kernel, energies};
 
-/// A congruential sequence of zero mean: seeds explicit, no dependence.
+use super::made_session::Uniform;
+
 fn readings(n: usize, seed: u64) -> Vec<f64> {
-    let mut state = seed
-        .wrapping_mul(2_862_933_555_777_941_757)
-        .wrapping_add(3_037_000_493);
-    (0..n)
-        .map(|_| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        })
-        .collect()
+    let mut random = Uniform(seed);
+    (0..n).map(|_| random.next()).collect()
 }
 
 proptest! {

@@ -7,6 +7,8 @@ use trihedron::ellipsoid::{
 };
 use trihedron::norm_invariant::{Frame, Model};
 
+use super::made_session::Uniform;
+
 const G: f64 = 9.81;
 
 /// Six faces and twelve edges of a cube.
@@ -100,14 +102,9 @@ proptest! {
 fn where_noise_makes_a_hyperboloid_the_constrained_fit_is_still_an_ellipsoid() {
     // All poses within 25° of one axis: the far side is extrapolated and noise decides its sign.
     let mut hyperboloids = 0;
-    let mut state = 1_u64;
-    let mut noise = || {
-        // A linear congruential generator is random enough to spoil a fit.
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(u32::MAX) * 2.0 - 0.5
-    };
+    let mut random = Uniform(1);
+    // A linear congruential generator is random enough to spoil a fit.
+    let mut noise = || 0.5 * random.next();
     for _ in 0..50 {
         let cap: Vec<Vector3<f64>> = (0..12)
             .map(|_| {

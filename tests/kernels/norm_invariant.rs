@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Matrix3, Vector3};
 use proptest::prelude::*;
 use trihedron::norm_invariant::{
-    Frame, Model, Readings, Settings, fit, held_out, in_frame, residual_gradient,
+    Frame, Model, Readings, Settings, fit, in_frame, residual_gradient,
 };
 
 use super::ellipsoid::{cube_poses, nine, readings, triad};
@@ -99,27 +99,6 @@ fn many(copies: usize) -> Vec<Vector3<f64>> {
                 .map(move |a| a + Vector3::new((k as f64).sin(), (2.0 * k as f64).cos(), 0.3))
         })
         .collect()
-}
-
-#[test]
-fn poses_held_out_are_predicted_within_their_own_error() {
-    let mut values = readings(&triad([0.1; 9]), &cube_poses());
-    values[4].x += 500.0;
-    let noise = [Matrix3::identity()];
-    let settings = settings(Frame::Lower);
-    let readings = of(&values, &noise);
-    let full = fit(readings, &settings, None).expect("fits");
-    let folds: Vec<usize> = (0..values.len()).collect();
-    let apart = held_out(readings, &settings, &full, &folds).expect("folds");
-    // Pose 4 is wrong: the fit that did not see it is exact, all others are bent by it.
-    assert!(apart[4].chi2_per_dof < 1e-6, "{}", apart[4].chi2_per_dof);
-    assert!(apart[4].residual.abs() > 100.0 * apart[4].sigma);
-    assert!(
-        apart
-            .iter()
-            .enumerate()
-            .all(|(i, pose)| i == 4 || pose.chi2_per_dof > 10.0)
-    );
 }
 
 #[test]

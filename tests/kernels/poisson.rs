@@ -146,18 +146,6 @@ fn sensitivities_match_differences_at_zero_tiny_and_ordinary_rates() {
 }
 
 #[test]
-fn the_same_bias_at_both_anchors_is_a_constant_rate() {
-    let time = timestamps(80, 2.0, 0.3);
-    let b = Vector3::new(0.3, -0.2, 0.5);
-    let p = prepared(&time, &vec![Vector3::zeros(); 80], RateModel::Coning);
-    let turn = run(&p, &scale(), &b, &b);
-    assert!((turn.rotation - exp(&(-b * 2.0))).norm() < 1e-13);
-    // Both anchors together move the rate by one for the whole time: the angle per unit of rate is Δt along b.
-    let along = (turn.wrt_bias_before + turn.wrt_bias_after) * b;
-    assert!((along - b * 2.0).norm() < 1e-12);
-}
-
-#[test]
 fn lost_rows_and_repeated_timestamps_are_bridged() {
     let time = timestamps(101, 2.0, 0.0);
     let w = Vector3::new(0.4, 0.1, -0.2);
@@ -177,27 +165,6 @@ fn lost_rows_and_repeated_timestamps_are_bridged() {
             "{model:?}"
         );
     }
-}
-
-#[test]
-fn a_lost_sample_widens_the_covariance() {
-    let mut time = timestamps(101, 2.0, 0.0);
-    let mut raw = sampled(&time, 1.0);
-    let noise = RateNoise {
-        nominal_step_s: 0.02,
-        ..QUIET
-    };
-    let cov = |time: &[f64], raw: &[Vector3<f64>]| {
-        let zero = Vector3::zeros();
-        prepared(time, raw, RateModel::Coning)
-            .integrate(&scale(), &zero, &zero, &noise)
-            .cov_noise
-            .trace()
-    };
-    assert!(cov(&time, &raw) == 0.0);
-    time.drain(50..55);
-    raw.drain(50..55);
-    assert!(cov(&time, &raw) > 0.0);
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! The simulated instrument against closed forms.
 
-use proptest::prelude::*;
 use std::f64::consts::TAU;
-use trihedron::simulate::jet::{Jet, progress, window};
 use trihedron::simulate::mechanism::{Bridge, creep, first_order, play, second_order};
 use trihedron::simulate::noise::flicker_poles;
 use trihedron::simulate::random::Stream;
@@ -176,30 +174,5 @@ fn flicker_poles_add_up_to_one_over_f() {
         // Ripple 0.3 %; at both ends of the band the sum is cut, at the upper one aliasing nearly makes up for it.
         assert!((psd * w - 1.0).abs() < 0.07, "{f} Hz: {}", psd * w);
         f *= 1.3;
-    }
-}
-
-fn jet_of(f: impl Fn(f64) -> f64, t: f64) -> (f64, f64) {
-    let h = 1e-4;
-    (
-        (f(t - 2.0 * h) - 8.0 * f(t - h) + 8.0 * f(t + h) - f(t + 2.0 * h)) / (12.0 * h),
-        (f(t + h) - 2.0 * f(t) + f(t - h)) / (h * h),
-    )
-}
-
-proptest! {
-    #[test]
-    fn progress_and_window_carry_their_derivatives(tau in 0.01..0.99f64, ramp in 0.05..0.5f64) {
-        // A joint of the pieces inside the difference would show its jump in the third derivative.
-        prop_assume!((tau - ramp).abs() > 1e-3 && (tau - 1.0 + ramp).abs() > 1e-3);
-        let at = |v: f64| Jet { v, d: 1.0, dd: 0.0 };
-        for f in [progress as fn(Jet, f64) -> Jet, window as fn(Jet, f64) -> Jet] {
-            let got = f(at(tau), ramp);
-            let (d, dd) = jet_of(|t| f(at(t), ramp).v, tau);
-            // Second difference of step 1e-4: truncation h²/12 f'''' with f'''' up to 360/ramp⁴.
-            prop_assert!((got.d - d).abs() < 1e-7 / ramp.powi(4));
-            prop_assert!((got.dd - dd).abs() < 1e-6 / ramp.powi(4));
-        }
-        prop_assert!((progress(at(1.0), ramp).v - 1.0).abs() < 1e-14);
     }
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from formats.session import G
+from hand_made_sessions import G
 from makers.layout import COUNTS, SI, Layout, dates, layout, plain, session, written
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from formats.session import G
+from hand_made_sessions import G
 from makers.layout import COUNTS, EPOCH_S, SI, Layout, dates, in_si, layout, nanoseconds, session, written
 
 

@@ -12,8 +12,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from formats import session as known
-from formats.session import Session
+from hand_made_sessions import motion
 
 EPOCH = datetime(2024, 3, 1, 12, 0, 0)
 EPOCH_S = 1709294400.0
@@ -37,6 +36,19 @@ class Layout:
     merged: bool = False
 
 
+@dataclass(frozen=True)
+class Session:
+    """One part's raw readings in SI: time (n,) [s], specific force (n, 3), rate (n, 3)."""
+
+    time_s: np.ndarray
+    force: np.ndarray
+    rate: np.ndarray
+
+    @property
+    def n(self) -> int:
+        return len(self.time_s)
+
+
 LAYOUTS: dict[str, Callable[[], Layout]] = {}
 
 
@@ -47,7 +59,7 @@ def layout(make: Callable[[], Layout]) -> Callable[[], Layout]:
 
 def session(rate_hz: float, seed: int = 1) -> Session:
     """Four poses and the turns between them, 18.5 s."""
-    return known.session(np.random.default_rng(seed), rate_hz, n_poses=4)
+    return Session(*motion(rate_hz, seed, 4))
 
 
 def written(*columns: np.ndarray, separator: str = ",", end: str = "\n", form: str = "{!r}") -> str:

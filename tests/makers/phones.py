@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 
-from formats.session import G
+from hand_made_sessions import G
 from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, session, written
 
 
