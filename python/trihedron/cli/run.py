@@ -31,6 +31,8 @@ _NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
 UNSTORED = "calibration.json"
 UNKNOWN_PLACE = "--latitude DEG"
 """Option of the next command where gravity was not given."""
+UNKNOWN_RATE = " --rate HZ"
+"""The same where the log states no rate."""
 # Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
     *("json", "report", "output", "force", "full", "csv", "plot", "updated", "improved"),
@@ -132,6 +134,8 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
     said, what_next = document.next_step, document.what_next
     if any(one.code is FindingCode.GRAVITY_DEFAULTED for one in document.findings):
         _now().place = UNKNOWN_PLACE
+    if any(one.code is FindingCode.RATE_ASSUMED for one in document.findings) and UNKNOWN_RATE not in _now().log:
+        _now().log += UNKNOWN_RATE
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):

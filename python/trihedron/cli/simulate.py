@@ -119,13 +119,15 @@ def simulate(
     findings: tuple[Finding, ...] = ()
     if like is not None and calibration is not None:
         from trihedron.api.applying import doubted
+        from trihedron.api.reading import segment
         from trihedron.files.calibration import read_calibration
         from trihedron.records.recording import as_arguments
 
         repeated = LogSource(**asdict(how), log=like).read()
         of_unit = read_calibration(calibration)
         recording, known = twin(repeated, of_unit, seed)
-        beside, findings = as_arguments(repeated.source), (*repeated.findings, *doubted(of_unit))
+        beside = as_arguments(repeated.source)
+        findings = (*repeated.findings, *segment(repeated).findings, *doubted(of_unit))
     else:
         recording, known = run(str(scenario), seed)
     if output is not None:
