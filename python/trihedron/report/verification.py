@@ -101,6 +101,9 @@ def use_in_words(v: Verification, what: str) -> str:
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
+    if use and _of_uncertainty(v):
+        look = "See what the errors are: `trihedron diagnose LOG --calibration FILE`."
+        use = f"{look} Where they are acceptable: u{use[1:]}"
     return above[0].action if above else use
 
 
