@@ -22,10 +22,7 @@ OPTIONS = {
     "log": typer.Argument(
         metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."
     ),
-    "limit_mg": (
-        "MG",
-        "Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
-    ),
+    "limit_mg": ("MG", "Largest rms gravity error in static poses that you accept; beyond it the exit status is 2."),
     "limit_deg": ("DEG", "The same for the tilt error after a rotation."),
 }
 
