@@ -98,6 +98,11 @@ def printed_numbers(texts: Sequence[str]) -> list[float] | None:
         return None
 
 
+def triad(sensor: str, unit: str) -> tuple[str, ...]:
+    """Column names of the three axes of a sensor."""
+    return tuple(f"{sensor}_{axis} [{unit}]" for axis in "xyz")
+
+
 class Decoder(ABC):
     """Converts bytes, in pieces of any size, to complete frames.
 
@@ -157,12 +162,10 @@ class FramedDecoder(Decoder):
         """The content of a valid frame, or None where it has no readings."""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Frames that are complete with these bytes."""
         self._buffer += data
         return self._take(is_last=False)
 
     def finish(self) -> list[Frame]:
-        """Frames in the remaining bytes, at the end of the stream."""
         frames = self._take(is_last=True)
         if self._buffer:
             self.skipped_bytes += len(self._buffer)
