@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trihedron.api.calibrating import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open, nominal
 from trihedron.diagnose.static_log.answer import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS
@@ -16,8 +17,6 @@ from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
 """The recording's own calibration, computed on first use; raises what ``calibrate`` raises."""
-FEWEST_POSES = 3
-"""Fewest poses for which a calibration is tried."""
 SAME_POSE_RAD = 0.15
 """Poses whose gravity points less than 9° apart are one orientation."""
 TWO_ORIENTATIONS = 2
