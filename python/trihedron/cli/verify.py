@@ -44,7 +44,6 @@ def verify(
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying
-    from trihedron.api.ranking import rank
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
@@ -54,7 +53,7 @@ def verify(
     recording = log.read()
     if len(known) > 1:
         with progress("ranking") as notify:
-            ranking = rank(paths, recording, progress=notify, **place.said)
+            ranking = verifying.rank(paths, recording, progress=notify, **place.said)
         document = ranking_report(ranking)
         note_file(next(path for path in paths if path.name == ranking.best.name))
         results.show(document, FIRST_SCREEN)
