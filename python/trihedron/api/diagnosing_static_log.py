@@ -94,9 +94,11 @@ def diagnosed_static_log(
     """The diagnosis of a log of one or two orientations."""
     linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
     found = diagnose_static_log(recording, linear, gravity[0], alpha)
+    lasts = float(recording.time_s[-1] - recording.time_s[0])
+    few = Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
     return DiagnosisResult(
         **vars(found),
-        findings=(*findings, _too_few(recording, segments)),
+        findings=(*findings, few),
         gravity_source=gravity[1],
         model_is_given=is_given,
         calibration=model,
@@ -104,8 +106,3 @@ def diagnosed_static_log(
         segments=segments,
         recording=recording,
     )
-
-
-def _too_few(recording: Recording, segments: Segments) -> Finding:
-    lasts = float(recording.time_s[-1] - recording.time_s[0])
-    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
