@@ -15,25 +15,14 @@ from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDecl
 Checksum = Callable[[bytes], int]
 
 
-def _crc8_table() -> tuple[int, ...]:
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte << 1) ^ (0x07 if byte & 0x80 else 0)
-        table.append(byte & 0xFF)
-    return tuple(table)
+def _table(shift: Callable[[int], int]) -> tuple[int, ...]:
+    """The remainder of every byte, after eight shifts by one bit."""
+    return tuple(reduce(lambda crc, _: shift(crc), range(8), byte) for byte in range(256))
 
 
-def _reflected_table(polynomial: int) -> tuple[int, ...]:
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte >> 1) ^ (polynomial if byte & 1 else 0)
-        table.append(byte)
-    return tuple(table)
-
-
-_CRC8, _MODBUS, _KERMIT = _crc8_table(), _reflected_table(0xA001), _reflected_table(0x8408)
+_CRC8 = _table(lambda crc: ((crc << 1) ^ (0x07 if crc & 0x80 else 0)) & 0xFF)
+_MODBUS = _table(lambda crc: (crc >> 1) ^ (0xA001 if crc & 1 else 0))
+_KERMIT = _table(lambda crc: (crc >> 1) ^ (0x8408 if crc & 1 else 0))
 
 
 def _crc8(data: bytes) -> int:
