@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from trihedron.api.capturing import capture as capture
     from trihedron.api.capturing import ports as ports
     from trihedron.api.checking import check as check
-    from trihedron.api.converting import convert as convert
     from trihedron.api.demonstrating import demo as demo
     from trihedron.api.diagnosing import diagnose as diagnose
     from trihedron.api.diagnosing_sessions import diagnose_sessions as diagnose_sessions
@@ -62,7 +61,7 @@ if TYPE_CHECKING:
     from trihedron.api.filtering import kalman as kalman
     from trihedron.api.identifying import allan as allan
     from trihedron.api.planning import plan as plan
-    from trihedron.api.ranking import rank as rank
+    from trihedron.api.reading import convert as convert
     from trihedron.api.reading import read as read
     from trihedron.api.reading import segment as segment
     from trihedron.api.references import calibrate_references as calibrate_references
@@ -70,6 +69,7 @@ if TYPE_CHECKING:
     from trihedron.api.sessions import calibrate_sessions as calibrate_sessions
     from trihedron.api.simulating import simulate as simulate
     from trihedron.api.simulating import twin as twin
+    from trihedron.api.verifying import rank as rank
     from trihedron.api.verifying import verify as verify
     from trihedron.errors import InputError as InputError
     from trihedron.estimate.attitude import integrate_rate as integrate_rate
@@ -102,7 +102,6 @@ _PUBLIC = {
     "api.calibrating": "calibrate",
     "api.capturing": "capture ports",
     "api.checking": "check",
-    "api.converting": "convert",
     "api.demonstrating": "demo",
     "api.diagnosing": "diagnose",
     "api.diagnosing_sessions": "diagnose_sessions",
@@ -112,13 +111,12 @@ _PUBLIC = {
     "api.filtering": "kalman",
     "api.identifying": "allan",
     "api.planning": "plan",
-    "api.ranking": "rank",
-    "api.reading": "read segment",
+    "api.reading": "convert read segment",
     "api.references": "calibrate_references",
     "api.replaying": "guide",
     "api.sessions": "calibrate_sessions",
     "api.simulating": "simulate twin",
-    "api.verifying": "verify",
+    "api.verifying": "rank verify",
     "errors": "InputError",
     "estimate.attitude": "integrate_rate",
     "estimate.noise.allan": "allan_deviation",

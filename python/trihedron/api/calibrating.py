@@ -254,16 +254,13 @@ def _by_poses(
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, nominal)
-            return replace(both, findings=(*_still_said(found), *both.findings))
+            # The joint fit states its own excess residual.
+            still = [finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
+            return replace(both, findings=(*still, *both.findings))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
     except INPUT_ERRORS as error:
         return _without_gyroscope(alone, error)
     return _together(alone, gyroscope, more)
-
-
-def _still_said(found: Found) -> Found:
-    """Findings of the accelerometer's own fit that hold for the joint fit, which states its own excess residual."""
-    return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
 
 
 def _by_faces(

@@ -69,6 +69,11 @@ def open_device(
         raise
 
 
+def recorder_of(source: Source, found: Found, output: Path, **options: Any) -> Recorder:
+    """The recorder of an opened device, with the bytes that were read to detect its protocol."""
+    return Recorder(source, found.make_decoder, output, first_bytes=found.first_bytes, **options)
+
+
 def capture(
     port: str,
     output: str | os.PathLike[str],
@@ -122,15 +127,7 @@ def capture(
         raise InputError(f"seconds is how long to record, not {seconds:g}")
     check_free([Path(output)], overwrite=overwrite)
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
-    recorder = Recorder(
-        source,
-        found.make_decoder,
-        Path(output),
-        overwrite=overwrite,
-        rate_hz=rate_hz,
-        wait_for_return_s=wait_s,
-        first_bytes=found.first_bytes,
-    )
+    recorder = recorder_of(source, found, Path(output), overwrite=overwrite, rate_hz=rate_hz, wait_for_return_s=wait_s)
     began_s = time.monotonic()
     with stopped_by(recorder, signal.SIGINT):
         for block in recorder:

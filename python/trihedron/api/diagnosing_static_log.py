@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trihedron.api.calibrating import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open, nominal
 from trihedron.diagnose.static_log.answer import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS
@@ -16,8 +17,6 @@ from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
 """The recording's own calibration, computed on first use; raises what ``calibrate`` raises."""
-FEWEST_POSES = 3
-"""Fewest poses for which a calibration is tried."""
 SAME_POSE_RAD = 0.15
 """Poses whose gravity points less than 9° apart are one orientation."""
 TWO_ORIENTATIONS = 2
@@ -95,9 +94,11 @@ def diagnosed_static_log(
     """The diagnosis of a log of one or two orientations."""
     linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
     found = diagnose_static_log(recording, linear, gravity[0], alpha)
+    lasts = float(recording.time_s[-1] - recording.time_s[0])
+    few = Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
     return DiagnosisResult(
         **vars(found),
-        findings=(*findings, _too_few(recording, segments)),
+        findings=(*findings, few),
         gravity_source=gravity[1],
         model_is_given=is_given,
         calibration=model,
@@ -105,8 +106,3 @@ def diagnosed_static_log(
         segments=segments,
         recording=recording,
     )
-
-
-def _too_few(recording: Recording, segments: Segments) -> Finding:
-    lasts = float(recording.time_s[-1] - recording.time_s[0])
-    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)

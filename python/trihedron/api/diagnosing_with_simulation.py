@@ -121,7 +121,9 @@ def simulated_beside(
     logged = _simulated_log(against, recording, segments, gravity)
     logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
     simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
-    return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
+    n, m = simulated.segments.n_poses, segments.n_poses
+    differing = () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
+    return simulated, recording, segments, (*differing, *one_sided)
 
 
 def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> Simulated:
@@ -139,11 +141,6 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)
     return Simulated(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
-
-
-def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
-    n, m = simulated.n_poses, segments.n_poses
-    return () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
 
 
 def _both_sensors(

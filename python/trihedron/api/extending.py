@@ -158,17 +158,10 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: Float
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    if not diagnosis.effects:
-        return Finding.of(
-            FindingCode.EFFECTS_MODELLED,
-            "none-but-disagree" if left else "none",
-            left=left,
-            n_effects=0,
-            n_domains_left=len(left),
-        )
+    case = "fitted" if diagnosis.effects else "none"
     return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        "fitted-but-disagree" if left else "fitted",
+        f"{case}-but-disagree" if left else case,
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
         left=left,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -267,51 +268,33 @@ def _between_intervals(
 
 def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
     """Findings about N, K and their consistency, sensor by sensor."""
-    out = []
-    for one in sensors:
-        if not one.is_settled:
-            out.append(Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=one.sensor))
-        if one.N.is_limit:
-            out.append(Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", sensor=one.sensor, upper=one.N.upper))
-        elif one.N.upper > one.N.lower * UNCERTAIN:
-            lower, upper, value = one.N.lower, one.N.upper, one.N.value
-            said = Finding.of(
-                FindingCode.FILTER_NOISE_UNCERTAIN, sensor=one.sensor, in_file=value, lower=lower, upper=upper
-            )
-            out.append(said)
-        elif (mostly := _mostly_reference(one)) is not None:
-            share, horizon_s = mostly
-            said = Finding.of(
-                FindingCode.FILTER_NOISE_UNCERTAIN, "reference", sensor=one.sensor, share=share, horizon_s=horizon_s
-            )
-            out.append(said)
-        if one.static is None:
-            out.append(Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=one.sensor))
-            if one.N.upper < one.quietest:
-                value = one.N.filter_value
-                said = Finding.of(
-                    FindingCode.FILTER_NOISE_BELOW_QUIETEST, sensor=one.sensor, in_file=value, quietest=one.quietest
-                )
-                out.append(said)
-        if one.reference is not None and one.reference.follows:
-            out.append(Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=one.sensor))
-        if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
-            out.append(Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=one.sensor))
-        uncalibrated = _uncalibrated(one)
-        if uncalibrated is not None:
-            share, horizon_s = uncalibrated
-            out.append(
-                Finding.of(FindingCode.FILTER_NOISE_UNCALIBRATED, sensor=one.sensor, share=share, horizon_s=horizon_s)
-            )
-        tested = [c for c in one.consistency if c.n_apart >= 3]
-        worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
-        if worst is not None:
-            out.append(
-                Finding.of(
-                    FindingCode.FILTER_NOISE_INCONSISTENT, sensor=one.sensor, nees=worst.nees, horizon_s=worst.horizon_s
-                )
-            )
-    return tuple(out)
+    return tuple(finding for one in sensors for finding in _noticed(one))
+
+
+def _noticed(one: SensorFilterNoise) -> Iterator[Finding]:
+    of, N = partial(Finding.of, sensor=one.sensor), one.N
+    if not one.is_settled:
+        yield of(FindingCode.FILTER_NOISE_UNSETTLED)
+    if N.is_limit:
+        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", upper=N.upper)
+    elif N.upper > N.lower * UNCERTAIN:
+        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, in_file=N.value, lower=N.lower, upper=N.upper)
+    elif (mostly := _mostly_reference(one)) is not None:
+        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, "reference", share=mostly[0], horizon_s=mostly[1])
+    if one.static is None:
+        yield of(FindingCode.FILTER_NOISE_NO_STATIC)
+        if N.upper < one.quietest:
+            yield of(FindingCode.FILTER_NOISE_BELOW_QUIETEST, in_file=N.filter_value, quietest=one.quietest)
+    if one.reference is not None and one.reference.follows:
+        yield of(FindingCode.FILTER_NOISE_FOLLOWED)
+    if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
+        yield of(FindingCode.FILTER_NOISE_NOT_SEPARATED)
+    if (uncalibrated := _uncalibrated(one)) is not None:
+        yield of(FindingCode.FILTER_NOISE_UNCALIBRATED, share=uncalibrated[0], horizon_s=uncalibrated[1])
+    tested = [c for c in one.consistency if c.n_apart >= 3]
+    worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
+    if worst is not None:
+        yield of(FindingCode.FILTER_NOISE_INCONSISTENT, nees=worst.nees, horizon_s=worst.horizon_s)
 
 
 def _mostly_reference(one: SensorFilterNoise) -> tuple[float, float] | None:

@@ -48,12 +48,10 @@ POSES_PER_GOAL = 2.5
 GYRO_NAMES = tuple(f"scale of {XYZ[i]}" if i == j else f"{XYZ[j]} into {XYZ[i]}" for i in range(3) for j in range(3))
 
 
-def examine(
-    recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2, look_ahead: bool = True
-) -> Examination:
-    """Poses so far, every parameter's uncertainty now and after the next pose, and the best next pose.
+def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2) -> Examination:
+    """Poses so far and still needed, every parameter's uncertainty now and after the next pose, and the best next one.
 
-    ``look_ahead`` also counts the poses still needed. Too few poses raise nothing: unknown values are None.
+    Too few poses raise nothing: unknown values are None.
     """
     segments = segment(recording)
     calibration = _calibration(recording, segments, gravity_m_s2)
@@ -72,7 +70,7 @@ def examine(
     shortfall = float(
         np.max(np.where(np.isfinite(now), now / wanted, np.inf)[: 18 if known.gyroscope is not None else 9])
     )
-    needed = poses_needed(known, wanted, factor, shortfall) if look_ahead else None
+    needed = poses_needed(known, wanted, factor, shortfall)
     if needed is not None:
         needed = max(needed, LEAST_POSES - len(up))
     uncertain = _uncertain(now, after, wanted, has_gyroscope=known.gyroscope is not None)

@@ -20,7 +20,6 @@ from trihedron.comparison.ranges import SENSOR
 from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
-from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.pose_noise import PoseNoise
 from trihedron.records.results import DiagnosisResult
 from trihedron.simulate import (
@@ -68,11 +67,10 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     _noise(tables, given, found)
     ranged = _ranges(tables, given, found)
     physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
-    shared = {p.id for p in found.parameters if p.significant}
-    shared -= ranged
-    sizes, left_out = diagnosed_sizes(
-        [e.to_dict() for e in (*physics, *_shared(found, shared))], float(np.ptp(found.recording.time_s))
-    )
+    differing = {p.id for p in found.parameters if p.significant} - ranged
+    # Effects of both sides whose parameters differ get the recording's values.
+    shared = [effect for effect in found.own_effects if effect.id in differing]
+    sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *shared)], float(np.ptp(found.recording.time_s)))
     surplus = [*(effect.id for effect in found.effects if effect.side == "model"), *ranged]
     text = improved_scenario(scenario, tables, sizes, surplus)
     own = found.updated
@@ -165,11 +163,6 @@ def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
     if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
         return [None] * len(axes)
     return [None if one.white is None else (one.white.value, one.white.sigma_log) for one in axes]
-
-
-def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
-    """Effects of both sides whose parameters differ: with the recording's values."""
-    return [effect for effect in found.own_effects if effect.id in ids]
 
 
 def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:

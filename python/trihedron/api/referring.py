@@ -157,16 +157,14 @@ def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
     assert one.score is not None
     units = one.unit.split(", ")
     per = len(one.names) // len(units)
+    is_g = ident == "gyro-g-sensitivity"
+    names = [f"G_{name}" if is_g else name.replace(" ", "_") for name in one.names]
     parameters = tuple(
-        EffectParameter(_written(ident, name), float(v), float(s), units[min(k // per, len(units) - 1)])
-        for k, (name, v, s) in enumerate(zip(one.names, one.value, one.std, strict=True))
+        EffectParameter(name, float(v), float(s), units[min(k // per, len(units) - 1)])
+        for k, (name, v, s) in enumerate(zip(names, one.value, one.std, strict=True))
     )
     largest = int(np.argmax(np.abs(one.value / one.std)))
-    what = (
-        "reads a rate that follows specific force"
-        if ident == "gyro-g-sensitivity"
-        else "has a scale that depends on rate"
-    )
+    what = "reads a rate that follows specific force" if is_g else "has a scale that depends on rate"
     return AcceptedEffect(
         ident,
         f"The gyro {what} ({parameters[largest].name} stands out most).",
@@ -184,10 +182,6 @@ def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
             }
         ),
     )
-
-
-def _written(ident: str, name: str) -> str:
-    return f"G_{name}" if ident == "gyro-g-sensitivity" else name.replace(" ", "_")
 
 
 def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> tuple[ParameterDifference, ...]:

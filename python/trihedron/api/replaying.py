@@ -33,7 +33,6 @@ class Replay:
     view: GuideView
     recording: Recording
     cut_s: float | None
-    is_done: bool
 
 
 def guide(
@@ -100,7 +99,7 @@ def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_po
                 on_pose(view)
         if made.is_done:
             break
-    return Replay(made.finish(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s, made.is_done)
+    return Replay(made.finish(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s)
 
 
 def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:

@@ -197,8 +197,7 @@ def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
         else:
             ranges += [(pose.outer_start, pose.start + kept), (pose.stop - kept, pose.outer_stop)]
     ranges += [(move.start, move.stop) for move in segments.moves]
-    edges = [0, log.n_samples] if not ranges else None
-    joined = _joined([(edges[0], edges[1])] if edges else ranges)
+    joined = _joined(ranges or [(0, log.n_samples)])
     starts = np.array([a for a, _ in joined])
     offsets = np.concatenate([[0], np.cumsum([b - a for a, b in joined])])
 

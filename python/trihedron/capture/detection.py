@@ -173,10 +173,8 @@ def _listen(source: Source, for_s: float, silence_s: float) -> bytes:
     while time.monotonic() < until:
         try:
             piece = source.read()
-        except SourceEndedError:
-            return data
-        except SourceLostError:
-            if not data:
+        except (SourceEndedError, SourceLostError) as error:
+            if isinstance(error, SourceLostError) and not data:
                 raise
             return data
         if piece and not data:

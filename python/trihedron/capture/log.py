@@ -43,8 +43,6 @@ class GrowingLog:
         self._flushed_s = self._synced_s = time.monotonic()
         self.rows_saved = 0
         self._rows_waiting = 0
-        self.duration_s = 0.0
-        self._time_waiting = 0.0
 
     def begin(self, facts: dict[str, str], columns: list[str]) -> None:
         """Write the header: constant facts, two lines to be filled later, and the column names."""
@@ -64,11 +62,10 @@ class GrowingLog:
         except OSError as error:
             raise self._rejected(error) from None
 
-    def row(self, text: str, time_s: float) -> None:
+    def row(self, text: str) -> None:
         """Add one row, given without its end of line."""
         self._waiting.append(text)
         self._rows_waiting += 1
-        self._time_waiting = time_s
 
     def remark(self, text: str) -> None:
         """Add a comment line, which readers skip."""
@@ -85,7 +82,6 @@ class GrowingLog:
         if self._waiting:
             self._write("\n".join(self._waiting) + "\n")
             self.rows_saved += self._rows_waiting
-            self.duration_s = self._time_waiting
             self._waiting.clear()
             self._rows_waiting = 0
         # Counted from the end of the write: a slow disk gets fewer and larger pieces.

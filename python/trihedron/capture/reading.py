@@ -69,7 +69,7 @@ class Rows(GrowingLog):
         parts.append(str(index))
         if self._has_device_clock:
             parts.append(str(one.frame.ticks))
-        self.row(",".join(parts) + "," + one.frame.text, time_s)
+        self.row(",".join(parts) + "," + one.frame.text)
         return time_s
 
     def say(self, text: str) -> None:
@@ -129,7 +129,6 @@ class ReadingThread:
         self._thread = threading.Thread(target=self._read, name="capture reader", daemon=True)
 
     def start(self) -> None:
-        """Start reading."""
         self._thread.start()
 
     def stop(self) -> None:

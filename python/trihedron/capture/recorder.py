@@ -188,7 +188,9 @@ class Recorder:
             self._new_connection = False
         self._last_host_s = placed[-1].host_s
         timeline.arrived(host_s)
-        self._fill(host_s)
+        if host_s - self._filled_s >= FILL_S:
+            self._filled_s = host_s
+            self._say_facts()
         self._rows.flush()
         yield Block(
             times,
@@ -256,12 +258,6 @@ class Recorder:
         self.count.skipped_bytes = skipped + self._decoder.skipped_bytes
         now = self._sequence.tally if self._sequence is not None else Tally()
         self.count.tally = Tally(*(getattr(past, name) + getattr(now, name) for name in Tally.__dataclass_fields__))
-
-    def _fill(self, host_s: float) -> None:
-        if host_s - self._filled_s < FILL_S:
-            return
-        self._filled_s = host_s
-        self._say_facts()
 
     def _say_facts(self) -> None:
         self._count_now()

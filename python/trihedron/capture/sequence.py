@@ -191,11 +191,10 @@ class Sequence:
         first = next((i for i, ahead in enumerate(steps) if any(0 < s <= 4 for s in ahead)), 0)
         self.tally.garbled += first
         del self._waiting[:first]
-        host_s, frame = self._waiting.pop(0)
-        self._place(host_s, frame, 1, False, out)
+        self._accept(1, out)
         rest, self._waiting = self._waiting, []
-        for host_s, frame in rest:
-            self._waiting.append((host_s, frame))
+        for one in rest:
+            self._waiting.append(one)
             self._resolve(out)
 
     def _resolve(self, out: list[Placed]) -> None:
@@ -262,8 +261,7 @@ class Sequence:
         for _ in range(n):
             self._drop()
         self.tally.restarts += 1
-        host_s, frame = self._waiting.pop(0)
-        self._place(host_s, frame, 1, True, out)
+        self._accept(1, out, restarted=True)
         while self._waiting:
             self._accept(1, out)
 
@@ -284,11 +282,9 @@ class Sequence:
             else:
                 self._drop()
 
-    def _accept(self, ahead: int, out: list[Placed]) -> None:
+    def _accept(self, ahead: int, out: list[Placed], *, restarted: bool = False) -> None:
+        """Place the first waiting frame, ``ahead`` steps after the last placed one."""
         host_s, frame = self._waiting.pop(0)
-        self._place(host_s, frame, ahead, False, out)
-
-    def _place(self, host_s: float, frame: Frame, ahead: int, restarted: bool, out: list[Placed]) -> None:
         self._index += ahead
         key = self._key(frame)
         if self._by_clock and self._last is not None:

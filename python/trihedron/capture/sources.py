@@ -62,15 +62,12 @@ class Source(Protocol):
 
     def read(self) -> bytes:
         """The next piece, empty if none arrives within ``POLL_S``. Raises SourceLostError or SourceEndedError."""
-        ...
 
     def reopen(self) -> bool:
         """Try once to open the source again after it was lost; return whether that succeeded."""
-        ...
 
     def close(self) -> None:
         """Close the source."""
-        ...
 
 
 def import_serial() -> type[serial.Serial]:

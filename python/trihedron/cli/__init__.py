@@ -11,59 +11,27 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
 import typer
 
-from trihedron.cli.allan import allan
-from trihedron.cli.apply import apply
-from trihedron.cli.calibrate import calibrate
-from trihedron.cli.capture import capture
-from trihedron.cli.check import check
-from trihedron.cli.convert import convert
-from trihedron.cli.demo import demo
-from trihedron.cli.diagnose import diagnose
-from trihedron.cli.export import export
-from trihedron.cli.fleet import fleet
-from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
-from trihedron.cli.kalman import kalman
-from trihedron.cli.noise import noise
 from trihedron.cli.output import silence, spell_out
-from trihedron.cli.plan import plan
-from trihedron.cli.ports import ports
-from trihedron.cli.report import report
 from trihedron.cli.run import begin
-from trihedron.cli.segment import segment
-from trihedron.cli.simulate import simulate
-from trihedron.cli.verify import verify
 from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
 from trihedron.sanitise import escaped
 
 # In the order in which they are used.
-COMMANDS = (
-    demo,
-    plan,
-    ports,
-    capture,
-    guide,
-    check,
-    segment,
-    calibrate,
-    allan,
-    noise,
-    kalman,
-    verify,
-    diagnose,
-    fleet,
-    apply,
-    convert,
-    export,
-    report,
-    simulate,
+_NAMES = (
+    *("demo", "plan", "ports", "capture", "guide"),
+    *("check", "segment", "calibrate", "allan", "noise", "kalman"),
+    *("verify", "diagnose", "fleet", "apply", "convert", "export", "report", "simulate"),
 )
+# One module for each, with a function of its name.
+COMMANDS = tuple(getattr(import_module(f"{__name__}.{name}"), name) for name in _NAMES)
 
 _OF_ONE_LOG = {"check", "segment", "allan", "noise", "kalman", "diagnose"}
 

@@ -106,15 +106,8 @@ def _of_file(source: LogSource, checkpoint: Path | None, options: dict[str, Any]
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):
-        return noise_of_file(
-            source.log,
-            columns=source.columns,
-            rate_hz=source.rate,
-            accelerometer_unit=source.accel_unit,
-            gyroscope_unit=source.gyro_unit,
-            checkpoint=checkpoint,
-            **options,
-        )
+        options |= {"checkpoint": checkpoint, **source.units}
+        return noise_of_file(source.log, columns=source.columns, rate_hz=source.rate, **options)
 
 
 def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, accel_lsb: str | None) -> Noise:
@@ -125,13 +118,7 @@ def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, acce
     if gyro_lsb or accel_lsb:
         raise typer.BadParameter("--curve has no counts: say the unit of the deviations with --gyro-unit, --accel-unit")
     with progress("identifying"):
-        return noise_of_curve(
-            source.log,
-            rate_hz=source.rate,
-            n_samples=samples,
-            accelerometer_unit=source.accel_unit,
-            gyroscope_unit=source.gyro_unit,
-        )
+        return noise_of_curve(source.log, rate_hz=source.rate, n_samples=samples, **source.units)
 
 
 def _stretch(text: str) -> tuple[float, float]:

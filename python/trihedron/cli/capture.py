@@ -64,7 +64,6 @@ def capture(
 ) -> None:
     """Record what a board sends into a log, written as it arrives; lost samples are counted and reported."""
     from trihedron.capture.protocols import PROTOCOLS
-    from trihedron.capture.recorder import Recorder
 
     if list_them:
         for name, sentence in PROTOCOLS.items():
@@ -74,21 +73,13 @@ def capture(
         raise typer.BadParameter("name what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("name the log to write: -o LOG")
-    from trihedron.api.capturing import open_device, stopped_by
+    from trihedron.api.capturing import open_device, recorder_of, stopped_by
     from trihedron.files.output import check_free
 
     check_free([output, calibration], overwrite=force, inputs=[Path(port)])
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
-    recorder = Recorder(
-        source,
-        found.make_decoder,
-        output,
-        overwrite=force,
-        rate_hz=rate,
-        wait_for_return_s=wait,
-        first_bytes=found.first_bytes,
-    )
+    recorder = recorder_of(source, found, output, overwrite=force, rate_hz=rate, wait_for_return_s=wait)
     if not (guide or browser):
         record(recorder, output, seconds)
         return

@@ -14,10 +14,10 @@ def convert(source: LogSource, output: Path, json: Path | None = None, force: bo
 
     check_suffix(output)
     recording = source.read()
-    from trihedron.api import converting
+    from trihedron.api import reading
     from trihedron.report.machine import recording_record
 
-    converting.convert(recording, output, overwrite=force)
+    reading.convert(recording, output, overwrite=force)
     for finding in recording.findings:
         if finding.severity.value != "note" or finding.code.value in {"rows-left-out", "device-chosen"}:
             say(str(finding))

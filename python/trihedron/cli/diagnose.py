@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 OPTIONS = {
     "calibration": ("FILE", "Calibration to compare with the log; otherwise one is fitted to it."),
-    "against": (
-        "SIM",
-        "Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one).",
-    ),
+    "against": ("SIM", "Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one)."),
     "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log."),
     "improved": ("FILE.toml", "Write the scenario with the parameters of the log."),
     "updated": ("FILE", "Write the calibration that this log itself gives."),

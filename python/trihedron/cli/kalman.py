@@ -15,10 +15,7 @@ OPTIONS = {
         "Without it the length of gravity is used.",
     ),
     "angle_sigma": ("DEG", "Standard error of the angles in the pose table."),
-    "noise": (
-        "FILE",
-        "A static log, the JSON that trihedron allan writes of one, or a JSON of Allan coefficients.",
-    ),
+    "noise": ("FILE", "A static log, the JSON that trihedron allan writes of one, or a JSON of Allan coefficients."),
     "frame": (
         "NAME",
         "Body frame without a pose table: lower (lower-triangular, X along accelerometer X) or symmetric.",

@@ -32,10 +32,7 @@ SHARED: Table = {
     "reference_columns": ("LIST", "Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."),
     "stream": "A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
     "units state the content. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
-    "checkpoint": (
-        "FILE",
-        "With --stream: store the progress in FILE, so that a stopped run continues from there.",
-    ),
+    "checkpoint": ("FILE", "With --stream: store the progress in FILE, so that a stopped run continues from there."),
 }
 
 
@@ -60,11 +57,13 @@ class ReadingOptions:
         "gyro_unit": ("UNIT", "rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
         "time_unit": ("UNIT", "s, ms, us or ns; detected otherwise."),
         "topic": ("NAME", "Which topic, dataset or member of a file that contains several."),
-        "instance": (
-            "N",
-            "Which of several IMUs whose readings one file contains.",
-        ),
+        "instance": ("N", "Which of several IMUs whose readings one file contains."),
     }
+
+    @property
+    def units(self) -> dict[str, Any]:
+        """Units of the sensors as keyword arguments for the functions of ``api`` and ``read``."""
+        return {"accelerometer_unit": self.accel_unit, "gyroscope_unit": self.gyro_unit}
 
 
 @dataclass(frozen=True)
@@ -100,8 +99,7 @@ class LogSource(ReadingOptions):
                 gyroscope_path=self.gyro,
                 columns=self.columns,
                 rate_hz=self.rate,
-                accelerometer_unit=self.accel_unit,
-                gyroscope_unit=self.gyro_unit,
+                **self.units,
                 time_unit=self.time_unit,
                 topic=self.topic,
                 instance=self.instance,

@@ -199,14 +199,11 @@ def with_provenance(document: Document) -> Document:
 
     rows.append(("version", f"trihedron {installed('trihedron')}, Python {platform.python_version()}"))
     rows += [("input", f"{source}, sha256 {sha256 or 'not computed'}") for source, sha256 in run.inputs]
-    options = [f"{key.replace('_', '-')} {_shown(value)}" for key, value in run.options.items() if _is_said(value)]
+    said = {key: value for key, value in run.options.items() if value not in (None, False, "", [], ())}
+    options = [f"{key.replace('_', '-')} {_shown(value)}" for key, value in said.items()]
     if options:
         rows.append(("options", ", ".join(options)))
     return replace(document, provenance=(*document.provenance, *rows))
-
-
-def _is_said(value: Any) -> bool:
-    return value not in (None, False, "", [], ())
 
 
 def _shown(value: Any) -> str:

@@ -137,14 +137,13 @@ def _groups(all_of_them: tuple[Uncertain, ...]) -> list[Uncertain]:
     """The worst of every kind, seven lines at most."""
     groups: dict[tuple[str, str], list[Uncertain]] = {}
     for one in all_of_them:
-        kind = "scale" if one.name.startswith("scale") else "bias" if one.name.startswith("bias") else "axes"
+        kind = "scales" if one.name.startswith("scale") else "biases" if one.name.startswith("bias") else "angles"
         groups.setdefault((one.sensor, kind), []).append(one)
     out = []
     for (sensor, kind), members in groups.items():
         worst = max(members, key=lambda one: math.inf if one.now is None else one.now)
         after = [one.after_next for one in members if one.after_next is not None]
-        words = {"scale": "scales", "bias": "biases", "axes": "angles"}[kind]
-        out.append(Uncertain(sensor, words, worst.now, max(after) if after else None, worst.wanted))
+        out.append(Uncertain(sensor, kind, worst.now, max(after, default=None), worst.wanted))
     return out
 
 

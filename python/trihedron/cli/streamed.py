@@ -29,13 +29,7 @@ def opened(source: LogSource) -> LogOnDisk:
 
     # A text log is first converted to a table, which takes time.
     with progress("opening"):
-        return log_on_disk(
-            source.log,
-            columns=source.columns,
-            rate_hz=source.rate,
-            accelerometer_unit=source.accel_unit,
-            gyroscope_unit=source.gyro_unit,
-        )
+        return log_on_disk(source.log, columns=source.columns, rate_hz=source.rate, **source.units)
 
 
 def calibrate_stream(

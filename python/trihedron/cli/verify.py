@@ -22,10 +22,7 @@ OPTIONS = {
     "log": typer.Argument(
         metavar="CALIBRATION LOG", help="A calibration file and a log; or a log and several of them."
     ),
-    "limit_mg": (
-        "MG",
-        "Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
-    ),
+    "limit_mg": ("MG", "Largest rms gravity error in static poses that you accept; beyond it the exit status is 2."),
     "limit_deg": ("DEG", "The same for the tilt error after a rotation."),
 }
 
@@ -47,7 +44,6 @@ def verify(
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying
-    from trihedron.api.ranking import rank
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
@@ -57,7 +53,7 @@ def verify(
     recording = log.read()
     if len(known) > 1:
         with progress("ranking") as notify:
-            ranking = rank(paths, recording, progress=notify, **place.said)
+            ranking = verifying.rank(paths, recording, progress=notify, **place.said)
         document = ranking_report(ranking)
         note_file(next(path for path in paths if path.name == ranking.best.name))
         results.show(document, FIRST_SCREEN)

@@ -15,25 +15,14 @@ from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDecl
 Checksum = Callable[[bytes], int]
 
 
-def _crc8_table() -> tuple[int, ...]:
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte << 1) ^ (0x07 if byte & 0x80 else 0)
-        table.append(byte & 0xFF)
-    return tuple(table)
+def _table(shift: Callable[[int], int]) -> tuple[int, ...]:
+    """The remainder of every byte, after eight shifts by one bit."""
+    return tuple(reduce(lambda crc, _: shift(crc), range(8), byte) for byte in range(256))
 
 
-def _reflected_table(polynomial: int) -> tuple[int, ...]:
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte >> 1) ^ (polynomial if byte & 1 else 0)
-        table.append(byte)
-    return tuple(table)
-
-
-_CRC8, _MODBUS, _KERMIT = _crc8_table(), _reflected_table(0xA001), _reflected_table(0x8408)
+_CRC8 = _table(lambda crc: ((crc << 1) ^ (0x07 if crc & 0x80 else 0)) & 0xFF)
+_MODBUS = _table(lambda crc: (crc >> 1) ^ (0xA001 if crc & 1 else 0))
+_KERMIT = _table(lambda crc: (crc >> 1) ^ (0x8408 if crc & 1 else 0))
 
 
 def _crc8(data: bytes) -> int:
@@ -98,6 +87,11 @@ def printed_numbers(texts: Sequence[str]) -> list[float] | None:
         return None
 
 
+def triad(sensor: str, unit: str) -> tuple[str, ...]:
+    """Column names of the three axes of a sensor."""
+    return tuple(f"{sensor}_{axis} [{unit}]" for axis in "xyz")
+
+
 class Decoder(ABC):
     """Converts bytes, in pieces of any size, to complete frames.
 
@@ -157,12 +151,10 @@ class FramedDecoder(Decoder):
         """The content of a valid frame, or None where it has no readings."""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Frames that are complete with these bytes."""
         self._buffer += data
         return self._take(is_last=False)
 
     def finish(self) -> list[Frame]:
-        """Frames in the remaining bytes, at the end of the stream."""
         frames = self._take(is_last=True)
         if self._buffer:
             self.skipped_bytes += len(self._buffer)

@@ -5,28 +5,24 @@ Layout by the manufacturer's "MT Low Level Communication Protocol" (MT0101P); nu
 
 import struct
 
-from trihedron.capture.protocols.framing import MORE, Frame, FramedDecoder
+from trihedron.capture.protocols.framing import MORE, Frame, FramedDecoder, triad
 
 _SYNC = b"\xfa\xff\x36"
 _EXTENDED = 0xFF
 
 # Identifier without its lowest nibble (number format and coordinate system) → column names.
 _TRIADS = {
-    0x4020: ("acc_x [m/s^2]", "acc_y [m/s^2]", "acc_z [m/s^2]"),
-    0x4040: ("acc_x [m/s^2]", "acc_y [m/s^2]", "acc_z [m/s^2]"),
-    0x8020: ("gyr_x [rad/s]", "gyr_y [rad/s]", "gyr_z [rad/s]"),
-    0x8040: ("gyr_x [rad/s]", "gyr_y [rad/s]", "gyr_z [rad/s]"),
+    0x4020: triad("acc", "m/s^2"),
+    0x4040: triad("acc", "m/s^2"),
+    0x8020: triad("gyr", "rad/s"),
+    0x8040: triad("gyr", "rad/s"),
     0xC020: ("mag_x", "mag_y", "mag_z"),
     0x0810: ("temperature [degC]",),
 }
 _COUNTER, _SAMPLE_TIME = 0x1020, 0x1060
 _RAW = 0xA010
-_RAW_NAMES = (
-    *(f"acc_{a} [counts]" for a in "xyz"),
-    *(f"gyr_{a} [counts]" for a in "xyz"),
-    *(f"mag_{a}_raw" for a in "xyz"),
-    "temperature_raw",
-)
+_RAW_NAMES = (*triad("acc", "counts"), *triad("gyr", "counts"), *(f"mag_{a}_raw" for a in "xyz"), "temperature_raw")
+_NAMES = _TRIADS | {_RAW: _RAW_NAMES}
 
 Packets = list[tuple[int, int, int]]
 
@@ -93,9 +89,7 @@ class Mtdata2Decoder(FramedDecoder):
                     found[kind] = values
         if not self.columns:
             self._wanted = {kind: len(found[kind]) for kind in sorted(found)}
-            self.columns = tuple(
-                name for kind in self._wanted for name in (_RAW_NAMES if kind == _RAW else _TRIADS[kind])
-            )
+            self.columns = tuple(name for kind in self._wanted for name in _NAMES[kind])
         nan = float("nan")
         values = tuple(v for kind, n in self._wanted.items() for v in found.get(kind, (nan,) * n))
         if not found or not values:

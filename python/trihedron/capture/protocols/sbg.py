@@ -6,7 +6,7 @@ integers), each with a clock in microseconds and the temperature.
 
 import struct
 
-from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, Frame, FramedDecoder
+from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, Frame, FramedDecoder, triad
 
 _HEAD, _TAIL, _END = 6, 3, 0x33
 _LONGEST = 4086
@@ -18,18 +18,12 @@ _PER_M_S2, _PER_DEGREE_C = 1048576.0, 256.0
 _PER_RAD_S, _PER_RAD_S_WIDE, _IS_WIDE = 67108864.0, 12304174.0, 1 << 10
 """Counts of message 44 per unit; ``_IS_WIDE`` in its status means the wider gyro range, with fewer counts per rad/s."""
 
-_COLUMNS = (
-    *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
-    *(f"gyr_{axis} [rad/s]" for axis in "xyz"),
-    "temperature [degC]",
-)
-
 
 class SbgDecoder(FramedDecoder):
     """Decodes messages of the first kind that contains both sensors; others are ignored."""
 
     name = "sbg"
-    columns: tuple[str, ...] = _COLUMNS
+    columns = (*triad("acc", "m/s^2"), *triad("gyr", "rad/s"), "temperature [degC]")
     tick_s = 1e-6
     clock_modulus = 1 << 32
     learned = ("_kind",)

@@ -6,7 +6,7 @@ high byte first, readings of a ten-bit ADC. There is no checksum. Razor: one lin
 
 import struct
 
-from trihedron.capture.protocols.framing import Frame, FramedDecoder, LineFedDecoder, printed_numbers
+from trihedron.capture.protocols.framing import Frame, FramedDecoder, LineFedDecoder, printed_numbers, triad
 from trihedron.capture.protocols.lines import LineColumns, LinesDecoder
 
 _FRAME = struct.Struct(">x7Hx")
@@ -16,10 +16,7 @@ _HIGHEST = 1023
 # The count wraps at 2^15 in some firmware and at 2^16 in others: modulo 2^15 is right for both.
 _COUNT_MODULUS = 1 << 15
 
-SIX_DOF_COLUMNS = (
-    *("acc_x [counts]", "acc_y [counts]", "acc_z [counts]"),
-    *("gyr_y [counts]", "gyr_x [counts]", "gyr_z [counts]"),
-)
+SIX_DOF_COLUMNS = (*triad("acc", "counts"), "gyr_y [counts]", "gyr_x [counts]", "gyr_z [counts]")
 
 
 class SixDofDecoder(FramedDecoder):

@@ -8,22 +8,18 @@ import binascii
 from functools import reduce
 from operator import xor
 
-from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
+from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers, triad
 
 _BEFORE = {b"VNIMU": 0, b"VNMAR": 0, b"VNCMV": 0, b"VNYMR": 3, b"VNQMR": 4}
 """Kinds of lines, and the number of attitude fields before the magnetometer's."""
-_COLUMNS = (
-    *(f"mag_{axis}" for axis in "xyz"),
-    *(f"acc_{axis} [m/s^2]" for axis in "xyz"),
-    *(f"gyr_{axis} [rad/s]" for axis in "xyz"),
-)
+_COLUMNS = ("mag_x", "mag_y", "mag_z", *triad("acc", "m/s^2"), *triad("gyr", "rad/s"))
 
 
 class VectorNavDecoder(LineFedDecoder):
     """Decodes lines of the first kind that contains both sensors; other lines are ignored."""
 
     name = "vectornav"
-    columns: tuple[str, ...] = _COLUMNS
+    columns = _COLUMNS
     learned = ("_kind",)
 
     def __init__(self) -> None:

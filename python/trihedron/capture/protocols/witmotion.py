@@ -7,14 +7,12 @@ if the sensor sends it, precedes them.
 
 import struct
 
-from trihedron.capture.protocols.framing import Frame, FramedDecoder
+from trihedron.capture.protocols.framing import Frame, FramedDecoder, triad
 
 _CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
 _LAST_KIND = 0x5F
 _G, _DEGREES = 16.0 / 32768, 2000.0 / 32768
 _DAY_MS = 86_400_000
-
-_COLUMNS = (*(f"acc_{axis} [g]" for axis in "xyz"), *(f"gyr_{axis} [deg/s]" for axis in "xyz"), "temperature [degC]")
 
 
 class WitMotionDecoder(FramedDecoder):
@@ -22,7 +20,7 @@ class WitMotionDecoder(FramedDecoder):
 
     name = "witmotion"
     length = 11
-    columns: tuple[str, ...] = _COLUMNS
+    columns = (*triad("acc", "g"), *triad("gyr", "deg/s"), "temperature [degC]")
     learned = ("_has_clock", "tick_s", "clock_modulus")
 
     def __init__(self) -> None:

@@ -7,13 +7,12 @@ little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xD
 import math
 import struct
 
-from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
+from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers, triad
 
 _INERTIAL = 0x80 + ord("I")
 _BODY = struct.Struct("<xQ6f")
 _TEXT = ",".join(["%.9g"] * 6)
 _ESCAPE = b"\xdb"
-_COLUMNS = (*("gyr_x [deg/s]", "gyr_y [deg/s]", "gyr_z [deg/s]"), *("acc_x [g]", "acc_y [g]", "acc_z [g]"))
 _LARGEST = 1e5
 """Limit in deg/s or g: no sensor has that range, but a flipped bit in the exponent of a float exceeds it."""
 
@@ -22,7 +21,7 @@ class XioDecoder(LineFedDecoder):
     """Decodes inertial messages; other kinds are ignored."""
 
     name = "xio"
-    columns: tuple[str, ...] = _COLUMNS
+    columns = (*triad("gyr", "deg/s"), *triad("acc", "g"))
     tick_s = 1e-6
 
     def frame_of(self, line: bytes) -> Frame | None:
