@@ -158,10 +158,17 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: Float
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    case = "fitted" if diagnosis.effects else "none"
+    if not diagnosis.effects:
+        return Finding.of(
+            FindingCode.EFFECTS_MODELLED,
+            "none-but-disagree" if left else "none",
+            left=left,
+            n_effects=0,
+            n_domains_left=len(left),
+        )
     return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        f"{case}-but-disagree" if left else case,
+        "fitted-but-disagree" if left else "fitted",
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
         left=left,

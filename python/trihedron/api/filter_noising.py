@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -272,29 +271,39 @@ def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
 
 
 def _noticed(one: SensorFilterNoise) -> Iterator[Finding]:
-    of, N = partial(Finding.of, sensor=one.sensor), one.N
+    sensor, N = one.sensor, one.N
     if not one.is_settled:
-        yield of(FindingCode.FILTER_NOISE_UNSETTLED)
+        yield Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=sensor)
     if N.is_limit:
-        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", upper=N.upper)
+        yield Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", sensor=sensor, upper=N.upper)
     elif N.upper > N.lower * UNCERTAIN:
-        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, in_file=N.value, lower=N.lower, upper=N.upper)
+        yield Finding.of(
+            FindingCode.FILTER_NOISE_UNCERTAIN, sensor=sensor, in_file=N.value, lower=N.lower, upper=N.upper
+        )
     elif (mostly := _mostly_reference(one)) is not None:
-        yield of(FindingCode.FILTER_NOISE_UNCERTAIN, "reference", share=mostly[0], horizon_s=mostly[1])
+        yield Finding.of(
+            FindingCode.FILTER_NOISE_UNCERTAIN, "reference", sensor=sensor, share=mostly[0], horizon_s=mostly[1]
+        )
     if one.static is None:
-        yield of(FindingCode.FILTER_NOISE_NO_STATIC)
+        yield Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=sensor)
         if N.upper < one.quietest:
-            yield of(FindingCode.FILTER_NOISE_BELOW_QUIETEST, in_file=N.filter_value, quietest=one.quietest)
+            yield Finding.of(
+                FindingCode.FILTER_NOISE_BELOW_QUIETEST, sensor=sensor, in_file=N.filter_value, quietest=one.quietest
+            )
     if one.reference is not None and one.reference.follows:
-        yield of(FindingCode.FILTER_NOISE_FOLLOWED)
+        yield Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=sensor)
     if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
-        yield of(FindingCode.FILTER_NOISE_NOT_SEPARATED)
+        yield Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=sensor)
     if (uncalibrated := _uncalibrated(one)) is not None:
-        yield of(FindingCode.FILTER_NOISE_UNCALIBRATED, share=uncalibrated[0], horizon_s=uncalibrated[1])
+        yield Finding.of(
+            FindingCode.FILTER_NOISE_UNCALIBRATED, sensor=sensor, share=uncalibrated[0], horizon_s=uncalibrated[1]
+        )
     tested = [c for c in one.consistency if c.n_apart >= 3]
     worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
     if worst is not None:
-        yield of(FindingCode.FILTER_NOISE_INCONSISTENT, nees=worst.nees, horizon_s=worst.horizon_s)
+        yield Finding.of(
+            FindingCode.FILTER_NOISE_INCONSISTENT, sensor=sensor, nees=worst.nees, horizon_s=worst.horizon_s
+        )
 
 
 def _mostly_reference(one: SensorFilterNoise) -> tuple[float, float] | None:
