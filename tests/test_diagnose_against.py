@@ -16,7 +16,7 @@ from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import ParameterDifference
-from trihedron.report import diagnosis_report
+from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.diagnosis_numbers import differing_numbers
 from trihedron.report.document import Picture
 from trihedron.simulate import Scenario, hand_session, scenario_by_name, simulate

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.report import diagnosis_report
+from trihedron.report.diagnosis import diagnosis_report
 
 DEG = np.pi / 180.0
 

@@ -21,7 +21,7 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
-from trihedron.report.effects.page import page
+from trihedron.report.findings.page import effects_page
 from trihedron.report.findings.wording import places
 from trihedron.report.text import to_text
 
@@ -127,7 +127,7 @@ def cases_of(effect):
 def test_every_effect_has_its_words_and_every_word_its_effect():
     assert set(CATALOGUE) == {effect.id for effect in ours()}
     assert all(entry.mechanism and entry.experiment for entry in CATALOGUE.values())
-    assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == set(CATALOGUE)
+    assert set(re.findall(r"^## (\S+)$", effects_page(), re.MULTILINE)) == set(CATALOGUE)
 
 
 def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():

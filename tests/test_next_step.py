@@ -20,9 +20,8 @@ from trihedron.cli.run import (
     with_arguments,
 )
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.report import Document
 from trihedron.report.diagnosis_words import next_step_in_words
-from trihedron.report.document import FindingList, Section
+from trihedron.report.document import Document, FindingList, Section
 
 
 @pytest.fixture(autouse=True)

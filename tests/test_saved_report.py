@@ -12,7 +12,6 @@ from trihedron.cli import main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.domains import DOMAINS
-from trihedron.report import to_text
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
@@ -20,14 +19,14 @@ from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
-from trihedron.report.findings import findings_block
-from trihedron.report.findings.grouping import combined
+from trihedron.report.findings import combined, findings_block
 from trihedron.report.findings.wording import filled
 from trihedron.report.layout import ticks
 from trihedron.report.machine import json_text
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.page import to_html
 from trihedron.report.saved import report_of, with_report
+from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from written_session import G, simulated, usual

@@ -8,10 +8,9 @@ import sys
 import pytest
 
 from trihedron.cli import COMMANDS, main
-from trihedron.report import Document, to_text
-from trihedron.report.document import Facts, Paragraph, Section, Table
+from trihedron.report.document import Document, Facts, Paragraph, Section, Table
 from trihedron.report.page import to_html
-from trihedron.report.text import Style
+from trihedron.report.text import Style, to_text
 
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
 ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")

@@ -10,7 +10,7 @@ import pytest
 
 from documented import DOCS, blocks
 from trihedron.cli import main
-from trihedron.report import diagnosis_report
+from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.page import to_html
 
 PAGE = DOCS / "worked-example.md"

@@ -14,7 +14,7 @@ import typer
 import trihedron
 from trihedron.cli import build_app
 from trihedron.cli.help import described
-from trihedron.report.effects.page import page as effects
+from trihedron.report.findings.page import effects_page as effects
 from trihedron.report.findings.page import page as findings
 
 

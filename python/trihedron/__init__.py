@@ -227,8 +227,10 @@ answered_by(
     dict.fromkeys(("as_dict", "as_frame", "as_html", "as_screen", "as_text", "plot"), "trihedron.report.presenting")
 )
 answered_by({"words_of": "trihedron.report.findings.catalogue", "phrase": "trihedron.report.findings.phrases"})
-answered_by(dict.fromkeys(("effect_words", "experiment", "why_not"), "trihedron.report.effects.catalogue"))
-answered_by({"family_words": "trihedron.report.effects.relations", "of_arrays": "trihedron.api.reading"})
+answered_by(
+    dict.fromkeys(("effect_words", "experiment", "why_not", "family_words"), "trihedron.report.effects.catalogue")
+)
+answered_by({"of_arrays": "trihedron.api.reading"})
 answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.static_axes"})
 answered_by({"find_possible_limits": "trihedron.channel_facts.possible_limits"})
 # Before any thread pool starts.

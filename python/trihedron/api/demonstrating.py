@@ -21,10 +21,11 @@ from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
 from trihedron.records.results import CalibrationResult, VerificationResult
-from trihedron.report import calibration_report, demonstration_report, verification_report
-from trihedron.report.demonstration import with_files
+from trihedron.report.calibration import calibration_report
+from trihedron.report.demonstration import demonstration_report, with_files
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
+from trihedron.report.verification import verification_report
 from trihedron.sensor_model import reframing
 from trihedron.simulate import Environment, Scenario, hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2

@@ -19,8 +19,8 @@ from trihedron.files.output import write_whole
 from trihedron.files.scenario import write_scenario
 from trihedron.gravity import normal_gravity
 from trihedron.records.results import DiagnosisResult
-from trihedron.report import diagnosis_report, disagreement_report
-from trihedron.report.demonstration import with_files
+from trihedron.report.demonstration import disagreement_report, with_files
+from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
 from trihedron.simulate import (

@@ -26,8 +26,8 @@ class ReferencesResult:
     recordings: tuple[Recording, ...]
 
     def __str__(self) -> str:
-        from trihedron.report import to_text
         from trihedron.report.reference import references_report
+        from trihedron.report.text import to_text
 
         return to_text(references_report(self.calibration, self.references))
 

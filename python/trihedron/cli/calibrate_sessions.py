@@ -67,8 +67,8 @@ def calibrate_many(
     """Calibrate every log; print common parameters and their repeatability."""
     how = one_of("--by", by or "session", ("session", "date", "device", "temperature"))
     from trihedron.api import sessions
-    from trihedron.report import sessions_report
     from trihedron.report.machine import sessions_record
+    from trihedron.report.sessions import sessions_report
 
     words = None if labels is None else [word.strip() for word in labels.split(",")]
     given = sources.each()

@@ -10,7 +10,7 @@ def check(source: LogSource, results: Results) -> None:
     results.check(inputs=source.files)
     recording = source.read()
     from trihedron.api import checking
-    from trihedron.report import check_report
+    from trihedron.report.check import check_report
     from trihedron.report.machine import check_record
 
     with progress("checking") as notify:

@@ -26,7 +26,7 @@ def demo(folder: Path | None = None, seed: int | None = None, force: bool = Fals
     if folder is not None and folder.exists() and not force:
         raise InputError(f"{folder}: this exists and was left alone; choose another name or add --force.")
     from trihedron.api.demonstrating import demonstrate
-    from trihedron.report import to_text
+    from trihedron.report.text import to_text
 
     done = demonstrate(target, overwrite=force, say=step)
     put(to_text(done.document, style=style()))

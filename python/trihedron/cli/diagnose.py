@@ -68,8 +68,7 @@ def diagnose(
     recording = sources.one().read()
     from trihedron.api import diagnosing
     from trihedron.files.diagnosis import diagnosis_document
-    from trihedron.report import diagnosis_report
-    from trihedron.report.diagnosis import first_screen
+    from trihedron.report.diagnosis import diagnosis_report, first_screen
 
     with progress("diagnosing") as notify:
         result = diagnosing.diagnose(

@@ -86,7 +86,9 @@ def finish(
     from trihedron.cli.output import leave, put, say, style
     from trihedron.cli.run import UNSTORED, note_file, with_arguments
     from trihedron.files.calibration import write_calibration
-    from trihedron.report import calibration_report, to_text, verification_report
+    from trihedron.report.calibration import calibration_report
+    from trihedron.report.text import to_text
+    from trihedron.report.verification import verification_report
 
     result, check = conclude(recording, cut_s, **place.said)
     note_file(output)

@@ -41,8 +41,7 @@ def kalman(
     results.check(output, inputs=(*source.files, reference, noise))
     recording = source.read()
     from trihedron.api import filtering
-    from trihedron.report import kalman_report
-    from trihedron.report.kalman import kalman_record
+    from trihedron.report.kalman import kalman_record, kalman_report
 
     with progress("filtering") as notify:
         result = filtering.kalman(

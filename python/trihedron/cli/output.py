@@ -22,7 +22,7 @@ from trihedron.sanitise import escaped
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration, Finding
-    from trihedron.report import Document
+    from trihedron.report.document import Document
     from trihedron.report.text import Style
 
 NOT_TO_BE_TRUSTED = 2
@@ -143,7 +143,7 @@ class FullResults(Results, _Extent):
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
     """Print the report on stdout, unless that is for JSON."""
     if not is_stdout(json_target):
-        from trihedron.report import to_text
+        from trihedron.report.text import to_text
 
         put(to_text(with_arguments(document), sections=sections, style=style()))
 

@@ -14,7 +14,7 @@ from trihedron.cli.run import note_file
 from trihedron.errors import InputError
 
 if TYPE_CHECKING:
-    from trihedron.report import Document
+    from trihedron.report.document import Document
 
 MOST_BYTES = 200_000_000
 """Largest saved result in bytes, far above any real one."""

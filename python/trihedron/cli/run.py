@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
-    from trihedron.report import Document
+    from trihedron.report.document import Document
 
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")

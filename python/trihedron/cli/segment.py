@@ -12,8 +12,8 @@ def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None 
     """Find the poses and the moves between them."""
     results.check(inputs=source.files)
     needs_stream(checkpoint, stream=stream)
-    from trihedron.report import segments_report
     from trihedron.report.machine import segments_record
+    from trihedron.report.segments import segments_report
 
     if stream:
         log = opened(source)

@@ -62,7 +62,7 @@ def verify(
         if ranking.best.is_rejected:
             raise typer.Exit(NOT_TO_BE_TRUSTED)
         return
-    from trihedron.report import verification_report
+    from trihedron.report.verification import verification_report
 
     with progress("verifying") as notify:
         result = verifying.verify(

@@ -47,8 +47,8 @@ class FleetResult:
         return f"<FleetResult of {len(self.rows)} logs, {self.n_done} calibrated: {self.folder}>"
 
     def __str__(self) -> str:
-        from trihedron.report import to_text
         from trihedron.report.fleet import fleet_report
+        from trihedron.report.text import to_text
 
         return to_text(fleet_report(self.summary))
 

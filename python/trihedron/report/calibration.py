@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, XYZ
+from trihedron.arrays import AXES, TINY, XYZ, FloatArray
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
@@ -182,13 +182,17 @@ def _before_in_words(calibration: Calibration, segments: Segments) -> list[tuple
     return [("  before calibration", f"{in_mm_s2(rms)} rms, {before_words(calibration)}")]
 
 
+def shared_power(values: FloatArray) -> tuple[float, str]:
+    """Factor that shortens all of the values, and the power of ten that then stands beside them."""
+    exponent = engineering_exponent(float(np.abs(values).max()))
+    return 10.0**-exponent, f" × {power_of_ten(exponent)}" if exponent else ""
+
+
 def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     """S and b with their standard errors, with a common power of ten where it shortens the numbers."""
     true, raw = SYMBOLS[name]
     unit = unit_in_print(sensor.si_unit)
-    exponent = engineering_exponent(float(np.abs(sensor.S).max()))
-    scale = 10.0**-exponent
-    times = f" × {power_of_ten(exponent)}" if exponent else ""
+    scale, times = shared_power(sensor.S)
     head = ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]")
     value = np.column_stack([scale * sensor.S, sensor.b])
     sigma = np.column_stack([scale * sensor.sigma_S, sensor.sigma_b])
@@ -201,10 +205,8 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
         )
     )
     of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
-    caption = (
-        f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}, "
-        f"{of_S}; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
-    )
+    caption = f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}"
+    caption += f", {of_S}; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
     return Table(head, rows, caption)
 
 

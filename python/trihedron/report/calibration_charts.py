@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,11 +23,11 @@ MOST_NUMBERED = 60
 """Most poses on a disc with printed numbers; more would overlap."""
 
 
-def residual_chart(quality: FitQuality, names: Sequence[str] | None = None, lines: tuple[Level, ...] = ()) -> Chart:
+def residual_chart(quality: FitQuality, lines: tuple[Level, ...] = ()) -> Chart:
     """Residual of every pose, in sample and cross-validated, with the 3 σ limits of noise alone."""
     pose = np.arange(1, len(quality.residual) + 1, dtype=np.float64)
     residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
-    label = [f"pose {k + 1}" for k in range(len(pose))] if names is None else list(names)
+    label = [f"pose {k + 1}" for k in range(len(pose))]
     limit = LIMIT_SIGMAS * np.abs(sigma)
     edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
     reach = np.repeat(limit, 2)
@@ -62,7 +61,6 @@ def _highest(held: FloatArray, held_sigma: FloatArray | None, residual: FloatArr
 
 
 def mm_s2(values: FloatArray) -> FloatArray:
-    """Accelerations in mm/s²."""
     return values * mm_s2_from_m_s2(1.0)
 
 

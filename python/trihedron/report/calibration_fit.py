@@ -121,10 +121,8 @@ def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> T
     if not rows:
         return None
     head = ("rms", "session fit", "S and b, in sample", "cross-validated", "noise alone")
-    caption = (
-        "The same residuals by this diagnosis (session fit) and by the S and b that calibrate saves for this log: "
-        f"poses with {AT_REST}, rotations with the {AFTER_MOVES}"
-    )
+    caption = "The same residuals by this diagnosis (session fit) and by the S and b that calibrate saves for this "
+    caption += f"log: poses with {AT_REST}, rotations with the {AFTER_MOVES}"
     return Table(head, tuple((row[0], session_fit.get(row[0], "–"), *row[1:]) for row in rows), caption)
 
 

@@ -12,6 +12,10 @@ Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "gr
 """Names of colours, which the page defines for light, dark and paper. c1, c2, c3 are the axes X, Y, Z."""
 MOST_OF_A_BAR = 3.0
 """Longest uncertainty drawn in full, in multiples of the median one."""
+TWO_SIGMA = 2.0
+"""Half an interval of 95 % in standard errors."""
+ROW_PX = 26
+"""Height of a named row in pixels."""
 AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 
 

@@ -25,7 +25,9 @@ def check_report(
         rows = tuple((name, *cells) for name, cells in _expected_cells(calibration).items())
         head = ("", "scale", "bias", "angles between axes")
         blocks.append(Table(head, rows, "Expected standard uncertainty (1 σ), worst axis"))
-        blocks += _advice(calibration)
+        # The next pose where poses suffice; else a finding names those to add, as it does moves.
+        if pose := next_pose(calibration):
+            blocks.append(Facts((("most useful next pose", pose),)))
     alone = " of the accelerometer (no gyro in the log)" if recording.gyroscope is None else ""
     good, bad = f"Fit for calibration{alone}", "NOT FIT for calibration"
     return Document(
@@ -71,9 +73,3 @@ def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]
         scale, bias, skew = (plain_number(float(np.max(sigma)), 2) for sigma in sigmas)
         cells[name] = (f"{scale} %", f"{bias} {unit}", f"{skew} mrad")
     return cells
-
-
-def _advice(calibration: Calibration) -> list[Block]:
-    """The next pose where poses suffice; else a finding names those to add, as it does moves."""
-    pose = next_pose(calibration)
-    return [Facts((("most useful next pose", pose),))] if pose else []

@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Comparison, Finding, Recording, Segments, Severity, Verification
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.report.calibration import parameter_table
+from trihedron.report.calibration import parameter_table, shared_power
 from trihedron.report.diagnosis import effects_blocks
 from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
 from trihedron.report.diagnosis_words import verdict_in_words
@@ -20,16 +20,19 @@ from trihedron.report.findings import findings_block
 from trihedron.report.names import MEANING, id_in_print
 from trihedron.report.numbers import (
     duration,
-    engineering_exponent,
     in_mm_s2,
     listed,
     plain_number,
-    power_of_ten,
     with_sigma,
 )
 from trihedron.report.verification import facts_of
 
 _MOST_NUMBERS = 6
+_NEXT_STEPS = (
+    ("is it fit?", "trihedron check LOG"),
+    ("calibrate", "trihedron calibrate LOG --latitude DEG -o calibration.json --report report.html"),
+    ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
+)
 _FILES = {
     "unit.csv": "the log of the unit",
     "simulation.toml": "the simulation as it was",
@@ -49,7 +52,6 @@ def demonstration_report(
     latitude_deg: float,
     files: tuple[tuple[Path, str], ...],
 ) -> Document:
-    """Lay out the demonstration."""
     before = f"{in_mm_s2(uncalibrated_rms_m_s2)} rms with the data sheet's scale"
     verified = (("gravity error before", before), *facts_of(verification))
     return Document(
@@ -63,7 +65,7 @@ def demonstration_report(
             Section("3  Verify on another session", (Facts(verified), *_warnings(verification.findings))),
             Section("4  Compare with the truth", (_truth_table(comparison), Paragraph(_coverage(comparison)))),
             Section("5  Files", (Facts(tuple((str(path), what) for path, what in files)),)),
-            Section("Your own sensor", (_next_steps(),)),
+            Section("Your own sensor", (Facts(_NEXT_STEPS),)),
         ),
     )
 
@@ -94,10 +96,8 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
         "calibrated accelerometer must read that length in every pose, and the calibrated gyro must predict the "
         "direction of gravity after every rotation. One fit of both gives:"
     )
-    blocks: list[Block] = [Paragraph(said), parameter_table("accelerometer", calibration.accelerometer)]
-    if calibration.gyroscope is not None:
-        blocks.append(parameter_table("gyroscope", calibration.gyroscope))
-    return (*blocks, *_warnings(calibration.findings))
+    tables = (parameter_table(name, sensor) for name, sensor in calibration.sensors)
+    return (Paragraph(said), *tables, *_warnings(calibration.findings))
 
 
 def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:
@@ -111,14 +111,8 @@ def _truth_table(comparison: Comparison) -> Table:
     for k, name in enumerate(comparison.names):
         sensor, parameter = name.split(".")
         # S of one sensor shares a power of ten, so that its rows can be compared.
-        peers = [
-            abs(comparison.truth[i])
-            for i, other in enumerate(comparison.names)
-            if other.startswith(f"{sensor}.{parameter[0]}")
-        ]
-        exponent = engineering_exponent(float(max(peers)))
-        scale = 10.0**-exponent
-        times = f" × {power_of_ten(exponent)}" if exponent else ""
+        is_peer = [other.startswith(f"{sensor}.{parameter[0]}") for other in comparison.names]
+        scale, times = shared_power(comparison.truth[is_peer])
         sigma = scale * comparison.sigma[k]
         rows.append(
             (
@@ -138,16 +132,6 @@ def _coverage(comparison: Comparison) -> str:
         f"Within 1 σ: {int(np.sum(z < 1.0))} of {n} (expected: {round(0.683 * n)}); within 2 σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
         f"{plain_number(comparison.chi2)} for {n} parameters. The truth of a bias is its mean in this session."
-    )
-
-
-def _next_steps() -> Facts:
-    return Facts(
-        (
-            ("is it fit?", "trihedron check LOG"),
-            ("calibrate", "trihedron calibrate LOG --latitude DEG -o calibration.json --report report.html"),
-            ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
-        )
     )
 
 

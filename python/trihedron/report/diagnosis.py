@@ -289,8 +289,7 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
     if recording is None or simulated is None or segments is None:
         return ()
     models = (getattr(diagnosis, "updated", None), getattr(diagnosis, "calibration", None))
-    picture = traces_picture(recording, simulated, segments, models)
-    return () if picture is None else (picture,)
+    return traces_picture(recording, simulated, segments, models)
 
 
 def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:

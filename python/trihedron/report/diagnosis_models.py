@@ -63,10 +63,6 @@ def _cell(model: object, key: str, place: tuple[int, ...]) -> str:
     value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
     for k in place:
         value, sigma = value[k], sigma[k]
-    return _number_with_sigma(float(value), float(sigma))
-
-
-def _number_with_sigma(value: float, sigma: float) -> str:
     exponent = engineering_exponent(max(abs(value), sigma))
     if sigma <= 0.0 or -3 < exponent <= 3:
         return value_in_words(value, sigma)

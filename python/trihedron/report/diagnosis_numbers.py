@@ -42,7 +42,6 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 
 
 def n_differing(diagnosis: Diagnosis) -> int:
-    """Number of parameters that differ."""
     return sum(len(_clear(members)) for members in _groups_that_differ(diagnosis).values())
 
 

@@ -9,7 +9,20 @@ import numpy as np
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
-from trihedron.report.chart import Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale, around_zero
+from trihedron.report.chart import (
+    ROW_PX,
+    TWO_SIGMA,
+    Bars,
+    Chart,
+    Colour,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Scale,
+    around_zero,
+)
 from trihedron.report.diagnosis_numbers import in_print
 from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
@@ -19,15 +32,12 @@ from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
-ROW_PX = 26
-"""Height of a row in pixels."""
 THICK, SHADED = 0.28, 0.8
 """Height of a bar and of the shade behind it, in rows."""
 FEWEST_DOMAINS = 2
 """Fewest domains for which the chart is drawn; for one the table is enough."""
 MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
-TWO_SIGMA = 2.0
 JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", NOT_JUDGED: "shade"}
 EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
@@ -170,21 +180,19 @@ def _ratio_words(n: NoiseDifference, name: str) -> str:
 
 
 def traces_picture(
-    recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
-) -> Picture | None:
+    recording: Recording, simulated: Recording, segments: Segments, models: Models
+) -> tuple[Picture, ...]:
     """Simulated and recorded readings where they differ most."""
-    chart = traces_chart(recording, simulated, segments, models)
+    chart = _traces_chart(recording, simulated, segments, models)
     if chart is None:
-        return None
+        return ()
     caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
     if any(isinstance(one, Panel) and one.y.label.startswith(CORRECTED) for one in chart.panels):
         caption += " One is in counts: both were corrected, each by its own parameters."
-    return Picture("traces", caption, lambda: chart)
+    return (Picture("traces", caption, lambda: chart),)
 
 
-def traces_chart(
-    recording: Recording, simulated: Recording, segments: Segments, models: Models = (None, None)
-) -> Chart | None:
+def _traces_chart(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> Chart | None:
     """A panel per sensor: its axis that differs most, in the move or pose where the sensors together differ most."""
     sides = _both_sides(recording, simulated, segments, models)
     if not sides:

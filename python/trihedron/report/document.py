@@ -211,11 +211,8 @@ class Document:
     @property
     def foremost(self) -> Finding | None:
         """The first serious finding, else the first warning; None without either."""
-        for severity in (Severity.SERIOUS, Severity.WARNING):
-            for finding in self.findings:
-                if finding.severity is severity:
-                    return finding
-        return None
+        by_severity = (f for s in (Severity.SERIOUS, Severity.WARNING) for f in self.findings if f.severity is s)
+        return next(by_severity, None)
 
 
 def with_its_making(document: Document) -> Document:

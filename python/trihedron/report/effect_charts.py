@@ -8,7 +8,7 @@ from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, EffectCurve
 from trihedron.records.domains import DomainResiduals
-from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.names import channel_in_print
 from trihedron.report.numbers import SHOWN, plain_number, shown
@@ -16,7 +16,6 @@ from trihedron.units import degrees_from_radians
 
 HALF_WINDOW_S = 0.3
 """Half the interval [s] about an instant over which readings are averaged."""
-TWO_SIGMA = 2.0
 MOST = 200
 """Most dots per axis of a static log; neighbours in time are averaged."""
 POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
@@ -92,10 +91,7 @@ def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> C
         drawn = residuals_chart(diagnosis, one).panels
         for panel, values in zip(drawn, (one.before, one.after), strict=True):
             assert isinstance(panel, Panel)
-            title = f"{panel.title}, {IN_SAMPLE}: {plain_number(factor * _rms(values))} {unit} rms"
+            rms = float(np.sqrt(np.nanmean(values**2)))
+            title = f"{panel.title}, {IN_SAMPLE}: {plain_number(factor * rms)} {unit} rms"
             panels.append(replace(panel, title=title))
     return Chart(tuple(panels), columns=2, is_linked=True)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))

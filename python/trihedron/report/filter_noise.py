@@ -37,8 +37,6 @@ CAUSE_WORDS = {
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
 """Words for every cause, and measures that reduce its share."""
-
-
 TERMS = {"N": "white noise N", "K": "bias random walk K"}
 
 
@@ -172,18 +170,11 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
 
 def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
     change, predicted = (plain_number(degrees_from_radians(v), 2) for v in (intervals.bias_change, intervals.predicted))
-    return [
-        (
-            "bias between static intervals",
-            f"changes by {change} °/s rms; static N and K predict {predicted} °/s (temperature and g-sensitivity are "
-            "in the difference)",
-        ),
-        (
-            "gravity in static intervals",
-            f"differs by {plain_number(100.0 * intervals.gravity_spread, 2)} % rms over {intervals.n} (residual "
-            "calibration error of the accelerometer)",
-        ),
-    ]
+    spread = plain_number(100.0 * intervals.gravity_spread, 2)
+    bias = f"changes by {change} °/s rms; static N and K predict {predicted} °/s (temperature and g-sensitivity are in "
+    bias += "the difference)"
+    gravity = f"differs by {spread} % rms over {intervals.n} (residual calibration error of the accelerometer)"
+    return [("bias between static intervals", bias), ("gravity in static intervals", gravity)]
 
 
 def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
@@ -224,10 +215,8 @@ def _tested(one: SensorFilterNoise) -> Block:
         )
         for c in one.consistency
     )  # fmt: skip
-    head = (
-        *("horizon [s]", "stretches", "NEES", f"predicted [{unit}]", f"actual [{unit}]"),
-        *("NEES, static", f"static [{unit}]"),
-    )
+    effective = ("horizon [s]", "stretches", "NEES", f"predicted [{unit}]", f"actual [{unit}]")
+    head = (*effective, "NEES, static", f"static [{unit}]")
     caption = f"{capital(what)}. NEES, its square over the predicted variance, is 3 where N and K are right"
     has_static = any(c.static_nees is not None for c in one.consistency)
     caption += "; static: static N and K, reference taken as exact" if has_static else ""
@@ -239,9 +228,7 @@ def filter_noise_record(found: FilterNoise) -> dict[str, Any]:
     return {
         "source": found.source,
         "reference": found.reference_source,
-        "rate_hz": found.rate_hz,
-        "band_hz": found.band_hz,
-        "duration_s": found.duration_s,
+        **{name: getattr(found, name) for name in ("rate_hz", "band_hz", "duration_s")},
         "sensors": [as_plain(one) for one in found.sensors],
         "tilt": None if found.tilt is None else as_plain(found.tilt),
         "intervals": None if found.intervals is None else as_plain(found.intervals),
@@ -254,11 +241,8 @@ def filter_noise_columns(found: FilterNoise) -> Columns:
     rows = []
     for one in found.sensors:
         for term, per, value, static in _terms(one):
-            static_value = None if static is None else static.filter_value
-            unit = f"{one.unit}{per}"
-            rows.append(
-                (one.sensor, term, value.filter_value, value.lower, value.upper, value.is_limit, static_value, unit)
-            )
+            sizes = (value.filter_value, value.lower, value.upper, value.is_limit)
+            rows.append((one.sensor, term, *sizes, None if static is None else static.filter_value, one.unit + per))
     return of_rows(("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"), rows)
 
 
@@ -275,11 +259,8 @@ def _panel(one: SensorFilterNoise) -> Panel:
     def both(predicted: str, actual: str) -> tuple[FloatArray, FloatArray, list[str]]:
         pairs = np.array([(getattr(c, predicted), getattr(c, actual)) for c in one.consistency], dtype=np.float64)
         expected, seen = factor * pairs.T
-        return (
-            expected,
-            seen,
-            [f"{plain_number(a)} {unit} over {plain_number(s)} s" for a, s in zip(seen, h, strict=True)],
-        )
+        tips = [f"{plain_number(a)} {unit} over {plain_number(s)} s" for a, s in zip(seen, h, strict=True)]
+        return expected, seen, tips
 
     predicted, actual, tips = both("predicted", "actual")
     marks: list[Mark] = [Line(h, predicted, "predicted, effective N and K", "c1")]

@@ -60,10 +60,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     n_usable = sum(map(_is_usable, summary.logs))
     lead = None
     if n_done:
-        caption = (
-            "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the median "
-        )
-        caption += "of devices."
+        caption = "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the "
+        caption += "median of devices."
         if n_usable < n_done:
             caption += " Logs that are not to be trusted stand under Distributions."
         lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
@@ -196,14 +194,10 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
 
 def _mixed(summary: FleetSummary) -> list[Block]:
     rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
-    said = (
-        "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
-        "folder; until then these logs are compared with nothing."
-    )
-    return [
-        Paragraph(said),
-        Table(("taken for one device", "logs", "parameter", "differs by"), tuple(rows), "Logs too unlike"),
-    ]
+    said = "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
+    said += "folder; until then these logs are compared with nothing."
+    head = ("taken for one device", "logs", "parameter", "differs by")
+    return [Paragraph(said), Table(head, tuple(rows), "Logs too unlike")]
 
 
 def _by(parameter: Parameter, difference: float) -> tuple[str, str]:
@@ -227,10 +221,8 @@ def _spread(summary: FleetSummary) -> list[Block]:
     is_grouped = any(one.between is not None for one in summary.repeated)
     head = ["parameter", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
     head += ["session to session", "95 %"] if is_grouped else []
-    rows = [
-        tuple(repeated_cells(one, (one.between, one.within) if is_grouped else (one.within,)))
-        for one in summary.repeated
-    ]
+    kinds = ("between", "within") if is_grouped else ("within",)
+    rows = [tuple(repeated_cells(one, kinds)) for one in summary.repeated]
     said = "Standard deviations beyond each log's uncertainty. Scales are relative to their mean; misalignments are "
     said += f"departures from 90°; {TRIAD}."
     if summary.passed_over:
@@ -254,21 +246,17 @@ def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
         return [Paragraph(_within(summary))]
     rows = [
-        (
-            one.serial, *_by(one.parameter, one.deviation),
-            plain_number(one.sigmas, 2), plain_number(one.p_adjusted, 1),
-        )
+        (one.serial, *_by(one.parameter, one.deviation), plain_number(one.sigmas, 2), plain_number(one.p_adjusted, 1))
         for one in summary.outliers
-    ]  # fmt: skip
+    ]
     return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
 
 
 def _drift(summary: FleetSummary) -> list[Block]:
     moved = [change for change in summary.changes if change.significant]
     n_devices = len({change.group for change in summary.changes})
-    tested = (
-        f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of parameters each, 1 % over all."
-    )
+    tested = f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of parameters each, 1 % over"
+    tested += " all."
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = []

@@ -21,7 +21,7 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.sessions import SessionsModel, Spread
+from trihedron.records.sessions import SessionsModel
 from trihedron.report.channels import logged_sensors
 from trihedron.report.noise_units import PER_UNIT
 
@@ -143,7 +143,6 @@ def sessions_columns(model: SessionsModel) -> Columns:
     }
     columns |= {name: [getattr(one, name) for one in model.repeated] for name in ("value", "std")}
     for kind in ("within", "between"):
-        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
         for part in ("sd", "low", "high"):
-            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
+            columns[f"{kind}_{part}"] = [getattr(getattr(one, kind), part, None) for one in model.repeated]
     return dict(columns)

@@ -104,34 +104,27 @@ def in_python(text: str) -> str:
     return text
 
 
-def finding_in_python(finding: Finding) -> Finding:
-    """A finding whose sentences name parameters instead of flags."""
-    seen, cause, action = map(in_python, (finding.seen, finding.cause, finding.action))
-    is_same = (seen, cause, action) == (finding.seen, finding.cause, finding.action)
-    return finding if is_same else replace(finding, seen=seen, cause=cause, action=action)
-
-
 def result_in_python(result: Value) -> Value:
     """A record whose findings, its own and those of its parts, name parameters instead of flags."""
-    changed = _changed(result)
-    return result if changed is None else changed
+    made: Value = _in_python(result)
+    return made
 
 
-def _changed(record: Any) -> Any:
-    """The record with findings rewritten, or None where none changes."""
-    if isinstance(record, tuple) and record and all(isinstance(part, Finding) for part in record):
-        said = tuple(finding_in_python(part) for part in record)
-        return None if all(new is old for new, old in zip(said, record, strict=True)) else said
-    if isinstance(record, tuple) and record and all(_has_findings(part) for part in record):
-        parts = [_changed(part) for part in record]
-        if all(part is None for part in parts):
-            return None
-        return tuple(old if new is None else new for new, old in zip(parts, record, strict=True))
-    if not _has_findings(record):
-        return None
-    found = {field.name: _changed(getattr(record, field.name)) for field in fields(record) if field.init}
-    found = {name: value for name, value in found.items() if value is not None}
-    return replace(record, **found) if found else None
+def _in_python(record: Any) -> Any:
+    """A finding, a record or a tuple of either kind with sentences rewritten; the same object where none changes."""
+    if isinstance(record, tuple):
+        is_rewritten = all(isinstance(part, Finding) for part in record) or all(map(_has_findings, record))
+        parts = tuple(map(_in_python, record)) if is_rewritten else record
+        return record if all(new is old for new, old in zip(parts, record, strict=True)) else parts
+    if isinstance(record, Finding):
+        found = {name: in_python(getattr(record, name)) for name in ("seen", "cause", "action")}
+        found = {name: said for name, said in found.items() if said != getattr(record, name)}
+    elif _has_findings(record):
+        found = {field.name: _in_python(getattr(record, field.name)) for field in fields(record) if field.init}
+        found = {name: value for name, value in found.items() if value is not getattr(record, name)}
+    else:
+        return record
+    return replace(record, **found) if found else record
 
 
 def _has_findings(record: Any) -> bool:

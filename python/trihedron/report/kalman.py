@@ -38,7 +38,6 @@ _CORRECTED = "Corrected minus reference specific force of every pose."
 
 
 def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
-    """Lay out the filter's results."""
     # The chart of innovations, which shows whether the uncertainties are valid, is next to the verdict.
     results: tuple[AxisKalmanResult | NormKalmanCalibration, ...]
     if isinstance(outcome, KalmanCalibration):
@@ -122,25 +121,19 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         ("residual", _residual_words(outcome.residual_m_s2)),
         ("without drift", _residual_words(outcome.residual_without_drift_m_s2)),
     )
-    pictures: list[Block] = [
-        Picture(
-            f"convergence-{AXES[axis.axis]}",
-            f"Constants of {AXES[axis.axis].upper()} after every pose by every method, with the filter's 3 σ band "
-            "around its last value.",
-            partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
-        )
-        for axis in outcome.axes
-    ]
+    raw_unit, pictures = outcome.accelerometer.raw_unit, list[Block]()
+    for axis in outcome.axes:
+        name = AXES[axis.axis]
+        caption = f"Constants of {name.upper()} after every pose by every method, with the filter's 3 σ band around "
+        caption += "its last value."
+        pictures.append(Picture(f"convergence-{name}", caption, partial(convergence_chart, axis, raw_unit)))
+    drift = "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands."
     pictures += [
-        Picture(
-            "drift",
-            "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands.",
-            partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
-        ),
+        Picture("drift", drift, partial(drift_chart, outcome.axes, raw_unit)),
         Picture("residual", _CORRECTED, partial(residual_chart, outcome.residual_m_s2)),
     ]
     return [
-        Section("Result", (Facts(facts), *(_constants_table(a, outcome.accelerometer.raw_unit) for a in outcome.axes))),
+        Section("Result", (Facts(facts), *(_constants_table(axis, raw_unit) for axis in outcome.axes))),
         Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
         Section("Convergence", (_arrival_table(outcome),)),
         Section("Poses", (_pose_table(outcome),)),
@@ -155,17 +148,11 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         ("frame", FRAMES[calibration.frame]),
         ("gravity error in static poses", _residual_words(outcome.residual_m_s2)),
     )
+    convergence = "S and b after every pose, with the 3 σ band around their last values."
+    residual = "Gravity error in every static pose: length of the corrected reading minus |g|."
     pictures: tuple[Block, ...] = (
-        Picture(
-            "convergence",
-            "S and b after every pose, with the 3 σ band around their last values.",
-            partial(norm_convergence_chart, outcome),
-        ),
-        Picture(
-            "residual",
-            "Gravity error in every static pose: length of the corrected reading minus |g|.",
-            partial(residual_chart, outcome.residual_m_s2[:, None]),
-        ),
+        Picture("convergence", convergence, partial(norm_convergence_chart, outcome)),
+        Picture("residual", residual, partial(residual_chart, outcome.residual_m_s2[:, None])),
     )
     return [
         Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
@@ -196,10 +183,8 @@ def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
         for name, c, n in seen
     )
     head = ("axis", "poses judged", "mean NIS", "99 % when right", "whiteness, p")
-    caption = (
-        "NIS: innovations squared over their predicted variance; Ljung-Box test of whiteness. The first poses only "
-        "start the filter, which predicts nothing yet"
-    )
+    caption = "NIS: innovations squared over their predicted variance; Ljung-Box test of whiteness. The first poses "
+    caption += "only start the filter, which predicts nothing yet"
     return Table(head, rows, caption)
 
 

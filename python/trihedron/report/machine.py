@@ -14,11 +14,7 @@ from trihedron.sanitise import escaped_json
 def recording_record(recording: Recording) -> dict[str, Any]:
     """A recording without its samples."""
     return {
-        "source": recording.source,
-        "sha256": recording.sha256,
-        "n_samples": recording.n_samples,
-        "duration_s": recording.duration_s,
-        "rate_hz": recording.rate_hz,
+        **{name: getattr(recording, name) for name in ("source", "sha256", "n_samples", "duration_s", "rate_hz")},
         "accelerometer_unit": None if recording.accelerometer is None else recording.accelerometer_unit.value,
         "gyroscope_unit": None if recording.gyroscope is None else recording.gyroscope_unit.value,
         "findings": [finding.to_dict() for finding in recording.findings],

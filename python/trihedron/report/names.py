@@ -65,11 +65,11 @@ def axis_in_print(name: str) -> str:
 def id_in_print(name: str) -> str:
     """An effect, a domain or a parameter in words: ``accel-bias`` as ``accelerometer bias``, ``gyro-g-sensitivity`` as
     ``gyro g-sensitivity``, ``gyro-bias-x`` as ``gyro bias X``."""
-    return MEANING.get(name) or axis_in_print(_spaced(re.sub(r"^accel\b", "accelerometer", name)))
+    spaced = re.sub(r"(?<!-g)-(?!gyro)", " ", re.sub(r"^accel\b", "accelerometer", name))
+    return MEANING.get(name) or axis_in_print(spaced)
 
 
 def finding_in_print(code: str) -> str:
-    """A finding's code in words."""
     return FINDINGS.get(code) or id_in_print(code)
 
 
@@ -86,10 +86,6 @@ def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
 def label_of(group: str, name: str) -> str:
     """A parameter as the label of a row or an axis, by the name that it has in sentences: ``accelerometer bias X``."""
     return f"{id_in_print(group)} {parameter_in_print(name)}"
-
-
-def _spaced(name: str) -> str:
-    return re.sub(r"(?<!-g)-(?!gyro)", " ", name)
 
 
 def ids_in_print(names: Iterable[str]) -> str:

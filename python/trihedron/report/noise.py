@@ -47,9 +47,7 @@ def noise_report(
         facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))
     facts += _coloured(noise)
     groups = _groups(noise)
-    tables: list[Block] = [Facts(tuple(facts))]
-    for unit, axes in groups:
-        tables += [_terms_table(axes, unit), _answers_table(axes, unit)]
+    tables = [table for unit, axes in groups for table in (_terms_table(axes, unit), _answers_table(axes, unit))]
     return Document(
         title="Noise of a static log",
         subtitle=noise.source,
@@ -61,7 +59,7 @@ def noise_report(
         lead=_lead(noise, groups) if groups else None,
         next_step=_next(noise) if noise.is_trustworthy else "",
         sections=(
-            Section("Result", tuple(tables)),
+            Section("Result", (Facts(tuple(facts)), *tables)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
             Section("Findings", (findings_block(findings),)),
             *((Section("Figures", tuple(_picture(noise, *group) for group in groups)),) if groups else ()),
@@ -192,10 +190,11 @@ def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
 
 
 def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
-    def cell(term: NoiseTerm) -> str:
-        return f"{plain_number(term.lower)} … {plain_number(term.upper)}"
-
-    rows = [(_label(term, unit), *(cell(axis.terms[term]) for axis in axes)) for term in TermName]
+    terms = {term: [axis.terms[term] for axis in axes] for term in TermName}
+    rows = [
+        (_label(term, unit), *(f"{plain_number(one.lower)} … {plain_number(one.upper)}" for one in found))
+        for term, found in terms.items()
+    ]
     if any(axis.is_slow_noise_unresolved for axis in axes):
         words = ("not both 0" if axis.is_slow_noise_unresolved else "" for axis in axes)
         rows.append(("   B and K together", *words))

@@ -22,9 +22,8 @@ NAME_DECADES = (1.2, 0.3)
 MARGIN = 10.0 ** (0.5 * NAME_DECADES[0])
 """Distance of a name from the ends of the panel, as a factor in time: half a name."""
 
-Limits = tuple[float, float]
-TIME = Scale("averaging time τ [s]", "s", is_log=True)
 BEST = "best averaging time"
+TIME = Scale("averaging time τ [s]", "s", is_log=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ def _is_free(named: list[Part], tau_s: FloatArray, deviation: FloatArray) -> npt
     return free
 
 
-def room_for(curve: AllanCurve, axes: list[tuple[NoiseAxis, int]], tau_s: FloatArray) -> Limits | None:
+def room_for(curve: AllanCurve, axes: list[tuple[NoiseAxis, int]], tau_s: FloatArray) -> tuple[float, float] | None:
     """Limits of the deviation that include the curves (axes with their columns) and the labels of all parts."""
     seen = [curve.deviation[:, c] for _, c in axes]
     seen += [np.array([part.y]) for axis, _ in axes if axis.sample_sigma > 0 for part in parts_of(axis, tau_s)]

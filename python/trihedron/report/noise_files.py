@@ -29,9 +29,7 @@ def noise_record(noise: Noise, lengths: Lengths | None = None, accuracy: float =
         "axes": [_axis_record(axis, (lengths or {}).get(axis.name, {})) for axis in noise.axes],
         "kalibr": {key: words.split()[0] for key, words in kalibr_rows(noise).items()},
         "curve": {
-            "kind": noise.curve.kind,
-            "confidence": noise.curve.confidence,
-            "stride": noise.curve.stride,
+            **{name: getattr(noise.curve, name) for name in ("kind", "confidence", "stride")},
             "tau_s": noise.curve.tau_s.tolist(),
             "cluster": noise.curve.clusters.tolist(),
             "axes": [
@@ -57,11 +55,7 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
         terms[term.value] = entry
     best = axis.optimal_averaging()
     return {
-        "name": axis.name,
-        "unit": axis.unit,
-        "mean": axis.mean,
-        "sample_sigma": axis.sample_sigma,
-        "resolution": axis.resolution,
+        **{name: getattr(axis, name) for name in ("name", "unit", "mean", "sample_sigma", "resolution")},
         "terms": terms,
         "gauss_markov": None if axis.gauss_markov is None else dict(vars(axis.gauss_markov)),
         "slow_pair": None if axis.slow_pair is None else dict(vars(axis.slow_pair)),

@@ -1,13 +1,10 @@
 """Report of a planned experiment: uncertainties to expect."""
 
 import math
-from dataclasses import asdict
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from trihedron.files.calibration import plain
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan
 from trihedron.report.chart import Chart, Line, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -46,22 +43,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
                 "Poses",
                 (_poses(plan.poses), Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth))),
             ),
-            Section(
-                "Moves between poses",
-                (
-                    Table(
-                        ("moves", "number", "of 9", "σ of scale"),
-                        tuple(
-                            (move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in plan.moves
-                        ),
-                        "How many of 9 parameters of the gyro moves determine, and its scale's uncertainty (1 σ)",
-                    ),
-                    Paragraph(
-                        "A move determines two parameters, for a turn about the vertical leaves gravity where it was: "
-                        "three turns about level axes show six of nine, and all nine if each stops once on the way."
-                    ),
-                ),
-            ),
+            Section("Moves between poses", _moves(plan.moves)),
             Section("Known turns", (_turns(plan),)),
         ),
     )
@@ -136,10 +118,12 @@ def _poses_chart(known: list[PosePlan]) -> Chart:
     return Chart(tuple(panels), columns=3)
 
 
-def plan_record(plan: ExperimentPlan) -> dict[str, Any]:
-    """As plain JSON types; undetermined values are null."""
-    record: dict[str, Any] = plain(asdict(plan))
-    return record
+def _moves(moves: tuple[MovePlan, ...]) -> tuple[Table, Paragraph]:
+    rows = tuple((move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in moves)
+    caption = "How many of 9 parameters of the gyro moves determine, and its scale's uncertainty (1 σ)"
+    said = "A move determines two parameters, for a turn about the vertical leaves gravity where it was: three turns "
+    said += "about level axes show six of nine, and all nine if each stops once on the way."
+    return Table(("moves", "number", "of 9", "σ of scale"), rows, caption), Paragraph(said)
 
 
 def _turns(plan: ExperimentPlan) -> Table:

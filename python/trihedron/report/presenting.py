@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,7 +36,7 @@ from trihedron.report.kalman import kalman_record, kalman_report
 from trihedron.report.noise import curve_summary, noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_fragment
-from trihedron.report.plan import plan_record, plan_report
+from trihedron.report.plan import plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.saved import written
 from trihedron.report.segments import recording_summary, segments_report
@@ -93,7 +94,7 @@ _KINDS: dict[type, _Shown] = {
     AllanCurve: _Shown(curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(recording_summary, machine.recording_record, frames.recording_columns),
     Segments: _Shown(segments_report, machine.segments_record, frames.segments_columns),
-    ExperimentPlan: _Shown(plan_report, plan_record),
+    ExperimentPlan: _Shown(plan_report, asdict),
 }
 
 

@@ -15,9 +15,7 @@ from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.verification import above_noise, headlines_of, parameters_table, use_in_words, verified_in_words
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
-AGAIN = "Calibrate again: none of these fits this log."
 ROW_PX = 34
-INTERVAL = "95 % interval"
 JUDGED: dict[str, Colour] = {"verified": "c1", "doubtful": "soft", "rejected": "accent"}
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
@@ -62,7 +60,7 @@ def ranking_report(ranking: Ranking) -> Document:
         sections=tuple(sections),
         headlines=headlines_of(v),
         lead=Picture("order", caption, partial(_ranking_chart, ranking)),
-        next_step=AGAIN if best.is_rejected else use_in_words(v, best.name),
+        next_step="Calibrate again: none of these fits this log." if best.is_rejected else use_in_words(v, best.name),
     )
 
 
@@ -111,10 +109,8 @@ def _order(ranking: Ranking) -> Table:
         )
         for k, one in enumerate(ranking.candidates)
     )
-    caption = (
-        "Best first. Errors: RMS with their 95 % interval. Behind the best: logarithm of how many times less probable "
-        "the log is by this calibration, ± 1 σ; beyond 2 σ the best is clearly better"
-    )
+    caption = "Best first. Errors: RMS with their 95 % interval. Behind the best: logarithm of how many times less "
+    caption += "probable the log is by this calibration, ± 1 σ; beyond 2 σ the best is clearly better"
     return Table(head, rows, caption)
 
 
@@ -174,7 +170,7 @@ def _panel(ranking: Ranking, what: str, unit: str, errors: FloatArray) -> Panel:
     judged = np.array([_judged(one) for one in ranking.candidates])
     # Bootstrap intervals are not symmetric: drawn as one line with gaps between rows.
     ends = np.column_stack([errors[:, 1:], np.full(len(names), np.nan)]).ravel()
-    marks: list[Mark] = [Line(ends, np.repeat(place, 3), INTERVAL, "soft")]
+    marks: list[Mark] = [Line(ends, np.repeat(place, 3), "95 % interval", "soft")]
     for word, colour in JUDGED.items():
         part = judged == word
         if part.any():

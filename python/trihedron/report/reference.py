@@ -8,8 +8,8 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
-from trihedron.report.calibration import calibration_report
-from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Scale, Span
+from trihedron.report.calibration import calibration_report, shared_power
+from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import envelope
 from trihedron.report.names import axis_in_print, id_in_print
@@ -26,7 +26,6 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
 DEGREES = degrees_from_radians(1.0)
-TWO_SIGMA = 2.0
 _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1, "% of ±250 °/s")}
 """Data-sheet sizes in printed units."""
 _SIGNS = {
@@ -174,8 +173,9 @@ def _clock(found: AgainstReference) -> str:
     way = "ahead of" if offset >= 0.0 else "behind"
     size = abs(offset)
     if not np.isfinite(sigma):
-        text = f"the reference's is {size:.2f} s {way} the log's, to about a sample"
-        return f"{text}: commands do not determine it better"
+        return (
+            f"the reference's is {size:.2f} s {way} the log's, to about a sample: commands do not determine it better"
+        )
     far = size > 100.0
     digits = f"{size:.4f} s" if far else f"{with_sigma(ms_from_s(size), ms_from_s(sigma))} ms"
     text = f"the reference's is {digits} {way} the log's {where}"
@@ -199,10 +199,8 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
 
 
 def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
-    exponent = engineering_exponent(float(np.abs(fit.S).max()))
-    scale = 10.0**-exponent
+    scale, times = shared_power(fit.S)
     sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    times = f" × {power_of_ten(exponent)}" if exponent else ""
     raw = "w" if symbol == "ω" else "a"
     rows = tuple(
         (
@@ -249,11 +247,10 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
         return None
     walk = plain_number(degrees_from_radians(found.apart.walk), 2)
     caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
-    caption += "reference's world: the reference's error, and the gyro's random walk of "
-    caption += f"{walk}°/√s. Band: ± 2 σ of the slow error."
-    caption += (
-        " Orange: where it differs from the other windows; the mean is new after it." if found.error.apart_s else ""
-    )
+    caption += f"reference's world: the reference's error, and the gyro's random walk of {walk}°/√s. Band: ± 2 σ of "
+    caption += "the slow error."
+    if found.error.apart_s:
+        caption += " Orange: where it differs from the other windows; the mean is new after it."
     caption += " Grey: gaps." if found.error.gaps_s else ""
     return Picture(name, caption, partial(error_chart, found))
 

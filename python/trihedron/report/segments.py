@@ -51,11 +51,8 @@ def recording_facts(recording: Recording, segments: Segments | None = None) -> t
     """Length, rate, sensors with unit; with segments also noise, and the number of poses and moves."""
     facts = [("length", f"{duration(recording.duration_s)}, {recording.n_samples} samples")]
     facts.append(("rate", f"{plain_number(recording.rate_hz, 5)} Hz"))
-    for name, readings, raw_unit in (
-        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
-        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
-    ):
-        unit = unit_in_print(raw_unit)
+    for name in ("accelerometer", "gyroscope"):
+        readings, unit = getattr(recording, name), unit_in_print(getattr(recording, f"{name}_unit").value)
         sigma = None if segments is None else getattr(segments, f"{name}_sigma")
         words = "not in the log" if readings is None else f"in {unit}"
         if readings is not None and sigma is not None and np.all(np.isfinite(sigma)):
@@ -94,8 +91,8 @@ def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the poses shaded."""
-    caption = "The recording; shaded where the sensor was static"
-    caption += ", darker where it moved or vibrated throughout a pose" if any(map(_is_shaken, segments.poses)) else ""
+    caption, is_shaken = "The recording; shaded where the sensor was static", any(p.is_unsteady for p in segments.poses)
+    caption += ", darker where it moved or vibrated throughout a pose" if is_shaken else ""
     caption += ", orange where a pose was disturbed." if any(pose.disturbed for pose in segments.poses) else "."
     return Picture("signals", caption, partial(signals_chart, recording, segments))
 
@@ -107,10 +104,6 @@ def signals_chart(recording: Recording, segments: Segments | None = None) -> Cha
     spans += [_span(recording, pose.start, pose.stop - 1, SHAKEN, "soft") for pose in poses if pose.is_unsteady]
     bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
     return _signals(recording, (*spans, *bumps))
-
-
-def _is_shaken(pose: Pose) -> bool:
-    return pose.is_unsteady
 
 
 def state_of(pose: Pose) -> str:

@@ -141,30 +141,26 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     head = ["parameter", "common ± σ", "session to session", "95 %"]
     head += [between, "95 %"] if grouped else []
     head += ["median σ of one"]
-    rows = []
-    for one in model.repeated:
-        own = plain_number(one.own_std * shown(one.parameter.unit)[0], 2)
-        rows.append((*repeated_cells(one, (one.within, one.between) if grouped else (one.within,)), own))
-    return [
-        Table(
-            tuple(head),
-            tuple(rows),
-            "Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is "
-            f"{BIAS}; scales are raw readings per unit, relative to the common value; misalignments are departures "
-            f"from 90°; {TRIAD}.",
-        )
-    ]
+    kinds = ("within", "between") if grouped else ("within",)
+    rows = tuple(
+        (*repeated_cells(one, kinds), plain_number(one.own_std * shown(one.parameter.unit)[0], 2))
+        for one in model.repeated
+    )
+    caption = f"Standard deviation from one recording to the next, beyond each one's own uncertainty. A bias is {BIAS}"
+    caption += "; scales are raw readings per unit, relative to the common value; misalignments are departures from 90°"
+    return [Table(tuple(head), rows, f"{caption}; {TRIAD}.")]
 
 
-def repeated_cells(one: Repeated, spreads: tuple[Spread | None, ...]) -> list[str]:
-    """A parameter with its common value, and each of its ``spreads`` with its 95 % interval."""
+def repeated_cells(one: Repeated, kinds: tuple[str, ...]) -> list[str]:
+    """A parameter with its common value, and its spreads of these ``kinds``, each with its 95 % interval."""
     factor, unit = shown(one.parameter.unit)
     value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
     common = with_sigma(value * factor, one.std * factor)
     if one.parameter.id.endswith("scale"):
         common = f"± {plain_number(one.std * factor, 2)}"
     cells = [f"{label_of(one.parameter.id, one.parameter.name)} [{unit}]", common]
-    for spread in spreads:
+    for kind in kinds:
+        spread: Spread | None = getattr(one, kind)
         if spread is None:
             cells += ["–", "–"]
             continue
@@ -180,13 +176,9 @@ def _changes(model: SessionsModel) -> list[Block]:
         cells = [id_in_print(change.id), *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
         rows.append((*cells, _said(change) if change.significant else "no"))
     head = ("parameter", *(["device"] if with_group else []), "p", "changed")
-    return [
-        Paragraph(
-            "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
-            "of its biases; p corrected for multiple testing (Holm)."
-        ),
-        Table(head, tuple(rows), "Changes beyond what repeats"),
-    ]
+    said = "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
+    said += "of its biases; p corrected for multiple testing (Holm)."
+    return [Paragraph(said), Table(head, tuple(rows), "Changes beyond what repeats")]
 
 
 def change_in_words(change: Change) -> tuple[str, list[str], str]:
@@ -227,14 +219,9 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
         if term.hysteresis is not None:
             cells = [plain_number(float(v) * factor, 2) for v in term.hysteresis]
             rows.append((f"{id_in_print(term.id)}: half of heating less cooling [{unit}]", *cells))
-    return [
-        Paragraph(
-            f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
-            f"has not seen. Valid from {_range(thermal)}: outside it `trihedron apply` uses the nearest end and "
-            "reports it."
-        ),
-        Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis"),
-    ]
+    said = f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it has "
+    said += f"not seen. Valid from {_range(thermal)}: outside it `trihedron apply` uses the nearest end and reports it."
+    return [Paragraph(said), Table(("parameter", "x or xy", "y or xz", "z or yz"), tuple(rows), "Slopes by axis")]
 
 
 def _sessions(model: SessionsModel) -> Table:
@@ -245,9 +232,8 @@ def _sessions(model: SessionsModel) -> Table:
         shown_degc = ["–" if math.isnan(s.temperature_degc) else f"{s.temperature_degc:.1f}" for s in model.sessions]
         branch = [{1: "heating", -1: "cooling"}.get(s.branch, "") for s in model.sessions]
         columns += [("temperature [°C]", shown_degc), ("branch", branch)]
-    return Table(
-        tuple(name for name, _ in columns), tuple(zip(*(cells for _, cells in columns), strict=True)), "Every recording"
-    )
+    head, cells = zip(*columns, strict=True)
+    return Table(head, tuple(zip(*cells, strict=True)), "Every recording")
 
 
 def _further(model: SessionsModel) -> list[Picture]:
@@ -274,7 +260,7 @@ def _compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
     return np.array([max(s.covariance[k, k] + drift[s.group], 0.0) for s in sessions])
 
 
-def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int = 1) -> Chart:
+def sessions_chart(model: SessionsModel, only: Sequence[str], columns: int = 1) -> Chart:
     """One panel per id: deviations from the common value, over temperature where modelled; ``only`` these ids."""
     places = np.arange(1.0, len(model.sessions) + 1.0)
     names = _short_names([session.name for session in model.sessions])
@@ -283,9 +269,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str] = (), columns: int 
         places = np.array([session.temperature_degc for session in model.sessions])
         x = Scale("temperature [°C]", "°C")
     panels = []
-    for name in dict.fromkeys(one.parameter.id for one in model.repeated):
-        if only and name not in only:
-            continue
+    for name in dict.fromkeys(one.parameter.id for one in model.repeated if one.parameter.id in only):
         picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
         unit = shown(PARAMETERS[picked[0]].unit)[1]
         # The bands of all axes lie behind their points.

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.chart import Bars, Chart, Level, Panel, Points, Scale, around_zero
+from trihedron.report.chart import ROW_PX, TWO_SIGMA, Bars, Chart, Level, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
@@ -23,8 +23,6 @@ from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, listed, plain_number, with_sigma
 
-TWO_SIGMA = 2.0
-ROW_PX = 26
 COLUMNS = 3
 BAR = 0.7
 """Height of a bar as a fraction of its row."""

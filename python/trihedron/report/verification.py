@@ -32,16 +32,11 @@ LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 def verification_report(
     verification: Verification, segments: Segments | None = None, recording: Recording | None = None
 ) -> Document:
-    """Lay out a verification."""
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    caption = (
-        "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty allow: "
-    )
-    caption += (
-        "one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them together; an rms "
-    )
-    caption += "can exceed the expected one by a single uncertain pose."
+    caption = "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty "
+    caption += "allow: one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them "
+    caption += "together; an rms can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
@@ -172,12 +167,8 @@ def parameters_table(v: Verification) -> Table:
         judged = times if one.is_judged else "not judged by this log"
         rows.append((label_of(one.id, one.name), unit, differs, sigma, stated, judged))
     head = ("parameter", "unit", "log − file", "σ of the log", "σ of the file", "in σ")
-    return Table(
-        head,
-        tuple(rows),
-        "Parameters that do not depend on the frame, against this log's own calibration; "
-        f"σ of a bias includes its drift between sessions; {TRIAD}",
-    )
+    caption = "Parameters that do not depend on the frame, against this log's own calibration; σ of a bias includes "
+    return Table(head, tuple(rows), f"{caption}its drift between sessions; {TRIAD}")
 
 
 def _tables(v: Verification, segments: Segments | None) -> list[Block]:

@@ -1,23 +1,133 @@
-"""Findings in words: the closed catalogue of sentences, and findings merged in reading order."""
+"""Findings in words: the closed catalogue of sentences; findings in reading order, merged, and their verdict."""
 
-from trihedron.report.findings.grouping import (
-    beyond_headline,
-    by_weight,
-    combined,
-    findings_block,
-    likely,
-    ranged,
-    serious_ones,
-    verdict_of,
-)
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
-__all__ = [
-    "beyond_headline",
-    "by_weight",
-    "combined",
-    "findings_block",
-    "likely",
-    "ranged",
-    "serious_ones",
-    "verdict_of",
-]
+from trihedron.records import Finding, Severity
+from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with
+from trihedron.report.findings.wording import opening
+from trihedron.report.names import warnings_in_print
+from trihedron.report.numbers import MINUS, capital, how_many, listed
+
+_ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
+# A number that is a value; a number in a name (pose 3) is recognised by the word before it.
+_NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
+_NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
+_AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
+
+
+def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
+    """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
+    ordered = by_weight(findings)
+    sentences = tuple(replace(one, seen=capital(one.seen), cause=capital(one.cause)) for one in ordered)
+    return FindingList(sentences) if sentences else Paragraph("None.")
+
+
+def by_weight(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings, equal ones merged, gravest first."""
+    return tuple(sorted(combined(findings), key=_weight))
+
+
+def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The serious findings, the one of the verdict first."""
+    return tuple(one for one in by_weight(findings) if one.severity is Severity.SERIOUS)
+
+
+def _weight(finding: Finding) -> tuple[int, int]:
+    is_listed = finding.code in CONSEQUENCE
+    return _ORDER[finding.severity], CONSEQUENCE.index(finding.code) if is_listed else len(CONSEQUENCE)
+
+
+def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
+    """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
+    ``good``."""
+    serious = serious_ones(findings)
+    warned: dict[str, list[str]] = {}
+    for one in by_weight(findings):
+        if one.severity is Severity.WARNING:
+            warned.setdefault(one.code.value, []).append(opening(one.seen))
+    if serious:
+        return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
+    if not warned:
+        return good
+    named = [warnings_in_print(code, sentences) for code, sentences in warned.items()]
+    total = sum(map(len, warned.values()))
+    return f"{usable}, with {how_many(total, 'warning')}: {listed(named)}."
+
+
+def likely(cause: str) -> str:
+    """A cause as a sentence after an observation; empty where there is none."""
+    return f"Likely: {cause[:1].lower()}{cause[1:]}" if cause else ""
+
+
+def beyond_headline(finding: Finding, document: Document, above: str = "Stated above. ") -> Finding:
+    """What verdict and next action of the document have not stated of a finding; unchanged where they do not."""
+    if finding is not document.foremost:
+        return finding
+    clause = opening(finding.seen)
+    rest = finding.seen[len(clause) :].lstrip(" .;")
+    is_stated = clause.lower() in document.verdict.lower()
+    seen = f"{above}{capital(rest)}".rstrip() if is_stated else finding.seen
+    is_next = begins_with(document.what_next, finding.action)
+    cause = "" if likely(finding.cause) in document.verdict else finding.cause
+    return replace(finding, seen=seen, cause=cause, action="" if is_next else finding.action)
+
+
+def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings with those that several axes, poses or moves have in common merged into one that lists them."""
+    groups: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for finding in findings:
+        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
+        groups.setdefault(key, []).append(finding)
+    return tuple(
+        same[0] if len(same) == 1 else replace(same[0], seen=_together([f.seen for f in same]))
+        for same in groups.values()
+    )
+
+
+def _together(sentences: Sequence[str]) -> str:
+    """One sentence for all that differ only in their subject and numbers; else one after another."""
+    for pattern, name in ((_AXIS, _axes), (_NAMED, _things)):
+        parts = [pattern.match(text) for text in sentences]
+        if all(parts):
+            rest = ranged([part[part.re.groups] for part in parts if part is not None])
+            if rest is not None:
+                return name([part for part in parts if part is not None], rest)
+    whole = ranged(sentences)
+    if whole is not None and not re.search(r"\b(pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
+        return whole
+    return " ".join(map(capital, sentences))
+
+
+def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
+    """``Gyro X, Y and Z: above 0.8 to 1.1 Hz ...``"""
+    groups: dict[str, list[str]] = {}
+    for part in parts:
+        sensor, _, axis = part[1].partition(" ")
+        groups.setdefault(sensor, []).append(axis)
+    words = [f"{sensor} {listed(axes)}".strip() for sensor, axes in groups.items()]
+    return f"{capital(', '.join(words))}: {rest[:1].lower()}{rest[1:]}"
+
+
+def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
+    """``Moves 7, 9 and 22: each has a tilt error of ...``"""
+    return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
+
+
+def ranged(sentences: Sequence[str]) -> str | None:
+    """The common sentence with ranges in place of numbers that differ; None where the texts differ."""
+    skeleton = _NUMBER.sub("\0", sentences[0])
+    if any(_NUMBER.sub("\0", text) != skeleton for text in sentences[1:]):
+        return None
+    columns = list(zip(*(_NUMBER.findall(text) for text in sentences), strict=True))
+    words = []
+    for column in columns:
+        low, high = min(column, key=_value), max(column, key=_value)
+        words.append(low if low == high else f"{low} to {high}")
+    pieces = skeleton.split("\0")
+    return pieces[0] + "".join(word + piece for word, piece in zip(words, pieces[1:], strict=True))
+
+
+def _value(number: str) -> float:
+    return float(number.replace(MINUS, "-"))

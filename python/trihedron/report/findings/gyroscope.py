@@ -14,9 +14,7 @@ _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whol
 _MOVES = {
     (Code.TURNTABLE, "", NOTE): Words(
         "{turns:.0f} steady turns of a table at known speed were fitted: |S w′ + b| within {rms_percent:.2g} % rms of "
-        "what was stated.",
-        "",
-        "",
+        "what was stated."
     ),
     (Code.TURNTABLE, "contradicting", WARNING): Words(
         "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "

@@ -1,8 +1,10 @@
-"""The catalogue of findings as a page of the documentation."""
+"""The catalogues of findings and of effects as pages of the documentation."""
 
 from itertools import groupby
 from string import Formatter
 
+from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
+from trihedron.report.effects.words import EffectWords
 from trihedron.report.findings.catalogue import ENTRIES
 from trihedron.report.findings.entry import Entry
 from trihedron.report.findings.wording import BRANCHES, branches
@@ -21,6 +23,16 @@ was seen, the likely cause and the next action; the same five stand in reports, 
 
 Words in *italics* are values of the recording. Made from the catalogue (`python/trihedron/report/findings/`).
 """
+_OF_EFFECTS = """# Effects
+
+What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning; reports write it
+in words (`accel-bias-drift` as *accelerometer bias drift*). What it says of one is
+its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; the
+*separating experiment* is printed where a recording cannot separate two effects.
+[A new effect](../adding-an-effect.md) is one file.
+
+This page is made from the catalogue (`python/trihedron/report/effects/`).
+"""
 
 
 def page() -> str:
@@ -35,15 +47,29 @@ def page() -> str:
 
 def _entry(entry: Entry) -> str:
     severity = entry.severity.value + (f" or {entry.or_severity.value}" if entry.or_severity else "")
-    lines = [f"\n**{severity}**: {shown(entry.seen)}"]
+    lines = [f"\n**{severity}**: {_shown(entry.seen)}"]
     if entry.cause:
-        lines.append(f"*Likely:* {shown(entry.cause)}")
+        lines.append(f"*Likely:* {_shown(entry.cause)}")
     if entry.action:
-        lines.append(f"*Do:* {shown(entry.action)}")
+        lines.append(f"*Do:* {_shown(entry.action)}")
     return "<br>\n".join(lines) + "\n"
 
 
-def shown(template: str) -> str:
+def effects_page() -> str:
+    """Markdown, by id in alphabetical order."""
+    return _OF_EFFECTS + "".join(_effect(*entry) for entry in sorted(EFFECTS.items()))
+
+
+def _effect(effect_id: str, entry: EffectWords) -> str:
+    lines = [f"\n## {effect_id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
+    lines += [f"*Said:* {_shown(text)}" for text in entry.said.values()]
+    lines.append(f"*Separating experiment:* {entry.experiment}.")
+    if entry.static_experiment:
+        lines.append(f"*In a log of one or two orientations:* {entry.static_experiment}.")
+    return "<br>\n".join(lines) + "\n"
+
+
+def _shown(template: str) -> str:
     """A sentence with the names of its values in place of the values, and both branches where it has two."""
     words = []
     for text, name, how, _ in Formatter().parse(template):
@@ -51,7 +77,7 @@ def shown(template: str) -> str:
         if not name:
             continue
         if how and how[0] in BRANCHES:
-            words.append("/".join(shown(branch) for branch in branches(how) if branch))
+            words.append("/".join(_shown(branch) for branch in branches(how) if branch))
         elif how and how.startswith("# "):
             words.append(f"*n* {how[2:]}(s)")
         else:
