@@ -8,10 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from diagnosed_session import unit_of
+from diagnosed_session import diagnosed, unit_of
 from small_session import SCENARIO, G, made_once
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
+from trihedron.comparison.model import _with_shared_effects
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
@@ -123,6 +124,14 @@ def test_an_effect_that_only_the_simulation_has_is_surplus():
     assert [(e.side, e.id) for e in found.effects] == [("model", "accel-quadratic")]
     assert not any(p.significant for p in found.parameters)
     assert "which the recording lacks" in " ".join(str(found).split())  # wherever its lines break
+
+
+def test_residuals_under_effects_that_both_have_keep_the_names_of_their_rows():
+    found = diagnosed("", 3, 12)
+    fewer = replace(found.residuals[0], names_before=("pose 1",))
+    (row,) = _with_shared_effects(replace(found, residuals=(fewer,))).residuals
+    assert row.names_before == row.names_after
+    assert len(row.names_before) == len(row.before)
 
 
 def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():

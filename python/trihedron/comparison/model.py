@@ -149,7 +149,13 @@ def _with_shared_effects(found: Diagnosis) -> Diagnosis:
         found,
         stages=tuple(replace(one, domains=with_effects) if with_effects else one for one in found.stages),
         residuals=tuple(
-            replace(one, time_before_s=one.time_after_s, before=one.after, sigma_before=one.sigma_after)
+            replace(
+                one,
+                time_before_s=one.time_after_s,
+                before=one.after,
+                sigma_before=one.sigma_after,
+                names_before=one.names_after,
+            )
             for one in found.residuals
         ),
     )

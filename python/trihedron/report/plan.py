@@ -75,6 +75,9 @@ def _beside_moves(plan: ExperimentPlan) -> str:
 
 def _next_step(plan: ExperimentPlan) -> str:
     """How to record the poses, and what to do between them for the gyro."""
+    best = min((one.scale for one in plan.poses if one.rank == ALL_NUMBERS), default=math.inf)
+    if best > LEAST_WORTH:
+        return "Hold every pose longer, or check the accelerometer's noise that was given: data sheets state as much."
     step = "Record them: `trihedron capture PORT -o session.csv --guide` leads through the poses."
     moves = _best_moves(plan)
     if moves is None:

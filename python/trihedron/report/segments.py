@@ -14,8 +14,6 @@ from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
 
 SHAKEN = "moved or vibrated"
-FOR_NINE = 9
-"""Fewest poses that determine nine parameters."""
 
 
 def segments_report(segments: Segments, recording: Recording | None = None) -> Document:
@@ -41,9 +39,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
         lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
         if recording is None
         else signals_picture(recording, segments),
-        next_step="Is every pose found? Then: `trihedron calibrate LOG --latitude DEG -o calibration.json`."
-        if segments.n_poses >= FOR_NINE
-        else "See what the log is fit for: `trihedron check LOG`.",
+        next_step="Is every pose found? Then see what the log is fit for: `trihedron check LOG`.",
     )
 
 

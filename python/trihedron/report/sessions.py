@@ -8,7 +8,16 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.records.sessions import (
+    GEOMETRY,
+    PARAMETERS,
+    Change,
+    Repeated,
+    Session,
+    SessionsModel,
+    Spread,
+    ThermalModel,
+)
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
@@ -51,7 +60,8 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = f"Usable: {agree}"
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        usable = f"Usable with the spread below: {parameters} changed between {used}"
+        word = "Several devices" if any(change.id in GEOMETRY for change in changed) else "Usable with the spread below"
+        usable = f"{word}: {parameters} changed between {used}"
     usable += _worst(model)
     return Document(
         title="Calibration from many recordings",
