@@ -149,7 +149,7 @@ def test_ferraris_session_is_calibrated_by_method_one_and_refused_by_method_two(
     rejected = calibrated(capsys, *common, status=2)
     assert "not-observable" in codes(rejected)
     advice = next(f for f in rejected["findings"] if f["code"] == "not-observable")["action"]
-    assert "calibrate with --method faces, or add poses with (1)" in advice
+    assert "`trihedron calibrate LOG --method faces`. Or add poses with (1)" in advice
 
 
 def test_tomi_clips_in_moves_and_agrees_with_the_published_scales(real_data, capsys):
