@@ -121,7 +121,8 @@ def calibrate_sessions(
         raise InputError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
-    findings = (*_doubts(results, sessions), *model.findings)
+    of_place = (one for one in results[0].findings if one.code is FindingCode.GRAVITY_DEFAULTED)
+    findings = (*of_place, *_doubts(results, sessions), *model.findings)
     if by != "device":
         findings = (*several_devices(model.changes, "calibrated"), *findings)
     model = replace(model, calibration=replace(model.calibration, findings=findings), findings=findings)
