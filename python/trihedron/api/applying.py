@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,6 +19,7 @@ from trihedron.errors import InputError
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
+from trihedron.read.sensing import static_norm
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
@@ -150,10 +152,9 @@ parts are within 10 % of their data sheet."""
 
 def static_force(force: FloatArray | None, rate_hz: float, gravity_m_s2: float) -> tuple[Finding, ...]:
     """A finding with the median |f| of corrected readings (n, 3) in quiet windows: serious far from gravity."""
-    windows = None if force is None else look({"accelerometer": force}, rate_hz)
-    if windows is None:
+    norm = math.nan if force is None else static_norm(force, look({"accelerometer": force}, rate_hz))
+    if not math.isfinite(norm):
         return ()
-    norm = float(np.median(np.linalg.norm(windows.quiet_mean("accelerometer"), axis=1)))
     case = "far" if abs(norm / gravity_m_s2 - 1.0) > FAR_FROM_GRAVITY else ""
     return (Finding.of(FindingCode.STATIC_FORCE, case, norm_m_s2=norm, gravity_m_s2=gravity_m_s2),)
 
