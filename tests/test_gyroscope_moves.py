@@ -84,11 +84,32 @@ def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_rep
     assert FindingCode.LEFT_HANDED in codes(findings)  # which says that axes differ in name
 
 
-@pytest.mark.parametrize(("signs", "both"), [((-1, -1, -1), True), ((1, 1, -1), False), ((-1, 1, 1), False)])
-def test_gyro_axes_that_all_turn_against_the_accelerometers_are_a_left_handed_board(signs, both):
-    # One axis of the board documented the wrong way round mirrors both sensors: R and -R S instead of S.
-    (found,) = handedness(np.diag(signs) * 1e-4, np.eye(3))
-    assert ("both sensors" in found.seen) is both
+SWAP = np.eye(3)[:, [0, 2, 1]]
+
+
+@pytest.mark.parametrize(
+    ("accelerometer", "gyro", "said"),
+    [
+        # Each row: the axes of both sensors on a right-handed board, and what is named.
+        (np.eye(3), np.eye(3), None),
+        (np.diag([-1, 1, 1]), np.diag([-1, 1, 1]), "both sensors"),
+        (np.eye(3), np.diag([1, 1, -1]), "gyro Z turns against accelerometer Z"),
+        (np.diag([-1, 1, 1]), np.eye(3), "accelerometer X points against gyro X"),
+        (SWAP, np.eye(3), "accelerometer Y and Z are exchanged"),
+        (np.eye(3), SWAP, "gyro Y and Z are exchanged"),
+        (np.eye(3), np.eye(3)[:, [1, 2, 0]], "other axes"),
+    ],
+)
+def test_axes_that_are_reversed_or_exchanged_are_named(accelerometer, gyro, said):
+    # The calibration takes the accelerometer's columns as they are: its body frame R f is mirrored where they are
+    # left-handed, and a rate, an axial vector, is det(R) R ω there.
+    R = accelerometer.T
+    found = [one.seen.lower() for one in handedness(np.linalg.det(R) * R @ gyro * 1e-4, R @ accelerometer * 2.0)]
+    assert ([said.lower() in one for one in found] == [True]) if said else not found
+    # With the signs stated as they are nothing is left to say of the accelerometer.
+    if np.count_nonzero(accelerometer - np.diag(np.diag(accelerometer))) == 0:
+        stated = [one.seen for one in handedness(gyro * 1e-4, accelerometer * 2.0)]
+        assert bool(stated) == bool((accelerometer != gyro).any())
 
 
 def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():

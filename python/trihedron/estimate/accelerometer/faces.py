@@ -100,7 +100,7 @@ def calibrate_faces(
     findings = [
         *face_poses.left_out(faces, values),
         *_tilt_findings(seen, estimate, used),
-        *verdict.model_findings(S, unit, signs_are_known=up is not None),
+        *verdict.model_findings(S, unit),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.fit.dof),
     ]
     jacobian = other_form_jacobian(S_a, b_a)

@@ -67,7 +67,7 @@ def calibrate_norm(
     n = len(values)
     folds = [i * LEAVE_ONE_OUT_LIMIT // n if n > LEAVE_ONE_OUT_LIMIT else i for i in range(n)]
     apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
-    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
+    return _assemble(fit, apart, values, noise, g, unit, signs, frame)
 
 
 def _assemble(
@@ -79,8 +79,6 @@ def _assemble(
     unit: AccelerationUnit,
     signs: FloatArray,
     frame: Frame,
-    *,
-    signs_are_known: bool,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Residuals, covariance and findings of a fitted triad, for the raw axes with their own signs."""
     # f = S₊ (D a') + b: flipping a raw axis flips a column of S.
@@ -116,7 +114,7 @@ def _assemble(
             are_faces=are_six_faces(values),
         ),
         *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
-        *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
+        *verdict.model_findings(S, unit),
         *verdict.residual_findings(chi2, quality),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]

@@ -131,16 +131,11 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     ]
 
 
-def model_findings(S: FloatArray, raw_unit: AccelerationUnit, *, signs_are_known: bool) -> Iterator[Finding]:
+def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Finding]:
     """Findings for a left-handed triad, and for scales that contradict the unit of the log."""
     if np.linalg.det(S) < 0:
         signs = "".join("+" if s > 0 else "-" for s in np.diag(S))
-        yield Finding.of(
-            FindingCode.LEFT_HANDED,
-            "accelerometer" if signs_are_known else "accelerometer-signs-asked",
-            signs=signs,
-            det_S_sign=-1.0,
-        )
+        yield Finding.of(FindingCode.LEFT_HANDED, "accelerometer", signs=signs, det_S_sign=-1.0)
     nominal = acceleration_to_si(raw_unit)
     if nominal is not None:
         ratio = np.linalg.norm(S, axis=0) / nominal

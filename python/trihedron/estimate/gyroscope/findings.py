@@ -66,29 +66,40 @@ def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
 
 
 def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
-    """LEFT_HANDED when the logged axes of a sensor form a left-handed triad, or those of both sensors disagree.
+    """LEFT_HANDED when the gyro's axes are not the accelerometer's axes of the same name.
 
-    ``det S_ω < 0`` is not due to the accelerometer's sign conventions: a reflection ``R`` of its frame makes
-    ``S_ω → −R S_ω``, whose determinant keeps its sign. Two gyro axes opposite to the accelerometer's show a reflection
-    of the accelerometer, three a reflection that both sensors share.
+    ``M = S_a⁻¹ S_ω`` holds the gyro's axes in those of the accelerometer. Where the handedness of the accelerometer is
+    another one than stated, a reflection ``R`` of its frame makes ``S_ω → −R S_ω``: ``M = −1`` is a reflection that
+    both sensors share, two reversed axes are the third one of the accelerometer, and a negative exchange of two axes
+    is one of the accelerometer's columns.
     """
-    determinant = float(np.linalg.det(S))
-    if determinant < 0.0:
-        is_shared = bool((np.diag(S) < 0.0).all()) and np.array_equal(np.argmax(np.abs(S), axis=0), np.arange(3))
-        if is_shared:
-            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors", determinant=determinant)
-        else:
-            yield Finding.of(FindingCode.LEFT_HANDED, "gyro", determinant=determinant)
-    if np.linalg.det(S_accelerometer) < 0.0:
+    axes = np.linalg.solve(S_accelerometer, S)
+    order = np.argmax(np.abs(axes), axis=0)
+    if len(set(order.tolist())) < 3:
         return
-    order = np.argmax(np.abs(S), axis=0)
-    if len(set(order.tolist())) < 3 or determinant <= 0.0:
-        return
-    reversed_axes = [f"{i + 1}" for i in range(3) if S[order[i], i] < 0.0]
-    if not np.array_equal(order, np.arange(3)):
-        yield Finding.of(FindingCode.LEFT_HANDED, "gyro-other-axes")
-    elif reversed_axes:
-        yield Finding.of(FindingCode.LEFT_HANDED, "gyro-against-accelerometer", axes=reversed_axes)
+    is_against = axes[order, np.arange(3)] < 0.0
+    moved = [int(i) + 1 for i in np.flatnonzero(order != np.arange(3))]
+    reversed_axes = np.flatnonzero(is_against)
+    match len(moved), len(reversed_axes):
+        case 0, 0:
+            return
+        case 0, 1:
+            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-reversed", axis=int(reversed_axes[0]) + 1)
+        case 0, 2:
+            right = int(np.flatnonzero(~is_against)[0])
+            signs = "".join("-" if (S_accelerometer[i, i] < 0.0) != (i == right) else "+" for i in range(3))
+            others = [int(i) + 1 for i in reversed_axes]
+            yield Finding.of(
+                FindingCode.LEFT_HANDED, "accelerometer-reversed", axis=right + 1, axes=others, signs=signs
+            )
+        case 0, 3:
+            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors")
+        case 2, 0:
+            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved)
+        case 2, 3:
+            yield Finding.of(FindingCode.LEFT_HANDED, "accelerometer-exchanged", axes=moved)
+        case _:
+            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-other-axes")
 
 
 def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> Iterator[Finding]:

@@ -66,17 +66,10 @@ ENTRIES = {
         "Too few poses to separate the two, or an accelerometer that is not linear.",
         "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
     ),
-    (Code.LEFT_HANDED, "accelerometer", WARNING): Words(
-        "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
-        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped.",
-        "Check the axis directions printed on the board against a pose with one axis up.",
-        numbers=("det_S_sign",),
-    ),
-    (Code.LEFT_HANDED, "accelerometer-signs-asked", WARNING): Words(
-        "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
-        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Poses alone "
-        "do not determine signs; these are the ones given.",
-        "Check the axis directions printed on the board against a pose with one axis up.",
+    (Code.LEFT_HANDED, "accelerometer", NOTE): Words(
+        "The accelerometer's axes as stated form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
+        "The documented axes of the board are left-handed, or one was stated wrong: poses alone do not determine "
+        "signs, the moves of a gyro do.",
         numbers=("det_S_sign",),
     ),
     (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(

@@ -44,23 +44,38 @@ _MOVES = {
         "Check the axis directions of the board; the calibration itself corrects them.",
         numbers=("determinant",),
     ),
+    (Code.LEFT_HANDED, "gyro-reversed", WARNING): Words(
+        "gyro {axis:axis} turns against accelerometer {axis:axis}.",
+        "its documented direction is wrong, or its sign was changed.",
+        "Check the axis directions of the board; the calibration itself corrects the gyro's.",
+    ),
+    (Code.LEFT_HANDED, "accelerometer-reversed", WARNING): Words(
+        "accelerometer {axis:axis} points against gyro {axis:axis}.",
+        "its documented direction is wrong, or its sign was changed; or gyro {axes:axes and} are both reversed.",
+        "Compare the axis directions of the board with a pose with {axis:axis} up; if the accelerometer is reversed, "
+        "state --axis-signs={signs}.",
+    ),
     (Code.LEFT_HANDED, "both-sensors", WARNING): Words(
-        "the axes of both sensors as logged form a left-handed triad: every gyro axis turns against the "
-        "accelerometer's.",
+        "every gyro axis turns against the accelerometer's axis of the same name: the axes of both sensors are of the "
+        "other handedness than stated.",
         "one documented axis of the board is reversed, or two are exchanged, alike for both sensors; or all three gyro "
         "axes are reversed.",
         "Check the axis directions of the board and state the accelerometer's with --axis-signs, for example "
         "--axis-signs=-++; the calibration itself corrects the gyro's.",
-        numbers=("determinant",),
     ),
-    (Code.LEFT_HANDED, "gyro-against-accelerometer", WARNING): Words(
-        "gyro {axes:axes and} point against the accelerometer's axes of the same name.",
-        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
-        "Check the axis directions of the board against both data sheets.",
+    (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
+        "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
+        "their columns are in another order than stated, or their documented directions are wrong.",
+        "Name the columns in their order with --columns; the calibration itself corrects the gyro's.",
+    ),
+    (Code.LEFT_HANDED, "accelerometer-exchanged", WARNING): Words(
+        "accelerometer {axes:axes and} are exchanged against the gyro's axes.",
+        "their columns are in another order than stated, or their documented directions are wrong.",
+        "Name the columns in their order with --columns.",
     ),
     (Code.LEFT_HANDED, "gyro-other-axes", WARNING): Words(
         "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
-        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed.",
+        "the axes of one of the two sensors are in another order, or have other signs, than stated.",
         "Check the axis directions of the board against both data sheets.",
     ),
     (Code.OUTLIER_MOVE, "", WARNING): Words(
