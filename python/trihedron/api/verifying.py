@@ -140,8 +140,8 @@ def same_recording(known: Calibration, recording: Recording) -> tuple[Finding, .
     made_from = {known.recording_sha256, *(one.get("sha256") for one in sessions)}
     is_same = bool(recording.sha256) and recording.sha256 in made_from
     # One of the two files of a recording has a hash of its own.
-    files = known.recording_source.split(" + ")
-    is_half = len(files) > 1 and recording.source in files
+    groups = [known.recording_source, *(one.get("group", "") for one in sessions)]
+    is_half = any(" + " in group and recording.source in group.split(" + ") for group in groups)
     return (Finding.of(FindingCode.SAME_RECORDING),) if is_same or is_half else ()
 
 

@@ -69,7 +69,7 @@ def verify_calibration(
     judged = (calibration, without, recording, segments)
     worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
-    beyond_noise = (*of_poses, *_angle_findings(moves, changed))
+    beyond_noise = (*of_poses, *_angle_findings(moves, changed, segments))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -289,7 +289,7 @@ def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
     return _Beyond(times, times > FAR_BEYOND, others > FALSE_ALARM)
 
 
-def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
+def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> Iterator[Finding]:
     angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
         return
@@ -298,6 +298,8 @@ def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
     if beyond is None:
         return
     worst = int(np.argmax(angle_deg / sigma_deg))
+    move = segments.moves[moves.which[worst]]
+    unsteady = [k + 1 for k in (move.pose_before, move.pose_after) if segments.poses[k].is_unsteady]
     yield Finding.of(
         FindingCode.HELD_OUT_WORSE,
         "verify-moves",
@@ -307,6 +309,8 @@ def _angle_findings(moves: Carriage, changed: _Changed) -> Iterator[Finding]:
         shifted=changed.shifted,
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
+        is_beside=bool(unsteady),
+        unsteady=unsteady,
         severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
         times=beyond.times,
         is_far=beyond.is_far,

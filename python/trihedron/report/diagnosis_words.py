@@ -125,7 +125,10 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "unexplained":
         experiments = [one.experiment for one in diagnosis.relations if one.experiment]
-        again = "Record again: what returns belongs to the sensor, what does not to the session."
+        left = {one.domain for one in diagnosis.domains if one.disagrees}
+        clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
+        again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
+        again += "to the session."
         return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
     steps = []
     if diagnosis.parameters:

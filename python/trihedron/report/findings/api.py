@@ -124,7 +124,7 @@ _USE = {
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
         "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s², but gravity {gravity_m_s2:.4g} m/s².",
-        "The calibration is of another device, or the log in other units than it was made for.",
+        "The calibration is of another device, or the log in another unit or range than it was made for.",
         "Check that calibration and log belong together: `trihedron verify CALIBRATION LOG`.",
     ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(

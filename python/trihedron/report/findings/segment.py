@@ -39,7 +39,8 @@ ENTRIES = {
     ),
     (Code.NOT_STATIC, "", SERIOUS): Words(
         "No pose of {least_s:.2g} s or more in {duration_s:.1f} s of log.",
-        "The sensor was moving, or held in the hand, all the time; or the log is too short.",
+        "The sensor was moving, or held in the hand, all the time; or the log is too short, as a table of means of poses is: "
+        "the readings themselves are needed.",
         "Log again: put the case down for several seconds in each pose.",
         numbers=("poses",),
     ),
@@ -63,9 +64,8 @@ ENTRIES = {
     (Code.FEW_POSES, "", WARNING): Words(
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
-        "The log has few poses, or they were held for less than {least_s:.2g} s.",
-        "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each; `trihedron segment LOG` shows what "
-        "was found.",
+        "Other poses were not logged, or held for less than {least_s:.2g} s.",
+        "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each.",
         or_severity=SERIOUS,
     ),
 }
