@@ -68,7 +68,8 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
 
 def _why_not(recording: Recording, segments: Segments, error: str) -> tuple[Finding, ...]:
     """Findings of the segmentation: serious where they count too few poses, else with the error of the calibration."""
-    if segments.n_poses < FEWEST_POSES and any(one.code in COUNTS_OF_POSES for one in segments.findings):
+    has_few = recording.accelerometer is not None and segments.n_poses < FEWEST_POSES
+    if has_few and any(one.code in COUNTS_OF_POSES for one in segments.findings):
         return tuple(
             replace(one, severity=Severity.SERIOUS) if one.code in COUNTS_OF_POSES else one for one in segments.findings
         )

@@ -202,7 +202,10 @@ class Document:
         if action.startswith("If ") and then:
             return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
         if first.severity is Severity.SERIOUS or first.code in INSTEAD:
-            return action
+            # An option that was missing is no remedy of what else is serious.
+            others = (one for one in self.findings if one.severity is Severity.SERIOUS and one.code is not first.code)
+            second = next(others, None) if first.code is FindingCode.RATE_ASSUMED else None
+            return action if second is None or not second.action else f"{action} Then: {action_in_words(second)}"
         if first.code not in CONSEQUENCE:
             return then
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])

@@ -40,8 +40,8 @@ _MOVES = {
     ),
     (Code.LEFT_HANDED, "gyro", WARNING): Words(
         "the gyro's axes as logged form a left-handed triad (det S < 0).",
-        "one documented gyro axis is reversed, or two are exchanged.",
-        "Check the axis directions of the board; the calibration itself corrects them.",
+        "a turn was stated in the wrong sense; or one documented gyro axis is reversed, or two are exchanged.",
+        "Check the sense of the stated turns, then the axis directions of the board, which the calibration corrects.",
         numbers=("determinant",),
     ),
     (Code.LEFT_HANDED, "gyro-reversed", WARNING): Words(
