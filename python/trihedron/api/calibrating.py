@@ -136,6 +136,7 @@ def calibrate(
             raise InputError("a turntable's speeds belong to poses and moves: leave them, or the reference, out.")
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
+        said = said if found.accelerometer is not None else ()
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
     _require_poses(recording, segments)
     if method == "faces":

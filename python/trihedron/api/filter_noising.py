@@ -163,6 +163,8 @@ def _no_noise(recording: Recording, segments: Segments | None, static: Noise | s
     remedy = "; for static values run `trihedron allan` on a static log of ten minutes or more"
     if static is not None:
         remedy = "; static values alone are those of `trihedron allan`"
+        if isinstance(static, Noise) and not _sensors(static):
+            remedy += f". Beside a reference, too, {IN_COUNTS}"
     return (
         f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
         f"beside it (--reference){remedy}."

@@ -82,6 +82,7 @@ def calibrate_references(
     gyro = _with_repeatability([one.gyroscope for one in found])
     first = replace(found[0], gyroscope=gyro, accelerometer=_averaged(found))
     calibration = calibration_by(first, logs[0], gravity, source, frame)
+    said = said if first.accelerometer is not None else ()
     findings = (*said, *(finding for one in found for finding in one.findings))
     return ReferencesResult(replace(calibration, findings=findings), found, logs)
 

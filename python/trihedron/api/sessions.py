@@ -131,11 +131,21 @@ def calibrate_sessions(
 
 def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -> Iterator[Finding]:
     """The gravest warning of every recording alone about what S and b leave: the common ones leave it as well."""
+    doubted: dict[FindingCode, list[tuple[str, str, str]]] = {}
     for result, session in zip(results, sessions, strict=True):
         warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
         for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
-            seen, path = words("quoted", sentence=warned[code]), as_arguments(result.recording.source)
-            yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=session.name, seen=seen, path=path)
+            one = session.name, warned[code], as_arguments(result.recording.source)
+            doubted.setdefault(code, []).append(one)
+    for said in doubted.values():
+        name, warning, path = said[0]
+        seen = words("quoted", sentence=warning)
+        if len(said) == 1:
+            yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=name, seen=seen, path=path)
+        else:
+            yield Finding.of(
+                FindingCode.CALIBRATION_DOUBTED, "of-recordings", n=len(said), n_all=len(results), name=name, seen=seen
+            )
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:

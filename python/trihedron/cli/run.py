@@ -22,7 +22,7 @@ _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output
 _SHOWN = ("--json", "--report", "--full", "--force")
 _WRITTEN = ("-o", "--output", "--updated", "--improved")
 _ON_A_NEW_LOG = "`... NEW_LOG`"
-_OF_DIAGNOSE = ("--alpha",)
+_OF_ITS_COMMAND = ("--alpha", "--by", "--labels", "--frame")
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
@@ -156,7 +156,9 @@ def _filled(command: str) -> str:
         named = shlex.split(command.strip("`"))[2:]
         options = next((shlex.join(words[len(named) :]) for words in _now().logs if words[: len(named)] == named), "")
         return f"`{' '.join(filter(None, (command.strip('`'), options, _now().place)))}`"
-    same = again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_DIAGNOSE).split()[2:])
+    same = (
+        again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_ITS_COMMAND).split()[2:])
+    )
     same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)

@@ -144,6 +144,8 @@ def verdict(calibration: Calibration) -> str:
     above = f"{WITHIN}{said}" if said else "Usable"
     if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
         above += ", for the accelerometer alone"
+    if any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in calibration.findings):
+        above += ", for the gyro alone"
     effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
     whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
-from trihedron.records import Finding
+from trihedron.records import Finding, FindingCode
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table, undetermined
@@ -87,6 +87,9 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         noise = (*ratios_picture(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
+    if diagnosis.verdict in ("not-testable", "unexplained"):
+        # No result to be used, of which the size of gravity would decide.
+        findings = [one for one in findings if one.code is not FindingCode.GRAVITY_DEFAULTED]
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:

@@ -7,6 +7,7 @@ from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut, not_explained
 from trihedron.records.noise import least_length_s
+from trihedron.records.sessions import GEOMETRY
 from trihedron.report.calibration import errors_in_words
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing, of_another_device
 from trihedron.report.document import Headline, Level, action_in_words
@@ -80,7 +81,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
-        said.append(f"parameters differ ({listed(numbers)})")
+        # What the package fixes differs before all else: a calibration of another device has any effect missing.
+        of_package = any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
+        said.insert(0 if of_package else len(said), f"parameters differ ({listed(numbers)})")
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}."
 
 

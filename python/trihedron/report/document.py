@@ -40,6 +40,7 @@ CONSEQUENCE = (
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
     FindingCode.GRAVITY_DEFAULTED,
+    FindingCode.EFFECTS_MODELLED,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
     FindingCode.NOT_OBSERVABLE,
@@ -199,7 +200,7 @@ class Document:
         if first is None or not first.action or begins_with(then, first.action):
             return then
         action = action_in_words(first)
-        if action.startswith("If ") and then:
+        if action.startswith("If ") and then and "; else " not in action:
             return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
         if first.severity is Severity.SERIOUS or first.code in INSTEAD:
             # An option that was missing is no remedy of what else is serious.

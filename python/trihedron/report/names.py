@@ -23,7 +23,7 @@ MEANING = {
 """Domains of residuals in words."""
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
-    "calibration-doubted": "calibration with warnings",
+    "calibration-doubted": "warnings of single calibrations",
     "calibration-shift": "parameters differ",
     "effect-not-applied": "effect not compensated",
     "effects-modelled": "residuals that no effect explains",

@@ -84,6 +84,8 @@ def _next(noise: Noise) -> str:
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
         return SAY_UNITS if any(f.code is FindingCode.CURVE_ALONE for f in noise.findings) else SAY_COUNTS
     actions = [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]
+    if not actions and not any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes):
+        actions = ["K is below what this log shows: its upper limit is the cautious value; a longer log measures it."]
     return " ".join([N_ALONE, *actions]) if actions else NEXT
 
 

@@ -203,7 +203,7 @@ _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
         "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
         _MODELLED,
-        _TAKES_OFF,
+        "Record again: what returns belongs to the sensor, what does not to the session.",
         numbers=("n_effects", "n_domains_left"),
     ),
     (Code.BIAS_DRIFT, "", WARNING): Words(
@@ -245,6 +245,11 @@ _MANY_RECORDINGS = {
         "By itself, {name} has a warning: {seen:clause}.",
         "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
         "Run `trihedron diagnose {path}`, which looks for the cause.",
+    ),
+    (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
+        "By themselves, {n} of {n_all} recordings have one warning; {name}: {seen:clause}.",
+        "What S and b of each recording leave, the common ones leave as well; their uncertainty is widened by it.",
+        "Run `trihedron diagnose ...`, which looks for what they share.",
     ),
     (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",

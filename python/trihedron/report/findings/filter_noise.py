@@ -57,8 +57,8 @@ ENTRIES = {
     (Code.FILTER_NOISE_UNCERTAIN, "limit", WARNING): Words(
         "N of the {sensor} was not measured: {upper:.3g} is an upper limit, and may be several times too large.",
         "The reference's own error is larger than the sensor's noise.",
-        "Give a static log of the unit (--static STATIC) or a better reference; with the limit in it a filter "
-        "is too cautious.",
+        "Give a static log of the unit (--static STATIC) or a better reference; with the limit as N a filter "
+        "trusts the {sensor} less than it could.",
     ),
     (Code.FILTER_NOISE_UNCERTAIN, "reference", WARNING): Words(
         "Over {horizon_s:.3g} s the reference's own error is {share:.0f %} of the {sensor}'s error: N and K come from "
