@@ -39,6 +39,7 @@ CONSEQUENCE = (
     FindingCode.LOG_TURNED,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
+    FindingCode.TABLE_TILT,
     FindingCode.GRAVITY_DEFAULTED,
     FindingCode.EFFECTS_MODELLED,
     FindingCode.RESIDUAL_ABOVE_NOISE,
