@@ -1,5 +1,6 @@
 """Signals that effects are computed from: the motion of the fitted session along every sensor axis, and logged ones."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,12 +10,16 @@ import numpy.typing as npt
 from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 
 TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
+QUICK_WINDOW_S = 2.5
+"""The same for a fine thermometer, whose temperature may go up and down within a minute."""
+SMALL_PART = 0.1
+"""Error of the rate of temperature, in its rms, that takes one part in a hundred off an effect's size."""
 BLOCKS_OF_WIDTH = 10
 """Blocks of samples per smoothing width: the blocks widen it by a part in 2400, and reduce windows of thousands of
 samples to dozens of means."""
@@ -172,12 +177,17 @@ class Context:
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
-        """(points,) rate of change of the logged temperature, smoothed over ``TEMPERATURE_WINDOW_S``, K/s."""
+        """(points,) rate of change of the logged temperature, K/s, smoothed as little as its thermometer allows."""
         recording, logged = self.obs.recording, self._logged("temperature_degc")
         if logged is None:
             return None
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
-        return self.at_points(smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz))
+        for window_s in (QUICK_WINDOW_S, TEMPERATURE_WINDOW_S):
+            slope = smoothed_slope(filled, recording.time_s, window_s * recording.rate_hz)
+            # Errors of all readings of a window may be alike, as those of rounding are.
+            if _error_of_one(filled) <= SMALL_PART * window_s * rms_of(slope):
+                break
+        return self.at_points(slope)
 
     @cached_property
     def supply(self) -> FloatArray | None:
@@ -254,7 +264,7 @@ class Context:
     def pose_attitude(self) -> FloatArray:
         """(poses, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves, levelled in each pose.
 
-        Poses that no chain of moves reaches keep NaN.
+        Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
         """
         obs, state, path = self.obs, self.fitted.state, self.fitted.path
         out = np.full((obs.n_poses, 3, 3), np.nan)
@@ -265,6 +275,7 @@ class Context:
             return np.stack([x, np.cross(up, x), up], axis=1)
 
         up = state.up
+        out[:, :, 2] = up
         out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
         for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
             if np.isfinite(out[before]).all():
@@ -288,7 +299,9 @@ class Context:
 def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
     """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
 
-    Timestamps are smoothed too: a straight line keeps its slope across pauses, and to the ends.
+    Timestamps are smoothed too: a straight line keeps its slope across pauses, and to the ends. Smoothing takes
+    ``width²/2`` times its second derivative off a slope, and twice the width four times as much: both together take
+    neither (Richardson), so that the slope of what changes over a few widths keeps its size.
     """
     length = max(round(width / BLOCKS_OF_WIDTH), 1)
     starts = np.arange(0, len(values), length)
@@ -296,8 +309,20 @@ def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> Floa
         return np.zeros(len(values))
     n = np.diff(starts, append=len(values))
     level, time = (np.add.reduceat(of, starts) / n for of in (values, time_s))
-    smooth, at = (gaussian_filter1d(of, max(width / length, 1.0), mode="nearest") for of in (level, time))
-    return np.interp(time_s, time, np.gradient(smooth, at))
+    narrow, wide = (_gradient(level, time, times * max(width / length, 1.0)) for times in (1.0, 2.0))
+    return np.interp(time_s, time, (4.0 * narrow - wide) / 3.0)
+
+
+def _error_of_one(values: FloatArray) -> float:
+    """Error of one reading: that of rounding to its LSB, or noise, whichever is larger."""
+    steps = np.diff(np.unique(values))
+    lsb = float(steps.min()) if len(steps) else 0.0
+    return max(lsb / math.sqrt(12.0), float(np.diff(values).std()) / math.sqrt(2.0))
+
+
+def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:
+    smooth, at = (gaussian_filter1d(of, width, mode="nearest") for of in (level, time))
+    return np.asarray(np.gradient(smooth, at))
 
 
 def _sensor_axes(S: FloatArray) -> FloatArray:
