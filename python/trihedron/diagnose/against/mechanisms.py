@@ -140,13 +140,14 @@ def compare_effects(
         for effect in left
         if effect.id not in of_session
         and effect.id in excluded
+        and _is_excluded(effect, tried, alpha)
         and not _shows_in(effect) & unexplained
         and (not by_id()[effect.id].is_spread or _would_show(effect, by_chance))
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
     ]
-    parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
+    parameters = [p for m, r in alike for p in _parameters(m.id, m.parameters, r.parameters, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
 
 
@@ -197,6 +198,13 @@ def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
     )
 
 
+def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: float) -> bool:
+    """Whether the recording excludes the effect at the model's size: its own estimate differs."""
+    one = next((c for c in tried if c.id == effect.id), None)
+    differences = [] if one is None else _parameters(effect.id, effect.parameters, one.size, alpha)
+    return not differences or any(p.significant for p in differences)
+
+
 def _is_free(effect: AcceptedEffect) -> bool:
     return effect.model.get("variant") == FREE_CURVE
 
@@ -205,10 +213,12 @@ def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:
     return a.id == b.id or a.id in b.confounded_with or b.id in a.confounded_with
 
 
-def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) -> list[ParameterDifference]:
-    sensor = SENSORS.get(model.id.partition("-")[0], "both")
-    given = {p.name: p for p in model.parameters}
-    shared = [(given[p.name], p) for p in recording.parameters if p.name in given and p.unit == given[p.name].unit]
+def _parameters(
+    effect_id: str, model: Iterable[EffectParameter], recording: Iterable[EffectParameter], alpha: float
+) -> list[ParameterDifference]:
+    sensor = SENSORS.get(effect_id.partition("-")[0], "both")
+    given = {p.name: p for p in model if p.name not in by_id()[effect_id].of_session}
+    shared = [(given[p.name], p) for p in recording if p.name in given and p.unit == given[p.name].unit]
     # A parameter without uncertainty on either side counts events of its session, or is an ADC code. Where the codes
     # beneath a parameter are equal, its difference in SI is that of the scales, which are compared by themselves.
     codes = {r.name for m, r in shared if r.name.startswith(CODE) and m.value == r.value}
@@ -224,7 +234,7 @@ def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) 
     p_value = min(1.0, 2.0 * len(shared) * ndtr(-max(beyond)))
     return [
         ParameterDifference(
-            model.id, sensor, r.name, m.value, r.value, r.value - m.value, s, r.unit, p_value, p_value < alpha / 2.0
+            effect_id, sensor, r.name, m.value, r.value, r.value - m.value, s, r.unit, p_value, p_value < alpha / 2.0
         )
         for (m, r), s in zip(shared, sigma, strict=True)
     ]

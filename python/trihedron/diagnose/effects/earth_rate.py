@@ -70,6 +70,7 @@ class EarthRate(Effect):
 
     id = "earth-rate"
     needs_moves = True
+    of_session = ("latitude", "north_azimuth", "horizontal_x", "horizontal_y")
     size = EARTH_RATE_RAD_S
     """rad/s: the size is known."""
 

@@ -176,10 +176,12 @@ SESSION = {
         "the documented axes do not form one right-handed triad",
         "tilt each axis up in turn and turn about it by hand: the signs show which axis is documented wrongly",
         {
+            "exchanged": "{moved:axes and} of one sensor are exchanged against the axes of the other by their names"
+            "{is_turned:?, with a sign: one sensor is turned against the other|}.",
             "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad. In "
             "question: {is_one:?gyro {reversed:axes}|{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
             "{is_three:?one axis of the board alike for both sensors (or two are exchanged), or every gyro axis|"
-            "the order of the axes}}}."
+            "the order of the axes}}}.",
         },
     ),
     "supply-sensitivity": EffectWords(
