@@ -136,7 +136,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     steps = []
     if diagnosis.parameters:
         differs = ["the parameters that differ"] if any(p.significant for p in diagnosis.parameters) else []
-        said = listed([*differs, *(["the missing effects"] if _named(diagnosis, "recording") or not differs else [])])
+        missing = ["the missing effects"] if _named(diagnosis, "recording") else []
+        said = listed([*differs, *missing] or ["the noise and sampling of this log"])
         steps.append(
             f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`."
             if improved

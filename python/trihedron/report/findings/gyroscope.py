@@ -133,14 +133,13 @@ _MOVES = {
         "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
     ),
     (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
-        "The tilt error after rotations exceeds noise: a support gives way after the moves, or samples are lost "
-        "without a trace in these timestamps. Up to {lost_share:.2g %} of the samples could be missing; every turn, "
-        "and the gyro's scale factors, would be wrong by as much; their standard error without that is "
-        "{sigma_scale:.2g %}.",
-        "A soft support; a link or a logger that drops samples and renumbers the others, or timestamps them anew; or "
-        "another cause of the error, for which `trihedron diagnose` looks.",
-        "Put the sensor on a firm support, log the count of samples or the time that the sensor itself gives (not "
-        "one of the logger), and record again.",
+        "The tilt error after rotations exceeds noise, and S and b do not say why. If samples are lost without a trace "
+        "in these timestamps, up to {lost_share:.2g %} of them could be missing; every turn, and the gyro's scale "
+        "factors, would be wrong by as much; their standard error without that is {sigma_scale:.2g %}.",
+        "An effect that S and b lack (a nonlinear gyro); a support that gives way after the moves; a link or a logger "
+        "that drops samples and renumbers the others, or timestamps them anew.",
+        "See which: `trihedron diagnose LOG`. Where it names no effect, put the sensor on a firm support, log the count "
+        "of samples or the time that the sensor itself gives (not one of the logger), and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
