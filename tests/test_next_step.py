@@ -20,7 +20,7 @@ from trihedron.cli.run import (
     with_arguments,
 )
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.report.diagnosis_words import next_step_in_words
+from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document, FindingList, Section
 
 

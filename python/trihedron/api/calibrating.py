@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from trihedron.api.choices import settle_gravity
-from trihedron.api.reading import AnyRecording, recording_of, segments_of
+from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
@@ -40,10 +40,6 @@ if TYPE_CHECKING:
 Method = Literal["joint", "separate", "faces"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
-COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
-"""Findings that already state the number of poses."""
-FEWEST_POSES = 3
-"""Fewest poses with which a fit is tried."""
 MOST_SETTLING = 0.05
 """Fraction of poses with detected settling that is allowed, since more settle undetected: with one of 18 on a support
 that yields, a fifth of the elements of the gyro's S were outside their 95 % interval."""
@@ -138,7 +134,7 @@ def calibrate(
         by_motion = calibration_by(found, recording, gravity, source, frame)
         said = said if found.accelerometer is not None else ()
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
-    _require_poses(recording, segments)
+    require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
         wanted: Frame = frame or "case"
@@ -165,7 +161,18 @@ def calibrate(
         *_as_they_weigh(segments, calibration),
         *_of_fit(calibration, recording, segments),
     )
-    return _result(calibration, findings, segments, recording)
+    return _result(calibration, _with_doubtful_columns(findings), segments, recording)
+
+
+def _with_doubtful_columns(findings: Found) -> Found:
+    """The findings, with columns that were guessed as serious as poses that do not determine a calibration: another
+    sensor's readings look like that."""
+    if not any(one.severity is Severity.SERIOUS and one.code is FindingCode.NOT_OBSERVABLE for one in findings):
+        return findings
+    is_guess = (FindingCode.COLUMNS_ASSUMED, Severity.WARNING)
+    return tuple(
+        replace(one, severity=Severity.SERIOUS) if (one.code, one.severity) == is_guess else one for one in findings
+    )
 
 
 def _result(calibration: Calibration, findings: Found, segments: Segments, recording: Recording) -> CalibrationResult:
@@ -202,24 +209,6 @@ def _as_they_weigh(segments: Segments, calibration: Calibration) -> Found:
         return one.code is FindingCode.POSE_SETTLING and one.numbers["poses"] > MOST_SETTLING * segments.n_poses
 
     return tuple(replace(one, severity=Severity.SERIOUS) if is_grave(one) else one for one in segments.findings)
-
-
-def _require_poses(recording: Recording, segments: Segments) -> None:
-    if recording.accelerometer is None:
-        raise InputError(
-            f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
-            "or name its columns with --columns."
-        )
-    if segments.n_poses < FEWEST_POSES:
-        of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
-        grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
-        is_count = grave is not None and grave.code in COUNTS_OF_POSES
-        why = [] if is_count else [f"Poses found: {segments.n_poses}."]
-        why += [] if grave is None else [grave.seen, *([grave.action] if of_log else [])]
-        raise InputError(
-            f"{recording.source}: {' '.join(why)} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
-            "different poses; `trihedron segment LOG` shows what was seen."
-        )
 
 
 def _by_poses(

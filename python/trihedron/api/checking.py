@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from trihedron.api.calibrating import COUNTS_OF_POSES, FEWEST_POSES, calibrate
+from trihedron.api.calibrating import calibrate
 from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_static_log
-from trihedron.api.reading import AnyRecording, recording_of, segment
+from trihedron.api.reading import COUNTS_OF_POSES, FEWEST_POSES, AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 from trihedron.records.noise import least_length_s
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
+from trihedron.segment.judge import POSES_FOR_NINE
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -62,6 +63,8 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
             return CheckResult(recording, segments, None, (static, *recording.findings))
         return CheckResult(recording, segments, None, (*recording.findings, *_why_not(recording, segments, str(error))))
     if is_static_log(recording, segments, lambda: result.calibration):
+        if recording.gyroscope is None and segments.n_poses >= POSES_FOR_NINE:
+            static = Finding.of(FindingCode.NOT_FIT, "same-poses", n_poses=segments.n_poses)
         return CheckResult(recording, segments, None, (static, *recording.findings, *segments.findings))
     return CheckResult(recording, segments, result.calibration, result.findings)
 

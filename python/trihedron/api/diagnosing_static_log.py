@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trihedron.api.calibrating import FEWEST_POSES
+from trihedron.api.reading import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open, nominal
 from trihedron.diagnose.static_log.answer import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -35,6 +36,8 @@ from trihedron.records.filter_noise import (
     TiltCheck,
 )
 from trihedron.records.noise import LEAST_S, NOT_OF_THE_SENSOR
+from trihedron.records.recording import as_arguments
+from trihedron.records.words import words
 from trihedron.units import rate_to_si
 
 UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -116,7 +119,11 @@ def filter_noise(
     if reference is None and own is None:
         raise InputError(_no_noise(recording, segments, static))
     known = _static(static) if static is not None else _sensors(own)
-    findings = (*recording.findings, *_doubts(static), *(said if reference is not None else ()))
+    findings = (
+        *recording.findings,
+        *_doubts(own if static is None else static),
+        *(said if reference is not None else ()),
+    )
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
@@ -198,6 +205,7 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
         None if recording.gyroscope is None else recording.gyroscope[at],
         accelerometer_unit=recording.accelerometer_unit,
         gyroscope_unit=recording.gyroscope_unit,
+        temperature_degc=None if recording.temperature_degc is None else recording.temperature_degc[at],
     )
     try:
         found = allan(part)
@@ -229,12 +237,18 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
 
 
 def _doubts(static: Noise | str | os.PathLike[str] | None) -> tuple[Finding, ...]:
-    """Serious findings on the static log, and those of what is in its K beside noise."""
+    """Serious findings on a static log, and those of what is in its K beside noise."""
     if static is None:
         return ()
     said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
-    return tuple(
-        finding for finding in said if finding.severity is Severity.SERIOUS or finding.code in NOT_OF_THE_SENSOR
+    name = as_arguments(static.source) if isinstance(static, Noise) else shlex.quote(os.fspath(static))
+    return (
+        *(
+            Finding.of(FindingCode.FILTER_NOISE_STATIC, "doubted", name=name, seen=words("quoted", sentence=one.seen))
+            for one in said
+            if one.severity is Severity.SERIOUS
+        ),
+        *(one for one in said if one.code in NOT_OF_THE_SENSOR and one.severity is not Severity.SERIOUS),
     )
 
 

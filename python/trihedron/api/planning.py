@@ -12,6 +12,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth
+from trihedron.records.segments import LEAST_POSE_S
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 _KINDS = np.count_nonzero(np.abs(CANDIDATES) > 1e-9, axis=1)
@@ -73,6 +74,8 @@ def plan(
             raise InputError(f"the {name} must be a positive number, got {value:g}")
         if not 1e-15 < value < 1e9:
             raise InputError(f"a {name} of {value:g} is that of no experiment")
+    if pose_s < LEAST_POSE_S:
+        raise InputError(f"a pose of {pose_s:g} s is not found in a log: plan with {LEAST_POSE_S:g} s or more")
     turns = design_turns(turns_deg, turn_s, pose_s, gyroscope_density, sigma_turn_rad)
     sigma = accelerometer_density / math.sqrt(pose_s) / gravity_m_s2
     angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))

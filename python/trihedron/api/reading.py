@@ -12,13 +12,17 @@ from trihedron.api.asking import asked_in_python
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
 from trihedron.read import ReadError, read_recording
-from trihedron.records import Recording, Segments
+from trihedron.records import FindingCode, Recording, Segments, Severity
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
 """A recording, a result with one, or an input of :func:`read`: a file, arrays, a dictionary, a data frame."""
+COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
+"""Findings that already state the number of poses."""
+FEWEST_POSES = 3
+"""Fewest poses with which a fit is tried."""
 
 
 def read(
@@ -268,3 +272,21 @@ def accelerometer_only(recording: Recording, segments: Segments) -> tuple[Record
     """The recording and its segments without the gyroscope."""
     bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
     return replace(recording, gyroscope=None), bare
+
+
+def require_poses(recording: Recording, segments: Segments) -> None:
+    if recording.accelerometer is None:
+        raise InputError(
+            f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
+            "or name its columns with --columns."
+        )
+    if segments.n_poses < FEWEST_POSES:
+        of_log = [one for one in recording.findings if one.severity is Severity.SERIOUS]
+        grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
+        is_count = grave is not None and grave.code in COUNTS_OF_POSES
+        why = [] if is_count else [f"Poses found: {segments.n_poses}."]
+        why += [] if grave is None else [grave.seen, *([grave.action] if of_log else [])]
+        raise InputError(
+            f"{recording.source}: {' '.join(why)} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            "different poses; `trihedron segment LOG` shows what was seen."
+        )

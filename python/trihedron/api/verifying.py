@@ -14,7 +14,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, rms_of
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, with_bias_of_log
 from trihedron.estimate.verification import verify_calibration
@@ -128,9 +128,19 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
     found = []
     rms_m_s2, rms_deg = judged.norm_rms, judged.angle_rms_deg
     if limit_mg is not None and not mg_from_m_s2(rms_m_s2) <= limit_mg:
-        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "static", rms_m_s2=rms_m_s2, limit_mg=limit_mg))
+        is_below = mg_from_m_s2(rms_of(judged.norm_noise)) > limit_mg
+        found.append(
+            Finding.of(
+                FindingCode.LIMIT_EXCEEDED, "static", rms_m_s2=rms_m_s2, limit_mg=limit_mg, is_below_noise=is_below
+            )
+        )
     if limit_deg is not None and not rms_deg <= limit_deg:
-        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg))
+        is_below = rms_of(judged.angle_noise_deg) > limit_deg
+        found.append(
+            Finding.of(
+                FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg, is_below_noise=is_below
+            )
+        )
     return tuple(found)
 
 

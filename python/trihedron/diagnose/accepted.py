@@ -22,10 +22,11 @@ from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.records.words import words
+from trihedron.session.model import misfits
 
 HEADLINE = 0.5
-"""Share of the misfit that makes a headline: what explains less is listed after what explains more, and leaves the
-verdict open while something still disagrees."""
+"""Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
+after the effects that explain poses and moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,28 +68,35 @@ class Answer:
         ]
 
     @property
-    def explained(self) -> float:
-        """Share of the chi-square beyond noise that the accepted effects remove from poses and rotations."""
-        whole = excess(self.domains)
-        return 1.0 - min(excess(self.remaining) / whole, 1.0) if whole > 0.0 else 1.0
-
-    @property
     def shares(self) -> list[float]:
-        """Share of the misfit explained by each: its gain over the sum of all gains, of what they explain together."""
+        """Share of the misfit explained by each: its gain over the sum of all gains, of the relations beside them, and
+        the remaining ``excess``."""
         gains = self.gains
-        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None), TINY)
-        return [self.explained * max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
+        whole = sum(max(gain, 0.0) for _, gain, own in gains if own is None)
+        whole = max(whole + sum(one.score for one in self.found.related.relations) + excess(self.judged), TINY)
+        return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
 
     @property
     def says_why(self) -> bool:
-        """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and most is explained."""
-        return self.explained >= HEADLINE and not all(effect.is_spread or effect.is_local for effect, *_ in self.gains)
+        """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and an effect that is not minor: a
+        faint line, or one of the samples that changes nothing in the fit; and relations explain less than the
+        instrument's mechanisms do."""
+        of_instrument = sum(gain for effect, gain, _ in self.gains if not effect.is_of_motion)
+        if sum(one.score for one in self.found.related.relations) > of_instrument:
+            return False
+        beside = {one.effect.id for one in self.seen if not one.reobserves}
+        is_weak = [effect.is_spread or effect.is_local for effect, *_ in self.gains]
+        is_minor = [
+            share < HEADLINE and (own is not None or weak or effect.id in beside)
+            for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
+        ]
+        return not all(is_weak) and not all(is_minor)
 
 
-def excess(domains: Sequence[DomainTest]) -> float:
-    """Chi-square beyond the degrees of freedom, summed over the domains of poses and rotations that disagree."""
-    rows = (one for one in domains if one.disagrees and one.domain in ROW_DOMAINS.values())
-    return sum((max(one.chi2_per_dof, 1.0) - 1.0) * one.dof for one in rows)
+def excess(fitted: Fit) -> float:
+    """Chi-square beyond the degrees of freedom, summed over the domains where it is positive."""
+    chi2, dof = misfits(fitted.core)
+    return float(np.maximum(chi2 - dof, 0.0).sum())
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:

@@ -12,6 +12,7 @@ from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
+from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (
     differing_blocks,
     differing_noise,
@@ -28,7 +29,6 @@ from trihedron.report.diagnosis_words import (
     is_explained,
     judged_in_words,
     level_of,
-    next_step_in_words,
     own_serious,
     p_in_words,
     parameter_unit,

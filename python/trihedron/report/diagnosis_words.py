@@ -1,18 +1,12 @@
 """A diagnosis in words: the verdict, where it disagrees, and residuals in customary units."""
 
-from pathlib import PurePath
-from shlex import quote
-
 from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest, HeldOut, not_explained
-from trihedron.records.noise import least_length_s
 from trihedron.records.sessions import GEOMETRY
-from trihedron.report.calibration import errors_in_words
-from trihedron.report.diagnosis_numbers import differing_in_short, n_differing, of_another_device
-from trihedron.report.document import Headline, Level, action_in_words
-from trihedron.report.effects.catalogue import experiment
-from trihedron.report.names import MEANING, channel_in_print, id_in_print, ids_in_print, variable_in_print
+from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
+from trihedron.report.document import Headline, Level
+from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
     listed,
@@ -51,9 +45,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = _named(diagnosis, "recording")
+    missing = named_effects(diagnosis, "recording")
     if diagnosis.verdict == "consistent":
-        beside = " with a reference that is not independent of this gyro" if _dependent(diagnosis) else ""
+        beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
             f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
@@ -69,7 +63,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
-    surplus = _named(diagnosis, "model")
+    surplus = named_effects(diagnosis, "model")
     still = [f"{listed(left)} still {_disagree(left)}"] if left else []
     still += [
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
@@ -103,7 +97,7 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     return text + (f"; parameters differ too ({listed(numbers)})." if numbers else ".")
 
 
-def _named(diagnosis: Diagnosis, side: str = "") -> list[str]:
+def named_effects(diagnosis: Diagnosis, side: str = "") -> list[str]:
     """Effects of one ``side``, or of both, in words and each once."""
     return list(dict.fromkeys(id_in_print(one.id) for one in diagnosis.effects if side in ("", one.side)))
 
@@ -112,101 +106,15 @@ def _disagree(subjects: list[str]) -> str:
     return "disagree" if len(subjects) > 1 else "disagrees"
 
 
-def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
-    """The next action; ``improved`` is the scenario already written with the parameters that differ."""
-    use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
-    serious = own_serious(diagnosis)
-    if serious is not None and diagnosis.verdict != "not-testable":
-        return _dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
-    if diagnosis.verdict == "consistent":
-        keep = f"Keep using {model or 'the model'}: it agrees with this log."
-        return _dependent(diagnosis) or (keep if diagnosis.parameters else use)
-    if diagnosis.verdict == "not-testable":
-        record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
-        log = getattr(diagnosis, "recording", None)
-        is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
-        return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
-    if diagnosis.verdict == "unexplained":
-        experiments = [one.experiment for one in diagnosis.relations if one.experiment]
-        left = {one.domain for one in diagnosis.domains if one.disagrees}
-        clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
-        again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
-        again += "to the session."
-        return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
-    steps = []
-    if diagnosis.parameters:
-        differs = ["the parameters that differ"] if any(p.significant for p in diagnosis.parameters) else []
-        missing = ["the missing effects"] if _named(diagnosis, "recording") else []
-        said = listed([*differs, *missing] or ["the noise and sampling of this log"])
-        steps.append(
-            f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`."
-            if improved
-            else f"{of_another_device(diagnosis, model)}Take over {said}: {_taken_by(model)}."
-        )
-    steps += _separation(diagnosis, "Then separate" if steps else "Separate")
-    if steps:
-        return " ".join(steps) + _by_themselves(diagnosis)
-    of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
-    if len(of_session) == len(diagnosis.effects):
-        alone = "No effect goes with them: none is corrected in another log."
-        return f"{_in_the_next_log(diagnosis)}{use} {alone}{_by_themselves(diagnosis)}"
-    store = "Store the effects with the calibration: `trihedron calibrate LOG --extended -o calibration.json`"
-    beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
-    return f"{store}{beside}.{_by_themselves(diagnosis)}"
-
-
-def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
-    """The experiment that separates the first effect from those confounded with it; empty where there is none."""
-    rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
-    if rivals is None or not rivals.separating_experiment:
-        return []
-    return [
-        f"{begun} {id_in_print(rivals.id)} from {ids_in_print(rivals.confounded_with)}: {rivals.separating_experiment}."
-    ]
-
-
-def _in_the_next_log(diagnosis: Diagnosis) -> str:
-    """What to do about the first effect of this session alone."""
-    advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
-    return next((f"Against {id_in_print(name)}: {said}. " for name, said in advice if said), "")
-
-
-def _by_themselves(diagnosis: Diagnosis) -> str:
-    """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
-    if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
-        return ""
-    if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
-        return " S and b may be used without effects: errors of poses and rotations are within noise."
-    own = getattr(diagnosis, "calibration", None)
-    if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
-        return "" if own is None else " S and b without effects are not to be trusted."
-    errors = errors_in_words(own)
-    return f" S and b without effects may be used where these errors are acceptable: {errors}." if errors else ""
-
-
-def _taken_by(model: str) -> str:
-    """The option that rewrites the model, or advice for a simulated log, whose source is unknown."""
-    if model.endswith(".toml"):
-        return "`... --improved improved.toml` writes your scenario with them"
-    if model.endswith(".json"):
-        return "`... --updated updated.json` writes the calibration of this log"
-    # A simulated log has an ending; a ready-made scenario is a name.
-    where = "your simulation, or in " if PurePath(model).suffix or not model else ""
-    return (
-        f"set them in {where}a scenario of your own (`trihedron simulate --template sensor.toml`), by "
-        "`trihedron diagnose LOG --against sensor.toml --improved improved.toml`"
-    )
-
-
 def level_of(diagnosis: Diagnosis) -> Level:
     """The colour of the verdict: bad where the log's own calibration is not to be trusted; consistency is not good
     where the reference was computed from these readings."""
     if own_serious(diagnosis) is not None:
         return "bad"
-    return "usable" if diagnosis.verdict == "consistent" and _dependent(diagnosis) else LEVELS[diagnosis.verdict]
+    return "usable" if diagnosis.verdict == "consistent" and dependent(diagnosis) else LEVELS[diagnosis.verdict]
 
 
-def _dependent(diagnosis: Diagnosis) -> str:
+def dependent(diagnosis: Diagnosis) -> str:
     """The action for a reference that is not independent; empty where it is or there is none."""
     found = getattr(diagnosis, "findings", ())
     return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
@@ -235,7 +143,7 @@ def _not_compared(diagnosis: Diagnosis) -> str:
 
 def _footnotes(diagnosis: Diagnosis) -> str:
     """A remark on minor effects: a disturbed pose, a weak spectral line."""
-    named = _named(diagnosis)
+    named = named_effects(diagnosis)
     return f" (also found: {listed(named)})" if named else ""
 
 

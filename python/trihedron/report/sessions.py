@@ -41,6 +41,8 @@ def sessions_report(model: SessionsModel) -> Document:
     changed = [change for change in model.changes if change.significant]
     used = f"{how_many(n, 'recording')} of {n + len(model.left_out)}" if model.left_out else how_many(n, "recording")
     agree = f"{used} differ by no more than their uncertainty and the bias drift within a recording"
+    if model.by == "device":
+        agree = f"{used} in one model: its uncertainty is that of a device that was not calibrated itself"
     if model.thermal is not None:
         agree = f"{used} make one model from {_range(model.thermal)}"
     sections = [

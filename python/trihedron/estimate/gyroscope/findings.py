@@ -93,7 +93,8 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
                 FindingCode.LEFT_HANDED, "accelerometer-reversed", axis=right + 1, axes=others, signs=signs
             )
         case 0, 3:
-            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors")
+            is_stated = float(np.linalg.det(S_accelerometer)) < 0.0
+            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors", is_stated=is_stated)
         case 2, 0:
             yield Finding.of(FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved)
         case 2, 3:

@@ -1,12 +1,17 @@
 """Findings about filter noise."""
 
-from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 ENTRIES = {
     (Code.FILTER_NOISE_STATIC, "", WARNING): Words(
         "No reference: N and K are those of this log's static intervals, without what vibration and motion add.",
         "Static stretches and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
+    ),
+    (Code.FILTER_NOISE_STATIC, "doubted", SERIOUS): Words(
+        "The static noise of {name} is not to be trusted: {seen:clause}.",
+        "Its log has this fault, which concerns every value beside which this log is held.",
+        "See what it needs: `trihedron allan {name}`; then give the JSON of that with --static.",
     ),
     (Code.FILTER_NOISE_NO_STATIC, "", NOTE): Words(
         "The static noise of the {sensor} is not known, and separable from vibration only where vibration changes.",

@@ -58,10 +58,11 @@ _MOVES = {
     (Code.LEFT_HANDED, "both-sensors", WARNING): Words(
         "every gyro axis turns against the accelerometer's axis of the same name: the axes of both sensors are of the "
         "other handedness than stated.",
-        "one documented axis of the board is reversed, or two are exchanged, alike for both sensors; or all three gyro "
+        "{is_stated:?the signs of --axis-signs are those of a left-handed board, and this one is right-handed|one "
+        "documented axis of the board is reversed, or two are exchanged, alike for both sensors}; or all three gyro "
         "axes are reversed.",
-        "Check the axis directions of the board and state the accelerometer's with --axis-signs, for example "
-        "--axis-signs=-++; the calibration itself corrects the gyro's.",
+        "{is_stated:?Leave --axis-signs out, or check its signs|Check the axis directions of the board and state the "
+        "accelerometer's with --axis-signs, for example --axis-signs=-++}; the calibration itself corrects the gyro's.",
     ),
     (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
         "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
@@ -138,8 +139,8 @@ _MOVES = {
         "factors, would be wrong by as much; their standard error without that is {sigma_scale:.2g %}.",
         "An effect that S and b lack (a nonlinear gyro); a support that gives way after the moves; a link or a logger "
         "that drops samples and renumbers the others, or timestamps them anew.",
-        "See which: `trihedron diagnose LOG`. Where it names no effect, put the sensor on a firm support, log the count "
-        "of samples or the time that the sensor itself gives (not one of the logger), and record again.",
+        "See which: `trihedron diagnose LOG`. Where it names no effect, put the sensor on a firm support, log the "
+        "count of samples or the time that the sensor itself gives (not one of the logger), and record again.",
     ),
     (Code.CLIPPING, "moves", WARNING): Words(
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "

@@ -106,13 +106,17 @@ _COLUMNS = {
     ),
     (Code.COLUMNS_ASSUMED, "accelerometer", WARNING): Words(
         "The {n_columns} columns have no names and were taken as an accelerometer.",
-        "A log without a header.",
-        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
+        "A log without a header; where its poses all read the same, one of a gyroscope.",
+        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4; a gyro's log goes with --gyro, beside "
+        "--accel.",
+        or_severity=SERIOUS,
     ),
     (Code.COLUMNS_ASSUMED, "x-y-z", WARNING): Words(
         "Columns x y z do not say which sensor they are and were taken as an accelerometer.",
-        "A log without a header.",
-        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
+        "A log without a header; where its poses all read the same, one of a gyroscope.",
+        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4; a gyro's log goes with --gyro, beside "
+        "--accel.",
+        or_severity=SERIOUS,
     ),
     (Code.COLUMNS_ASSUMED, "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",

@@ -1,0 +1,106 @@
+"""The next action after a diagnosis: what to record, store or take over."""
+
+from pathlib import PurePath
+from shlex import quote
+
+from trihedron.records import Severity
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.noise import least_length_s
+from trihedron.report.calibration import errors_in_words
+from trihedron.report.diagnosis_numbers import of_another_device
+from trihedron.report.diagnosis_words import OF_SAMPLES, dependent, named_effects, own_serious
+from trihedron.report.document import action_in_words
+from trihedron.report.effects.catalogue import experiment
+from trihedron.report.names import id_in_print, ids_in_print
+from trihedron.report.numbers import listed
+
+STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
+"""The command that stores the effects of a log with its S and b."""
+
+
+def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
+    """The next action; ``improved`` is the scenario already written with the parameters that differ."""
+    use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
+    serious = own_serious(diagnosis)
+    if serious is not None and diagnosis.verdict != "not-testable":
+        return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
+    if diagnosis.verdict == "consistent":
+        keep = f"Keep using {model or 'the model'}: it agrees with this log."
+        return dependent(diagnosis) or (keep if diagnosis.parameters else use)
+    if diagnosis.verdict == "not-testable":
+        record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
+        log = getattr(diagnosis, "recording", None)
+        is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
+        return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
+    if diagnosis.verdict == "unexplained":
+        experiments = [one.experiment for one in diagnosis.relations if one.experiment]
+        left = {one.domain for one in diagnosis.domains if one.disagrees}
+        clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
+        again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
+        again += "to the session."
+        return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
+    differs = any(p.significant for p in diagnosis.parameters)
+    of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
+    is_file, is_carried = model.endswith(".json"), len(of_session) < len(diagnosis.effects)
+    steps = []
+    if diagnosis.parameters and improved:
+        steps.append(f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`.")
+    elif diagnosis.parameters and (differs or not is_file):
+        missing = bool(named_effects(diagnosis, "recording")) and (is_carried or not is_file)
+        news = [*(["the parameters that differ"] if differs else []), *(["the missing effects"] if missing else [])]
+        said = listed(news or ["the noise and sampling of this log"])
+        by = STORED if is_file and missing else _taken_by(model)
+        steps.append(f"{of_another_device(diagnosis, model)}Take over {said}: {by}.")
+    steps += _separation(diagnosis, "Then separate" if steps else "Separate")
+    if steps:
+        return " ".join(steps) + _by_themselves(diagnosis)
+    if not is_carried:
+        use = f"Keep using {model}: its parameters agree with this log." if is_file else use
+        alone = "No effect goes with them: none is corrected in another log."
+        return f"{_in_the_next_log(diagnosis)}{use} {alone}{_by_themselves(diagnosis)}"
+    store = f"Store the effects with the calibration: {STORED}"
+    beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
+    return f"{store}{beside}.{_by_themselves(diagnosis)}"
+
+
+def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
+    """The experiment that separates the first effect from those confounded with it; empty where there is none."""
+    rivals = next((effect for effect in diagnosis.effects if effect.confounded_with), None)
+    if rivals is None or not rivals.separating_experiment:
+        return []
+    return [
+        f"{begun} {id_in_print(rivals.id)} from {ids_in_print(rivals.confounded_with)}: {rivals.separating_experiment}."
+    ]
+
+
+def _in_the_next_log(diagnosis: Diagnosis) -> str:
+    """What to do about the first effect of this session alone."""
+    advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
+    return next((f"Against {id_in_print(name)}: {said}. " for name, said in advice if said), "")
+
+
+def _by_themselves(diagnosis: Diagnosis) -> str:
+    """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
+    if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
+        return ""
+    if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
+        return " S and b may be used without effects: errors of poses and rotations are within noise."
+    own = getattr(diagnosis, "calibration", None)
+    if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
+        return "" if own is None else " S and b without effects are not to be trusted."
+    errors = errors_in_words(own)
+    return f" S and b without effects may be used where these errors are acceptable: {errors}." if errors else ""
+
+
+def _taken_by(model: str) -> str:
+    """The option that rewrites the model, or advice for a simulated log, whose source is unknown."""
+    if model.endswith(".toml"):
+        return "`... --improved improved.toml` writes your scenario with them"
+    if model.endswith(".json"):
+        return "`... --updated updated.json` writes the calibration of this log"
+    # A simulated log has an ending; a ready-made scenario is a name.
+    where = "your simulation, or in " if PurePath(model).suffix or not model else ""
+    return (
+        f"set them in {where}a scenario of your own (`trihedron simulate --template sensor.toml`), by "
+        "`trihedron diagnose LOG --against sensor.toml --improved improved.toml`"
+    )
