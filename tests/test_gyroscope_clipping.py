@@ -141,7 +141,7 @@ def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):
             shape = np.concatenate([ramp, np.ones(n), 1.0 - ramp])
             shape *= sense * 180.0 * RATE_HZ / shape.sum()
             rates += [shape[:, None] * np.eye(3)[axis], np.zeros((round(POSE_S * RATE_HZ), 3))]
-            turns.append(Turn(at - 5, at + len(shape) + 5, tuple(np.eye(3)[axis]), sense * np.pi))
+            turns.append(Turn(at - 5, at + len(shape) + 5, axis + 1, sense * np.pi))
             at += len(shape) + len(rates[-1])
     rates = np.concatenate(rates)
     seen = rates @ mix.T + zero + noise_deg_s * rng.normal(size=rates.shape)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from trihedron.estimate.gyroscope import turn_system
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.records import FindingCode, Recording
@@ -22,8 +23,7 @@ def turns_and_zeros(recording, truth):
     segments = segments_from_truth(recording, truth)
     mean = segments.accelerometer_mean
     moves = [m for m in segments.moves if np.linalg.norm(mean[m.pose_after] - mean[m.pose_before]) < 0.5]
-    ups = [np.sign(np.round(mean[m.pose_before] / 9.8)) for m in moves]
-    turns = [Turn(m.start, m.stop, tuple(up)) for m, up in zip(moves, ups, strict=True)]
+    turns = [Turn(m.start, m.stop, int(np.round(mean[m.pose_before] / 9.8) @ (1, 2, 3))) for m in moves]
     return turns, [(pose.start, pose.stop) for pose in segments.poses]
 
 
@@ -41,7 +41,9 @@ def with_wrong_turn(recording, turn, axis, error_rad):
     return replace(recording, gyroscope=gyroscope)
 
 
-def test_error_bars_cover_the_truth_at_their_stated_rate():
+def test_error_bars_cover_the_truth_at_their_stated_rate(monkeypatch):
+    # The faces of this case are flat; what they might be out of flat by would make every score smaller.
+    monkeypatch.setattr(turn_system, "FLATNESS_RAD", 1e-9)
     scores = []
     for seed in range(16):
         recording, truth, turns, zeros = session(seed)
@@ -87,7 +89,7 @@ def test_one_wrong_turn_among_many_is_named_and_left_out(error_deg):
     wrong = with_wrong_turn(recording, turns[1], 2, error_deg * DEG)
     found, findings = calibrate_turns(wrong, turns, zeros)
     named = [int(f.numbers["turn"]) for f in findings if f.code is FindingCode.TURN_NOT_A_MULTIPLE]
-    assert named == [1]
+    assert named == [2]
     assert np.abs(z_scores(found, truth)).max() < 4.0
 
 
@@ -114,13 +116,13 @@ def test_a_given_angle_is_believed_and_a_contradiction_is_a_finding():
 def test_malformed_turns_are_refused():
     recording, _, turns, zeros = session()
     with pytest.raises(ValueError, match="two samples"):
-        Turn(5, 6, (1.0, 0.0, 0.0))
-    with pytest.raises(ValueError, match="unit vector"):
-        Turn(5, 60, (3.0, 0.0, 0.0))
+        Turn(5, 6, 1)
+    with pytest.raises(ValueError, match="face of a turn"):
+        Turn(5, 60, 0)
     for given, still, words in (
         ([], zeros, "needs turns"),
         (turns, [], "without rotation"),
-        ([Turn(0, 10**7, (1.0, 0.0, 0.0))], zeros, "inside the record"),
+        ([Turn(0, 10**7, 1)], zeros, "inside the record"),
         (turns[:12], zeros, "three directions"),
     ):
         with pytest.raises(ValueError, match=words):
@@ -141,7 +143,7 @@ def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.
             n = 300
             shape = 1.0 - np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
             rates += [shape[:, None] * up * angle * DEG * rate_hz / n, np.zeros((400, 3))]
-            turns.append(Turn(start - 1, start + n + 1, tuple(sign * np.eye(3)[axis]), angle * DEG, face=face))
+            turns.append(Turn(start - 1, start + n + 1, face, angle * DEG))
             zeros.append((start + n, start + n + 400))
     omega = np.concatenate(rates)
     raw = omega @ S_w.T - S_w @ np.array(BIAS) + 2e-3 * rng.normal(size=omega.shape)

@@ -35,7 +35,7 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
         for angle in (math.pi / 2, -math.pi / 2):
             n, still = int(2.0 * rate), int(20.0 * rate)
             zeros.append((clock, clock + still))
-            turns.append(Turn(clock + still, clock + still + n, tuple(np.eye(3)[axis]), angle))
+            turns.append(Turn(clock + still, clock + still + n, axis + 1, angle))
             block = np.zeros((still + n, 3))
             t = (np.arange(n) + 0.5) / n
             block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2

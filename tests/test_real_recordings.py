@@ -246,7 +246,7 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         rough = block[first:last, axis].sum() / 100.0
         zeros.append((start, start + 2000))
         angle = math.copysign(math.radians(angles[name]), rough)
-        turns.append(Turn(start + first, start + last, tuple(np.eye(3)[axis]), angle))
+        turns.append(Turn(start + first, start + last, axis + 1, angle))
         blocks.append(block)
         start += len(block)
     gyroscope = np.concatenate(blocks)

@@ -11,16 +11,23 @@ import numpy as np
 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
+from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gravity_circle import opposite_headings
-from trihedron.estimate.gyroscope import turn_axes
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.lost_samples import missing_samples, unless_seen
-from trihedron.estimate.gyroscope.turn_angles import SCALE_TOLERANCE, TurnAngleUnknownError
+from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
+from trihedron.estimate.gyroscope.turn_angles import (
+    SCALE_TOLERANCE,
+    TurnAngleUnknownError,
+    moves_on_faces,
+    resting_spans,
+    turns_on_faces,
+)
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
@@ -143,9 +150,7 @@ def calibrate(
             raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         try:
-            calibration = _by_poses(
-                recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal, turns_deg
-            )
+            calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal)
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
             grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
@@ -153,6 +158,8 @@ def calibrate(
     if calibration.accelerometer.method != "joint":
         calibration = with_bending(calibration, segments)
     calibration = in_frame(calibration, wanted)
+    if turns_deg is not None and method != "faces":
+        calibration = on_stated_turns(calibration, recording, segments, turns_deg)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     findings = (
@@ -220,7 +227,6 @@ def _by_poses(
     frame: Frame,
     axis_signs: Sequence[int] | None,
     nominal: float | None,
-    turns_deg: Sequence[float] | None,
 ) -> Calibration:
     assert segments.accelerometer_mean is not None
     assert segments.norm_sigma is not None
@@ -235,11 +241,6 @@ def _by_poses(
     alone = _alone(accelerometer, found, frame, gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    if turns_deg is not None:
-        turns = turn_axes.stated_turns(recording, segments, accelerometer, gravity, turns_deg)
-        shared = turn_axes.shared_errors(turns, accelerometer, gravity)
-        static = turn_axes.resting_spans(segments)
-        return _together(alone, *calibrate_turns(recording, turns, static, shared_errors=shared))
     try:
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
@@ -269,7 +270,7 @@ def _by_faces(
     up = faces_up(mean, unit, faces)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
     stated = () if turns_deg is None else turns_deg
-    opposite = opposite_headings(recording, segments, turn_axes.moves_on_faces(segments, up), stated)
+    opposite = opposite_headings(recording, segments, moves_on_faces(segments, up), stated)
     try:
         accelerometer, found = calibrate_faces(
             mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
@@ -282,8 +283,8 @@ def _by_faces(
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    turns = turn_axes.turns_on_faces(recording, segments, up, turns_deg)
-    scale: float | np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None = nominal
+    turns = turns_on_faces(recording, segments, up, turns_deg)
+    scale: FloatArray | float | None = nominal
     tolerance = SCALE_TOLERANCE
     if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
         by_gravity = scale_by_gravity(recording, segments, accelerometer, gravity)
@@ -291,7 +292,7 @@ def _by_faces(
             scale, tolerance = by_gravity
     try:
         gyroscope, more = calibrate_turns(
-            recording, turns, turn_axes.resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
+            recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
         )
     except INPUT_ERRORS as error:
         if turns_deg is not None:

@@ -159,6 +159,28 @@ def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArra
     )
 
 
+LOOSE_TURN_RAD = np.radians(1.0)
+"""Scatter of turns above which it is reported: a square case against a wall repeats to some tenths of a degree."""
+
+
+def loose_turns(sigma_turn_rad: float) -> Iterator[Finding]:
+    """Finding on turns that scatter about their known angles."""
+    if sigma_turn_rad > LOOSE_TURN_RAD:
+        yield Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma_turn_rad)
+
+
+def wrong_turn(index: int, angle_rad: float, axis: int, deviation_rad: float, *, is_excluded: bool) -> Finding:
+    """Finding on a turn that others contradict; where they do not show which of them is wrong, none is excluded."""
+    return Finding.of(
+        FindingCode.TURN_NOT_A_MULTIPLE,
+        "left-out" if is_excluded else "contradicted",
+        turn=index + 1,
+        angle_rad=angle_rad,
+        axis=axis + 1,
+        deviation_rad=abs(deviation_rad),
+    )
+
+
 def audit_moves(measured: MoveMeasurements) -> Iterator[Finding]:
     """Findings on clipped moves and on gaps inside moves."""
     if np.any(measured.clipped_s > 0.0):

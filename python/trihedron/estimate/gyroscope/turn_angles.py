@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron._core import block_differences, integrate_raw_rate
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.session.start import scale_matrix
 from trihedron.records.recording import Recording
+from trihedron.records.segments import Move, Segments
 from trihedron.units import rate_to_si
 
 QUARTER = math.pi / 2.0
@@ -31,32 +32,33 @@ SLACK_RAD = math.radians(10.0)
 
 @dataclass(frozen=True)
 class Turn:
-    """Samples ``[start, stop)`` of a turn about the unit vector ``direction`` in the body frame.
+    """Samples ``[start, stop)`` of a turn about the axis of the case that points up, ``face`` (±1, ±2, ±3).
 
-    ``angle_rad`` is its signed angle where known, ``sigma_direction_rad`` the standard error of each of the direction's
-    two components. ``face`` (±1, ±2, ±3) is the axis of the case that points up, 0 where unknown: a face that is not
-    flat tilts all turns on it equally.
+    ``angle_rad`` is its signed angle where known.
     """
 
     start: int
     stop: int
-    direction: tuple[float, float, float]
+    face: int
     angle_rad: float | None = None
-    sigma_direction_rad: float = 0.0
-    face: int = 0
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
             raise InputError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
         if self.angle_rad is not None and not math.isfinite(self.angle_rad):
             raise InputError("the angle of a turn must be finite")
-        if not 0.99 < math.hypot(*self.direction) < 1.01:
-            raise InputError("the direction of a turn must be a unit vector")
+        if self.face not in (1, 2, 3, -1, -2, -3):
+            raise InputError(f"the face of a turn must be 1, 2, 3, -1, -2 or -3, not {self.face}")
 
     @property
     def axis(self) -> int:
-        """Nearest axis of the case: 0, 1 or 2."""
-        return int(np.argmax(np.abs(self.direction)))
+        """Axis of the case: 0, 1 or 2."""
+        return abs(self.face) - 1
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector (3,) along the turn, in the body frame."""
+        return np.asarray(math.copysign(1.0, self.face) * np.eye(3)[self.axis])
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,9 @@ class MeasuredTurns:
         return self.raw_angle - np.outer(self.duration_s, self.bias)
 
 
-def measure_turns(recording: Recording, turns: Sequence[Turn], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
+def measure_turns(
+    recording: Recording, turns: Sequence[Turn] | Sequence[Move], static: Sequence[tuple[int, int]]
+) -> MeasuredTurns:
     """Integrate turns and static intervals; the noise is measured in the static intervals.
 
     Raises ``InputError`` when there is no gyro, no turn, or no static interval, or these are too short to measure the
@@ -153,10 +157,17 @@ def nominal_matrix(
     Raises ``InputError`` with the question to the user, when readings are counts and neither angles nor a scale are
     known.
     """
-    stated = scale_of_stated(measured, turns)
+    is_stated = np.array([bool(turn.angle_rad) for turn in turns])
+    angles = np.array([(turn.angle_rad or 0.0) * turn.direction for turn in turns])[is_stated]
+    raw = measured.turned()[is_stated]
+    stated = scale_of_stated(raw, angles)
     if stated is not None:
         return stated
-    _require_one_sense(measured, turns)
+    # Readings of turns about one axis have one sign relative to the turns.
+    first = [int(np.flatnonzero(np.any(angles * one != 0.0, axis=1))[0]) for one in angles]
+    is_reversed = np.sum(angles * angles[first], axis=1) * np.sum(raw * raw[first], axis=1) < 0.0
+    if np.any(is_reversed):
+        raise other_sense(is_reversed, np.array([turn.angle_rad for turn in turns if turn.angle_rad]))
     if nominal_scale is not None:
         return scale_matrix(nominal_scale)
     unit = rate_to_si(recording.gyroscope_unit)
@@ -165,42 +176,27 @@ def nominal_matrix(
     raise TurnAngleUnknownError
 
 
-def _require_one_sense(measured: MeasuredTurns, turns: Sequence[Turn]) -> None:
-    """Raise ``InputError`` where readings of stated turns about one axis have other signs than the turns."""
-    raw, wrong = measured.turned(), []
-    first: dict[int, int] = {}
-    for k, turn in enumerate(turns):
-        if turn.angle_rad:
-            known = first.setdefault(turn.axis, k)
-            before = turns[known]
-            stated = turn.angle_rad * (before.angle_rad or 0.0) * float(np.dot(turn.direction, before.direction))
-            if stated * float(raw[k] @ raw[known]) < 0.0:
-                wrong.append(k)
-    if wrong:
-        angles = [-(t.angle_rad or 0.0) if k in wrong else t.angle_rad or 0.0 for k, t in enumerate(turns)]
-        said = ",".join(f"{math.degrees(angle):g}" for angle in angles)
-        numbers = ", ".join(str(k + 1) for k in wrong)
-        raise InputError(
-            f"the gyro turned the other way in turn {numbers} than the stated angles say: as it read them they are "
-            f"--turns {said}"
-        )
+def other_sense(is_reversed: BoolArray, angles: FloatArray) -> InputError:
+    """The error for turns by stated ``angles`` (k,) [rad] some of which the gyro shows to be ``is_reversed`` (k,)."""
+    said = ",".join(f"{math.degrees(angle):g}" for angle in np.where(is_reversed, -angles, angles))
+    numbers = ", ".join(str(k + 1) for k in np.flatnonzero(is_reversed))
+    return InputError(
+        f"the gyro turned the other way in turn {numbers} than the stated angles say: as it read them they are "
+        f"--turns {said}"
+    )
 
 
-def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:
-    """Scale (3, 3), rad/s per raw unit, by a robust fit to stated turns; ``None`` where they do not span three axes.
+def scale_of_stated(raw: FloatArray, angles: FloatArray) -> FloatArray | None:
+    """Scale (3, 3), rad/s per raw unit, by a robust fit to raw angles (k, 3) of turns by ``angles`` (k, 3) [rad];
+    ``None`` where they do not span three axes.
 
     Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
     """
-    is_stated = np.array([bool(turn.angle_rad) for turn in turns])
-    directions = np.array([turn.direction for turn in turns])[is_stated]
-    if not spans_three_axes(directions):
+    size: FloatArray = np.linalg.norm(angles, axis=1)
+    if not spans_three_axes(angles / size[:, None]):
         return None
-    angles = directions * np.array([turn.angle_rad for turn in turns if turn.angle_rad])[:, None]
-    raw = measured.turned()[is_stated]
     # Initial weights are equal in relative error; later ones are the inverse of the relative misfit.
-    size = np.linalg.norm(angles, axis=1)
     weight: FloatArray = 1.0 / size
-    solution = np.zeros((3, 3))
     for _ in range(30):
         solution, *_ = np.linalg.lstsq(angles * weight[:, None], raw * weight[:, None], rcond=None)
         miss = np.linalg.norm(raw - angles @ solution, axis=1) / size
@@ -228,7 +224,7 @@ def identify_turns(
     known: dict[int, KnownTurn] = {}
     for index in np.argsort(np.linalg.norm(seen, axis=1), kind="stable").tolist():
         turn, vector, of_axis = turns[index], seen[index], sums[turns[index].axis]
-        unit = np.array(turn.direction)
+        unit = turn.direction
         is_first = of_axis[1] == 0.0
         along = float(vector @ unit) if is_first else float(vector @ unit) / (of_axis[0] / of_axis[1])
         known[index] = one = _identified(turn, vector, along, tolerance if is_first else 0.1 * tolerance)
@@ -239,7 +235,7 @@ def identify_turns(
 
 def _identified(turn: Turn, seen: FloatArray, along: float, tolerance: float) -> KnownTurn:
     """A turn seen as (3,) with the nominal scale, by ``along`` [rad] with the one refined to ``tolerance``."""
-    unit = np.array(turn.direction)
+    unit = turn.direction
     off_axis = math.atan2(float(np.linalg.norm(np.cross(seen, unit))), abs(float(seen @ unit)))
     if turn.angle_rad is None:
         angle, unsure = QUARTER * round(along / QUARTER), abs(along) * tolerance
@@ -251,3 +247,41 @@ def _identified(turn: Turn, seen: FloatArray, along: float, tolerance: float) ->
         limit = max(SLACK_RAD, 0.3 * abs(angle))
     is_used = angle != 0.0 and abs(along - angle) < limit and off_axis < 2.0 * SLACK_RAD
     return KnownTurn(turn, float(angle), is_used, along, off_axis, is_ambiguous)
+
+
+# Turns on a table, among the moves of a log.
+
+
+def moves_on_faces(segments: Segments, up: IntArray) -> list[Move]:
+    """Moves that begin and end on one face of the case, ``up`` (n,) in every pose (0: none)."""
+    moves = (move for move in segments.moves if move.stop - move.start >= 2)
+    return [one for one in moves if up[one.pose_before] == up[one.pose_after] != 0]
+
+
+def turns_on_faces(
+    recording: Recording, segments: Segments, up: IntArray, angles_deg: Sequence[float] | None
+) -> list[Turn]:
+    """Turns about the axis of the case that points up; multiples of 90° where the user states no angles."""
+    moves = moves_on_faces(segments, up)
+    known = [(move, None) for move in moves] if angles_deg is None else stated(recording, moves, angles_deg)
+    return [Turn(move.start, move.stop, int(up[move.pose_before]), angle) for move, angle in known]
+
+
+def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]) -> list[tuple[Move, float]]:
+    """Moves with their stated angles [rad], without those of 0.
+
+    Raises ``InputError`` when the numbers of turns and angles differ; the message states when each turn was found.
+    """
+    if len(angles_deg) != len(moves):
+        times = ", ".join(f"{recording.time_s[move.start]:.0f}" for move in moves[:12])
+        where = f" (at {times}{' ...' if len(moves) > 12 else ''} s)" if moves else ""
+        raise InputError(
+            f"{len(angles_deg)} turns were stated and {len(moves)} were found between poses of the same tilt{where}: "
+            "give one angle in degrees for each, 0 to leave it out."
+        )
+    return [(move, math.radians(angle)) for move, angle in zip(moves, angles_deg, strict=True) if angle != 0.0]
+
+
+def resting_spans(segments: Segments) -> list[tuple[int, int]]:
+    """Half-open ranges of the static poses: turns by 0°, which determine the bias."""
+    return [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]

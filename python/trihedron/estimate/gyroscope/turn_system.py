@@ -9,12 +9,14 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+from trihedron.estimate.gyroscope.turntable import Predicted
 from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
-from trihedron.probability import MEDIAN_CHI2, chdtrc
 
 FALSE_ALARM = 1e-3
 """False alarm rate of each kind of statistical finding on turns."""
 LARGEST_SIGMA_TURN = math.radians(20.0)
+UNKNOWN = 0.3
+"""Relative standard error of a scale that only the turns determine: a wrong turn is off by as much at most."""
 FLATNESS_RAD, FLATNESS_SPREAD = math.radians(0.05), 0.9
 """Prior of a face's deviation from its nominal plane, one component: 0.04 mm over 50 mm, within a factor of 2.5 either
 way (turned and moulded cases: 0.02 to 0.1°); the second is σ of the logarithm."""
@@ -25,18 +27,14 @@ class TurnSystem:
     """Turns by known ``angles`` (k, 3) [rad], and the bias as a last row, in rad by the scale ``to_rad`` (3, 3).
 
     ``sigma_turn`` [rad] is the standard error along a turn, ``sigma_tilt`` that across it (tilt of table, case).
-    ``sigma_directions`` (k,) [rad] is the standard error of each turn's measured axis, per component across it.
-    ``faces`` (k,) is the face (±1, ±2, ±3; 0 unknown) of each turn, ``sigma_face`` [rad] the standard deviation of the
-    tilt of a face, one component, which all turns on that face share in either sense. ``shared`` (k, 3, m) [rad] are
-    other errors that turns share, one standard deviation each.
+    ``faces`` (k,) is the face (±1, ±2, ±3) of each turn, ``sigma_face`` [rad] the standard deviation of the tilt of a
+    face, one component, which all turns on that face share in either sense.
     """
 
     measured: MeasuredTurns
     angles: FloatArray
     to_rad: FloatArray
-    sigma_directions: FloatArray
     faces: IntArray
-    shared: FloatArray
     sigma_turn: float = 0.0
     sigma_tilt: float = 0.0
     sigma_face: float = 0.0
@@ -55,9 +53,8 @@ class TurnSystem:
         variance += np.sum(self._apart() ** 2, axis=2)
         noise = self.to_rad @ (variance[:, :, None] * np.eye(3)) @ self.to_rad.T
         along = self.axes[:, :, None] * self.axes[:, None, :]
-        across2 = self.sigma_tilt**2 + (self.sigma_directions * np.linalg.norm(self.angles, axis=1)) ** 2
-        noise[:-1] += self.sigma_turn**2 * along + across2[:, None, None] * (np.eye(3) - along)
-        of_turns = np.concatenate([self.shared, self._by_faces()], axis=2)
+        noise[:-1] += self.sigma_turn**2 * along + self.sigma_tilt**2 * (np.eye(3) - along)
+        of_turns = self._by_faces()
         return KnownVectors(
             raw=np.concatenate([measured.raw_angle, [measured.bias]]) @ self.to_rad.T,
             vectors=np.concatenate([self.angles, np.zeros((1, 3))]),
@@ -69,7 +66,7 @@ class TurnSystem:
     def _by_faces(self) -> FloatArray:
         """(k, 3, m) changes of the turns by a standard deviation of each tilt of a face."""
         tilts = [np.zeros((len(self.angles), 3, 0))]
-        for face in sorted(set(self.faces[self.faces != 0].tolist())) if self.sigma_face > 0.0 else []:
+        for face in sorted(set(self.faces.tolist())) if self.sigma_face > 0.0 else []:
             across = np.delete(np.eye(3), abs(face) - 1, axis=1)
             size = np.where(self.faces == face, self.angles[:, abs(face) - 1], 0.0)
             tilts.append(self.sigma_face * size[:, None, None] * across)
@@ -89,27 +86,19 @@ class TurnSystem:
         """The system in rad by the scale of its own fit."""
         return replace(self, to_rad=np.asarray(np.linalg.solve(self.solve(used).S_a, self.to_rad), dtype=np.float64))
 
-    def loosely(self, used: BoolArray) -> TurnSystem:
-        """The system with the scatter of turn angles from the median squared prediction error, robust to wrong ones."""
-        system = self
-        for _ in range(3):
-            error2 = system.along(system.left_out(used)[0])[used] ** 2
-            if not np.any(np.isfinite(error2)):
-                return system
-            system = system._beyond_noise(float(np.nanmedian(error2)) / MEDIAN_CHI2[1])
-        return system
+    def along(self, used: BoolArray) -> Predicted:
+        """Components (n,) of the ``used`` turns along their axes, each axis with a scale that is not known before."""
+        axes, size, noise = self.axes[used], np.abs(self.angles[used]), self.rows().noise
+        missed = self.measured.turned() @ self.to_rad.T - self.angles @ self.solve(used).S_a.T
+        lasts = axes * self.measured.duration_s[used, None]
+        own = np.diag(np.einsum("ki,kij,kj->k", axes, noise[:-1][used], axes))
+        innovation = own + lasts @ noise[-1] @ lasts.T + UNKNOWN**2 * size @ size.T
+        return Predicted(np.einsum("ki,ki->k", missed[used], axes), innovation, n_free=3)
 
     def scattered(self, used: BoolArray) -> TurnSystem:
-        """The system with the scatter of turn angles by moments, where noise and tilts do not explain the residuals."""
-        system = replace(self, sigma_turn=0.0, sigma_tilt=0.0).tilted(used)
-        fit = system.solve(used)
-        if fit.dof < 1 or chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
-            return system
-        for _ in range(3):
-            error = system.along(system.residual(system.solve(used)))[used]
-            # One parameter per axis is fitted along the turns.
-            system = system._beyond_noise(float(error @ error) / max(len(error) - 3, 1)).tilted(used)
-        return system
+        """The system with the scatter that turn angles show, and the tilts beside it."""
+        scatter = self.along(used).shown_scatter(np.ones(np.count_nonzero(used)))
+        return replace(self, sigma_turn=min(scatter, LARGEST_SIGMA_TURN)).tilted(used) if scatter > 0.0 else self
 
     def correlation(self, fit: KnownFit, used: BoolArray) -> FloatArray:
         """(12, 12) to add to a fit's covariance for errors by rounding that turns share; their weights are independent.
@@ -130,17 +119,9 @@ class TurnSystem:
         residual, covariance, distance2 = self.solve(used).left_out()
         return _spread(residual[:-1], used), _spread(covariance[:-1], used), _spread(distance2[:-1], used)
 
-    def along(self, residual: FloatArray) -> FloatArray:
-        """Components (k,) of residuals (k, 3) along the turns."""
-        return np.asarray(np.einsum("ki,ki->k", residual, self.axes))
-
-    def _beyond_noise(self, mean_square: float) -> TurnSystem:
-        beyond2 = max(mean_square - self._noise2(), 0.0)
-        return replace(self, sigma_turn=min(math.sqrt(beyond2), LARGEST_SIGMA_TURN))
-
     def _noise2(self) -> float:
         """Median variance of a component of a turn by noise, rad²."""
-        quiet = replace(self, sigma_directions=np.zeros(len(self.angles)), sigma_turn=0.0, sigma_tilt=0.0).rows()
+        quiet = replace(self, sigma_turn=0.0, sigma_tilt=0.0).rows()
         return float(np.median(np.einsum("kii->k", quiet.noise[:-1]))) / 3.0
 
     def tilted(self, used: BoolArray) -> TurnSystem:
@@ -148,22 +129,20 @@ class TurnSystem:
         mean variances of both by restricted likelihood on a grid.
 
         Turns on one face share its tilt, which their scatter does not show; opposite faces differ by it. With one face
-        alone the prior is kept. Where faces are unknown, every turn has its own tilt.
+        alone the prior is kept.
         """
         noise2 = self._noise2()
-        log_faces, log_owns, flatness = np.zeros(1), np.linspace(-2.0, 7.0, 7), 0.0
-        if np.all(self.faces[used] != 0):
-            log_faces, flatness = np.linspace(-3.0, 3.0, 9) * FLATNESS_SPREAD, FLATNESS_RAD
+        log_faces, log_owns = np.linspace(-3.0, 3.0, 9) * FLATNESS_SPREAD, np.linspace(-2.0, 7.0, 7)
         log_weights = np.empty((len(log_faces), len(log_owns)))
         for i, log_face in enumerate(log_faces):
             for j, log_own in enumerate(log_owns):
                 own = math.sqrt(noise2) * math.exp(log_own)
-                tried = replace(self, sigma_face=flatness * math.exp(log_face), sigma_tilt=own)
+                tried = replace(self, sigma_face=FLATNESS_RAD * math.exp(log_face), sigma_tilt=own)
                 prior = -0.5 * (log_face / FLATNESS_SPREAD) ** 2 + log_own - math.log1p(math.exp(2.0 * log_own))
                 log_weights[i, j] = prior + tried.solve(used).log_likelihood
         weights = np.exp(log_weights - log_weights.max())
         weights /= weights.sum()
-        face2 = float(weights.sum(axis=1) @ np.exp(2.0 * log_faces)) * flatness**2
+        face2 = float(weights.sum(axis=1) @ np.exp(2.0 * log_faces)) * FLATNESS_RAD**2
         own2 = float(weights.sum(axis=0) @ np.exp(2.0 * log_owns)) * noise2
         return replace(self, sigma_face=math.sqrt(face2), sigma_tilt=math.sqrt(own2))
 

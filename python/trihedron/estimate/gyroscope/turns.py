@@ -8,7 +8,8 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.gyroscope.findings import drift_findings
+from trihedron.estimate.gyroscope.findings import drift_findings, loose_turns, wrong_turn
+from trihedron.estimate.gyroscope.stated_turns import contradicted
 from trihedron.estimate.gyroscope.turn_angles import (
     QUARTER,
     SCALE_TOLERANCE,
@@ -22,7 +23,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
 )
 from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, TurnSystem
 from trihedron.estimate.known_vectors import KnownFit
-from trihedron.probability import chdtrc, chdtri
+from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
@@ -38,16 +39,14 @@ def calibrate_turns(
     *,
     nominal_scale: FloatArray | float | None = None,
     nominal_tolerance: float = SCALE_TOLERANCE,
-    shared_errors: FloatArray | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from turns about known axes: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` (equation 5.12).
 
     Angles of ``turns`` (whole turns too) are found from the data where they are not stated; ``static`` are intervals
     without rotation. ``nominal_scale`` (3, 3) or a number [rad/s per raw unit], with its relative tolerance, identifies
     multiples of 90°; it follows from the unit unless readings are counts. Stated angles need none; their scale has
-    precedence where they span three axes. ``shared_errors`` (k, 3, m) is the change of the turns [rad] by one standard
-    error of each of m independent errors that all turns share. White rate noise ``N`` [unit/√Hz] gives
-    ``var δφ = N² Δt``. The result is the direct form ``ω = S raw + b`` in the frame of the turns' axes.
+    precedence where they span three axes. White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``. The result is the
+    direct form ``ω = S raw + b`` in the frame of the turns' axes.
 
     Raises ``InputError`` when usable turns do not span three axes or there is no static interval; or, with the
     question to the user, when readings are counts and neither the angles nor a nominal scale are given.
@@ -59,11 +58,9 @@ def calibrate_turns(
     _require_every_axis(known, used, rate_to_si(recording.gyroscope_unit) is None)
     system = TurnSystem(
         measured,
-        angles=np.array([one.angle_rad * np.array(one.turn.direction) for one in known]),
+        angles=np.array([one.angle_rad * one.turn.direction for one in known]),
         to_rad=nominal,
-        sigma_directions=np.array([turn.sigma_direction_rad for turn in turns]),
         faces=np.array([turn.face for turn in turns], dtype=np.int64),
-        shared=np.zeros((len(turns), 3, 0)) if shared_errors is None else shared_errors,
     )
     screened = screen(system, used)
     system, used = screened.system, screened.used
@@ -159,34 +156,16 @@ class Screened:
 
 
 def screen(system: TurnSystem, used: BoolArray) -> Screened:
-    """Find turns that the others contradict, and the standard error of a turn.
+    """The system without turns that the others show to be wrong, with the tilts and the scatter of the remaining ones.
 
-    Each turn is predicted by all others. The scatter of a turn is first estimated from the median of the prediction
-    errors, which is robust to one wrong turn; a turn far beyond it is a suspect. It is removed when two others about
-    its axis remain. The scatter is then that of the remaining turns, 0 where the rate noise explains it.
+    Where they do not show which of some turns are wrong, their difference is part of the scatter.
     """
     axes = np.argmax(np.abs(system.angles), axis=1)
     unchecked = tuple(axis for axis in range(3) if np.count_nonzero(used & (axes == axis)) < 2)
-    suspects: list[int] = []
-    removed: list[int] = []
-    system = system.refined(used).tilted(used)
-    while True:
-        distance2 = np.nan_to_num(system.loosely(used).left_out(used)[2])
-        limit = float(chdtri(3, FALSE_ALARM / max(int(np.count_nonzero(distance2)), 1)))
-        worst = int(np.argmax(distance2))
-        if distance2[worst] <= limit:
-            break
-        if np.count_nonzero(used & (axes == axes[worst])) < 3:
-            suspects += np.flatnonzero((axes == axes[worst]) & (distance2 > limit)).tolist()
-            break
-        suspects.append(worst)
-        removed.append(worst)
-        used = used & (np.arange(len(used)) != worst)
-    return Screened(system.scattered(used), used, tuple(suspects), tuple(removed), unchecked)
-
-
-LOOSE_TURN_RAD = math.radians(1.0)
-"""Scatter of turns above which it is reported: a square case against a wall repeats to some tenths of a degree."""
+    system, at = system.refined(used).tilted(used), np.flatnonzero(used)
+    removed, either = (at[one].tolist() for one in contradicted(system.along(used), np.ones(len(at))))
+    used = used & ~np.isin(np.arange(len(used)), removed)
+    return Screened(system.tilted(used).scattered(used), used, (*removed, *either), tuple(removed), unchecked)
 
 
 def turn_findings(
@@ -195,18 +174,9 @@ def turn_findings(
     """Findings: turns that are no multiple of 90°, contradicting turns, axes with a single turn, handedness, drift."""
     yield from (_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn))
     for index in screened.suspects:
-        one = known[index]
-        yield Finding.of(
-            FindingCode.TURN_NOT_A_MULTIPLE,
-            "left-out" if index in screened.removed else "contradicted",
-            turn=int(index),
-            angle_rad=one.angle_rad,
-            axis=one.turn.axis + 1,
-            deviation_rad=np.linalg.norm(deviation[index]),
-        )
-    sigma = screened.system.sigma_turn
-    if sigma > LOOSE_TURN_RAD:
-        yield Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma)
+        one, error = known[index], float(np.linalg.norm(deviation[index]))
+        yield wrong_turn(index, one.angle_rad, one.turn.axis, error, is_excluded=index in screened.removed)
+    yield from loose_turns(screened.system.sigma_turn)
     if screened.unchecked_axes:
         yield Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes])
     if np.linalg.det(S) < 0.0:

@@ -1,15 +1,18 @@
-"""A rate table at known speeds, the unit on it in any orientation: ``|S w' + b| = W`` while the speed W is constant.
+"""Rates of known size in a session: ``|S w̄ + b| = W``, w̄ the mean reading of a rotation about any axis.
 
-It is the norm fit of an accelerometer's poses with another constant (docs/model-gyroscope.md). The speeds are added as
-rows to the fit of poses and moves of the same log, so that the frame stays that of the accelerometer.
+It is the norm fit of an accelerometer's poses with another constant (docs/model-gyroscope.md). The rows update the
+posterior of poses and moves of the same log, so that the frame stays that of the accelerometer. Here W is the speed of
+a rate table; `stated_turns.py` has turns by known angles.
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
@@ -24,11 +27,141 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import norms
 from trihedron.session.rounding import undithered_axes
 
+ITERATIONS = 20
+FALSE_ALARM = 1e-3
+"""Probability that accurate rates are found to scatter."""
+NOISE_DOF = 100.0
+"""Degrees of freedom of the noise that χ² is relative to."""
+
+
+@dataclass(frozen=True, eq=False)
+class StatedRates:
+    """Mean readings (k, 3) with their covariances (k, 3, 3) at ``speeds`` (k,) [rad/s] with a common relative error.
+
+    ``shared`` (k, 3, m) are m further errors of the mean readings, one standard deviation each; ``unit`` (k,) is the
+    change of each speed [rad/s] by a scatter of one.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    shared: FloatArray
+    speeds: FloatArray
+    unit: FloatArray
+    relative_sigma: float = 0.0
+
+    def of(self, used: BoolArray) -> StatedRates:
+        """The rates ``used`` (k,)."""
+        rows = (self.mean[used], self.covariance[used], self.shared[used], self.speeds[used], self.unit[used])
+        return StatedRates(*rows, self.relative_sigma)
+
+    def predicted(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Speeds (k,) [rad/s], and their derivatives (k, 24) by the parameters of both sensors."""
+        speed, slope = norms(self.mean, values[12:21].reshape(3, 3), values[21:])
+        return speed, np.pad(slope, ((0, 0), (12, 0)))
+
+    def on(self, calibration: Calibration, scatter: float = 0.0) -> Updated:
+        """The calibration updated with these rates of so much ``scatter``, relinearised until it converges."""
+        start, prior = parameters_of(calibration), calibration.covariance
+        by_reading = self.predicted(start)[1][:, 21:] @ start[12:21].reshape(3, 3)
+        own = np.einsum("ki,kij,kj->k", by_reading, self.covariance, by_reading)
+        together = np.einsum("ki,kim->km", by_reading, self.shared)
+        noise = np.diag(own + (scatter * self.unit) ** 2) + together @ together.T
+        noise += np.outer(self.speeds, self.speeds) * self.relative_sigma**2
+        values = start
+        for _ in range(ITERATIONS):
+            speed, slope = self.predicted(values)
+            innovation = slope @ prior @ slope.T + noise
+            gain = prior @ slope.T @ np.linalg.inv(innovation)
+            misfit = self.speeds - speed + slope @ (values - start)
+            last, values = values, start + gain @ misfit
+            if np.max(np.abs(values - last)[12:]) <= 1e-12 * np.max(np.abs(start[12:])):
+                break
+        posterior = prior - gain @ slope @ prior
+        covariance = 0.5 * (posterior + posterior.T)
+        return Updated(misfit, innovation, values=values, covariance=covariance, scatter=scatter)
+
+    def scattered_on(self, calibration: Calibration) -> Updated:
+        """The calibration updated with these rates, and with the scatter that they show."""
+        found = self.on(calibration)
+        scatter = found.shown_scatter(self.unit)
+        return self.on(calibration, scatter) if scatter > 0.0 else found
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """``misfit`` (k,) of rows as predicted by what was known before them, with its covariance ``innovation`` (k, k).
+
+    That leaves ``n_free`` directions of the rows undetermined.
+    """
+
+    misfit: FloatArray
+    innovation: FloatArray
+    n_free: int = 0
+
+    def left_out(self, used: IntArray, further: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Error (n,) of each row ``used`` (n,) as the others predict it, and its variance (n,); ``further`` (k,) are
+        standard errors of all rows beside the known ones."""
+        inverse = np.linalg.inv((self.innovation + np.diag(further**2))[np.ix_(used, used)])
+        variance = 1.0 / np.diag(inverse)
+        return inverse @ self.misfit[used] * variance, variance
+
+    def shown_scatter(self, unit: FloatArray) -> float:
+        """Scatter of rows that deviate by more than all known errors, else 0: with it χ² is its degrees of freedom.
+        ``unit`` (k,) is the change of each row by a scatter of one."""
+        dof = len(self.misfit) - self.n_free
+
+        def chi2(scatter: float) -> float:
+            covariance = self.innovation + np.diag((scatter * unit) ** 2)
+            return float(self.misfit @ np.linalg.solve(covariance, self.misfit))
+
+        if dof < 1 or fdtrc(float(dof), NOISE_DOF, chi2(0.0) / dof) >= FALSE_ALARM:
+            return 0.0
+        from scipy.optimize import brentq
+
+        most = float(np.sqrt(np.sum((self.misfit / unit) ** 2) / dof))
+        return float(brentq(lambda one: chi2(one) - dof, 0.0, most))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Updated(Predicted):
+    """Parameters of both sensors ``values`` (24,) with their ``covariance`` (24, 24), and the ``scatter`` of the rates
+    [rad/s], which the session predicts."""
+
+    values: FloatArray
+    covariance: FloatArray
+    scatter: float
+
+    def of(self, calibration: Calibration, recording: Recording, segments: Segments) -> Calibration:
+        """The calibration with these parameters, and with residuals of poses and moves at them."""
+        assert calibration.gyroscope is not None
+        shift = self.values - parameters_of(calibration)
+        # The shift from the optimum of poses and moves increases their χ² by this, to first order.
+        cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
+        after = replace(
+            calibration,
+            accelerometer=_with(calibration.accelerometer, self.values[:12], self.covariance[:12, :12]),
+            gyroscope=_with(calibration.gyroscope, self.values[12:], self.covariance[12:, 12:]),
+            covariance=self.covariance,
+        )
+        return with_own_residuals(after, recording, segments, cost)
+
+
+def parameters_of(calibration: Calibration) -> FloatArray:
+    """Parameters (24,) of both sensors, in the order of the covariance."""
+    gyro = calibration.gyroscope
+    assert gyro is not None
+    accelerometer = calibration.accelerometer
+    return np.concatenate([accelerometer.S.ravel(), accelerometer.b, gyro.S.ravel(), gyro.b])
+
+
+def _with(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray) -> SensorCalibration:
+    return replace(sensor, S=values[:9].reshape(3, 3), b=values[9:], covariance=covariance)
+
 
 def with_own_residuals(calibration: Calibration, recording: Recording, segments: Segments, cost: float) -> Calibration:
     """The calibration with residuals of poses and moves at its S and b; ``cost`` is the increase of the moves' χ².
 
-    Held-out residuals belong to the fit without the table and are removed.
+    Held-out gravity errors stay those of the fit without these rows, which only narrow it; those of moves are removed.
     """
     accelerometer, gyroscope = calibration.accelerometer, calibration.gyroscope
     if accelerometer.quality is not None and segments.accelerometer_mean is not None:
@@ -52,10 +185,10 @@ def _of_poses(sensor: SensorCalibration, quality: FitQuality, segments: Segments
     residual = norms(segments.accelerometer_mean, sensor.S, sensor.b)[0] - gravity_m_s2
     seen = gravity_quality(residual, quality.sigma, None)
     rms_dof = seen.rms_dof * np.sqrt(seen.dof / quality.dof) if quality.dof else float("nan")
-    return replace(
-        quality, residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof),
-        held_out=None, held_out_sigma=None, held_out_rms=None,
-    )  # fmt: skip
+    return replace(quality, residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof))
+
+
+# A rate table at known speeds, the unit on it in any orientation.
 
 
 BLOCK_S = 0.2
@@ -67,9 +200,6 @@ NOISE = 6.0
 """Standard errors of a block's mean by which a steady rate may deviate."""
 SLOWEST = 20.0
 """Smallest rate of a turn, in standard errors of a block's mean."""
-ITERATIONS = 20
-FALSE_ALARM = 1e-3
-"""Probability that the speeds of an accurate table are found to scatter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,41 +272,18 @@ def on_turntable(
         raise InputError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")
     if speeds_deg_s is None:
         raise InputError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
-    gyro = calibration.gyroscope
-    if gyro is None or recording.gyroscope is None:
+    if calibration.gyroscope is None or recording.gyroscope is None:
         raise InputError("a turntable calibrates the gyro, and this log has none; log poses and moves as well.")
     found = plateaus(recording, segments)
     speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0
-    rows = _Rows(found.mean[used], found.covariance[used], speeds[used], relative_sigma)
-    before = np.concatenate([calibration.accelerometer.S.ravel(), calibration.accelerometer.b, gyro.S.ravel(), gyro.b])
-    scatter = 0.0
-    while True:
-        values, gain, slope, misfit, noise = rows.update(before, calibration.covariance, scatter)
-        innovation = slope @ calibration.covariance @ slope.T + noise
-        chi2 = float(misfit @ np.linalg.solve(innovation, misfit))
-        if scatter > 0.0 or fdtrc(float(len(misfit)), 100.0, chi2 / len(misfit)) >= FALSE_ALARM:
-            break
-        # The table's speed scatters, or S and b do not describe the sensor: the rms misfit is added to the variance.
-        scatter = float(np.sqrt(np.mean((misfit / rows.speeds) ** 2)))
-    posterior = calibration.covariance - gain @ slope @ calibration.covariance
-    posterior = 0.5 * (posterior + posterior.T)
-    shift = values - before
-    # The shift from the optimum of poses and moves increases their χ² by this, to first order.
-    cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
-    left = float(np.sqrt(np.mean((rows.predicted(values)[0] / rows.speeds - 1.0) ** 2)))
-    after = replace(
-        calibration,
-        accelerometer=_with(calibration.accelerometer, values[:12], posterior[:12, :12]),
-        gyroscope=_with(gyro, values[12:], posterior[12:, 12:]),
-        covariance=posterior,
-        findings=(*calibration.findings, _said(scatter, misfit / rows.speeds, left, relative_sigma)),
-    )
-    return with_own_residuals(after, recording, segments, cost)
-
-
-def _with(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray) -> SensorCalibration:
-    return replace(sensor, S=values[:9].reshape(3, 3), b=values[9:], covariance=covariance)
+    unshared = np.zeros((len(speeds), 3, 0))
+    rates = StatedRates(found.mean, found.covariance, unshared, speeds, speeds, relative_sigma).of(used)
+    updated = rates.scattered_on(calibration)
+    left = float(np.sqrt(np.mean((rates.predicted(updated.values)[0] / rates.speeds - 1.0) ** 2)))
+    said = _said(updated.scatter, updated.misfit / rates.speeds, left, relative_sigma)
+    after = updated.of(calibration, recording, segments)
+    return replace(after, findings=(*calibration.findings, said))
 
 
 def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
@@ -192,39 +299,6 @@ def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> F
             "give one for all, or one a turn; 0 leaves a turn out."
         )
     return np.broadcast_to(given, (n,)).copy()
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Mean readings (k, 3) with their covariances (k, 3, 3) at ``speeds`` (k,) [rad/s] with a common relative error."""
-
-    mean: FloatArray
-    covariance: FloatArray
-    speeds: FloatArray
-    relative_sigma: float
-
-    def predicted(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Speeds (k,) [rad/s], and their derivatives (k, 24) by the parameters of both sensors."""
-        speed, slope = norms(self.mean, values[12:21].reshape(3, 3), values[21:])
-        return speed, np.pad(slope, ((0, 0), (12, 0)))
-
-    def update(
-        self, start: FloatArray, prior: FloatArray, scatter: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Posterior parameters (24,), gain (24, k), derivatives (k, 24), misfit (k,) of the prior, noise (k, k)."""
-        by_reading = self.predicted(start)[1][:, 21:] @ start[12:21].reshape(3, 3)
-        own = np.einsum("ki,kij,kj->k", by_reading, self.covariance, by_reading)
-        noise = np.diag(own + (scatter * self.speeds) ** 2)
-        noise += np.outer(self.speeds, self.speeds) * self.relative_sigma**2
-        values = start
-        for _ in range(ITERATIONS):
-            speed, slope = self.predicted(values)
-            gain = prior @ slope.T @ np.linalg.inv(slope @ prior @ slope.T + noise)
-            misfit = self.speeds - speed + slope @ (values - start)
-            last, values = values, start + gain @ misfit
-            if np.max(np.abs(values - last)[12:]) <= 1e-12 * np.max(np.abs(start[12:])):
-                break
-        return values, gain, slope, misfit, noise
 
 
 def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Finding:

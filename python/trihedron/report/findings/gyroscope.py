@@ -23,6 +23,10 @@ _MOVES = {
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
         "Count the turns in a minute; state --turntable-error.",
     ),
+    (Code.TURNTABLE, "turns", NOTE): Words(
+        "{turns:.0f} turns by stated angles were fitted beside poses and moves: |∫ω dt| within {rms_rad:.2g deg} rms "
+        "of what was stated."
+    ),
     (Code.NOT_CONVERGED, "session", SERIOUS): Words(
         "the fit of the session did not converge ({stopped_because}).", _CONTRADICTING, _LOOK_AT_MOVES
     ),
@@ -129,6 +133,13 @@ _MOVES = {
     (Code.LEFT_HANDED, "turns-reversed", SERIOUS): Words(
         "The moves between poses contradict the sense of the turns: the tilt error after them is {rms_deg:.3g}° rms, "
         "and {rms_other_deg:.3g}° with all turns reversed.",
+        "The accelerometer's axes form a left-handed triad as documented, or the turns were stated the other way "
+        "round.",
+        "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
+    ),
+    (Code.LEFT_HANDED, "turns-against-moves", SERIOUS): Words(
+        "The moves between poses contradict the sense of the turns: by them the gyro turned the other way in all "
+        "{turns:.0f}.",
         "The accelerometer's axes form a left-handed triad as documented, or the turns were stated the other way "
         "round.",
         "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
