@@ -218,6 +218,8 @@ def _tilt_findings(seen: _Faces, estimate: _Estimate, used: IntArray) -> Iterato
     yield Finding.of(
         FindingCode.TABLE_TILT,
         chi2_per_dof=estimate.chi2_noise / estimate.fit.dof,
+        # Norms that agree say nothing of a tilt: it is then that of the faces' own turns.
+        is_by_heading=estimate.chi2_noise < estimate.fit.dof,
         severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
         tilt_deg=tilt_deg,
         pose=int(used[worst]) + 1,

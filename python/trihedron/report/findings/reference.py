@@ -54,7 +54,8 @@ ENTRIES = {
     (Code.ACCELEROMETER_NOMINAL, "", WARNING): Words(
         "The accelerometer was not calibrated: the reference has no force. Its parameters in the file are nominal.",
         "A rate alone says nothing of gravity.",
-        "Calibrate it from poses (`trihedron calibrate LOG`); the frame is the reference's body.",
+        "Use the gyro alone: its frame is the reference's body, not the accelerometer's axes. Or calibrate from poses "
+        "(`trihedron calibrate LOG`).",
         numbers=("scale",),
     ),
     (Code.SHARED_MOTION, "", NOTE): Words(
