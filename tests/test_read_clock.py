@@ -144,6 +144,37 @@ def test_a_sensor_a_little_fast_of_whole_milliseconds_loses_nothing_to_its_stamp
     np.testing.assert_array_equal(np.flatnonzero(clock.lost_behind), behind)
 
 
+def delivered(tick, period, delay_s, grid_s, seed):
+    """Timestamps of arrival, of a grid: samples ``tick`` (n,) taken every ``period`` [s] and delivered late."""
+    late = np.random.default_rng(seed).exponential(delay_s, len(tick))
+    timestamps = np.maximum.accumulate(0.3 + period * tick + late)
+    return timestamps if grid_s == 0.0 else np.floor(timestamps / grid_s + 1e-6) * grid_s
+
+
+@pytest.mark.parametrize("grid_s", [0.0, 1e-3, 2e-3])
+@pytest.mark.parametrize("length", [3, 12, 40, 100])
+@pytest.mark.parametrize(("rate_hz", "delay_s"), [(100.0, 3e-3), (100.0, 1e-3), (104.0, 2e-3), (200.0, 1e-3)])
+def test_blocks_lost_from_late_timestamps_are_counted_whatever_the_resolution(rate_hz, delay_s, length, grid_s):
+    tick = np.arange(N) + length * np.sum(np.arange(N)[:, None] >= [800, 2300, 4800], axis=1)
+    clock = find_even_clock(delivered(tick, 1.0 / rate_hz, delay_s, grid_s, length))
+    assert clock.kind is TimestampKind.LATE
+    assert clock.counts_losses
+    assert clock.lost_behind.sum() == 3 * length
+    assert clock.period_s == pytest.approx(1.0 / rate_hz, rel=2e-5)
+
+
+@pytest.mark.parametrize("grid_s", [0.0, 1e-3])
+@pytest.mark.parametrize("rows", [30, 60, 100])
+def test_a_stall_whose_rows_come_together_behind_it_loses_nothing(rows, grid_s):
+    timestamps = delivered(np.arange(N), 0.01, 1e-3, grid_s, rows)
+    for start in (700, 2500, 4100):
+        timestamps[start : start + rows] = timestamps[start + rows]
+    clock = find_even_clock(timestamps)
+    assert clock.counts_losses
+    assert not clock.lost_behind.any()
+    assert clock.period_s == pytest.approx(0.01, rel=2e-5)
+
+
 def log(rate_hz, unit_s, n=3000, poses=False, seed=1, whole=None):
     """(n, 7) rows of a static sensor or of poses of 30 rows, changed within one row or as smoothly as a hand does."""
     rng = np.random.default_rng(seed)

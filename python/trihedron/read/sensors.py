@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.clock.base import Clock, build_clock, in_order
+from trihedron.probability import bdtrc
+from trihedron.read.clock.base import PART, Clock, build_clock, in_order
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
@@ -305,21 +306,35 @@ def _reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[in
             )
 
 
-USUALLY = 0.5
-"""Share of the rows with an equal timestamp that must repeat its readings too, so that these are copies."""
+BY_CHANCE = 1e-3
+"""Probability below which equal readings under equal timestamps are copies: one log of a thousand is wrong."""
+WINDOW = 64
+"""Rows over which axes repeat their readings independently; over longer ones they all do so in poses."""
 
 
 def _copied_rows(
     columns: Sequence[FloatArray], time_s: FloatArray, rows: npt.NDArray[np.signedinteger]
 ) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) that repeat timestamp and readings of the previous sample, if most that repeat its timestamp do.
+    """Samples (k,) that repeat timestamp and readings of the previous sample, if more do so than by chance.
 
     ``columns`` are the readings (rows of the table), ``rows`` (n,) the table row of each sample. Samples timestamped on
-    arrival share timestamps, and coarse codes in a pose share readings, so two samples may share both; seldom most do.
+    arrival share timestamps, and coarse codes or a sensor slower than the log repeat readings: how often, rows with
+    timestamps of their own show, by all axes together and by each. Copies are at least twice as frequent.
     """
-    again = np.flatnonzero(np.diff(time_s) == 0) + 1
-    is_alike = np.ones(len(again), dtype=bool)
-    for values in columns:
-        if len(values):
-            is_alike &= values[rows[again]] == values[rows[again - 1]]
-    return again[is_alike] if np.count_nonzero(is_alike) >= USUALLY * len(again) else again[:0]
+    is_same = np.diff(time_s) == 0
+    again, apart = np.flatnonzero(is_same) + 1, np.flatnonzero(~is_same)[:PART] + 1
+    copies = again[_repeats(columns, rows, again).all(axis=0)]
+    repeats = _repeats(columns, rows, apart)
+    width = min(WINDOW, len(apart))
+    whole = repeats[:, : len(apart) // width * width].reshape(len(repeats), -1, width)
+    chance = max(float(whole.mean(axis=2).prod(axis=0).mean()), float(repeats.all(axis=0).mean()))
+    k, most = len(copies), 2.0 * chance * len(again)
+    return copies if k > most and bdtrc(k - 1, len(again), chance) < BY_CHANCE else again[:0]
+
+
+def _repeats(
+    columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger], at: npt.NDArray[np.signedinteger]
+) -> npt.NDArray[np.bool_]:
+    """(1 + axes, k) whether readings of the samples ``at`` (k,) equal those of the previous sample; row 0 is true."""
+    equal = [values[rows[at]] == values[rows[at - 1]] for values in columns if len(values)]
+    return np.array([np.ones(len(at), dtype=bool), *equal])

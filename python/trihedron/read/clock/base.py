@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.clock.rate import steps_of
+from trihedron.read.clock.rate import RESET, modulus_of, steps_of, usual_step
 from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
@@ -116,7 +116,6 @@ MAX_DISPLACEMENT = 64
 """Largest number of rows by which a packet may be late; a larger one means another recording."""
 PART = 1 << 20
 """Rows of a long log that are processed together."""
-_MODULI = (2.0**16, 2.0**24, 2.0**32)
 
 
 def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int) -> Words:
@@ -126,30 +125,25 @@ def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int
 def unwrap(
     raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> tuple[FloatArray, bool]:
-    """Timestamps from a tick counter of 16, 24 or 32 bits, continued where it wraps, and whether it wraps."""
-    if len(raw) < 3:
-        return raw, False
+    """Timestamps from a tick counter, continued where it wraps, and whether it wraps."""
     step = np.diff(raw)
     back = np.flatnonzero(step < 0)
-    if not len(back) or raw.min() < 0:
+    modulus = modulus_of(raw) if len(back) else 0.0
+    # A late row steps back by less than half of the range, a wrap by more.
+    if not modulus or np.any(step[back] + modulus > min(RESET * usual_step(raw), 0.5 * modulus)):
         return raw, False
-    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
-    for modulus in _MODULI:
-        continued = step[back] + modulus
-        if raw.max() < modulus and usual > 0 and np.all((continued >= 0) & (continued <= 100 * usual)):
-            turns = np.zeros(len(raw))
-            turns[back + 1] = modulus
-            findings.append(
-                Finding.of(
-                    FindingCode.TIME_WRAPPED,
-                    bits=int(np.log2(modulus)),
-                    count=len(back),
-                    where=_place(table, rows, int(back[0]) + 1),
-                    sample=back[0] + 1,
-                )
-            )
-            return raw + np.cumsum(turns), True
-    return raw, False
+    turns = np.zeros(len(raw))
+    turns[back + 1] = modulus
+    findings.append(
+        Finding.of(
+            FindingCode.TIME_WRAPPED,
+            bits=int(np.log2(modulus)),
+            count=len(back),
+            where=_place(table, rows, int(back[0]) + 1),
+            sample=back[0] + 1,
+        )
+    )
+    return raw + np.cumsum(turns), True
 
 
 def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.ranges import ranges_of
-from trihedron.read.clock.period import PAUSE_STEPS
+from trihedron.read.clock.period import PAUSE_STEPS, STALL_STEPS
 
 LOST = 0.6
 """Permanent shift of the earliest timestamps, in periods, from which on a sample counts as lost."""
@@ -18,8 +18,6 @@ SETTLED_OVER = 5
 """Blocks on either side of a place from which the level of the earliest timestamps is estimated."""
 UNMOVED = LOST / (2.0 * SETTLED_OVER)
 """Shift from block to block, in periods, of which ``2 SETTLED_OVER`` together are still no loss."""
-STALL_STEPS = 120
-"""Longest stall of the link, in rows; a longer one is a pause."""
 
 
 def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
@@ -87,9 +85,10 @@ def track(
             continue
         moved_back, n_blocks = _count_losses(late[a:b], width, reach, is_sharp, lost[a:b])
         back, blocks = back + moved_back, blocks + n_blocks
-    for k in pauses:
-        # The number of samples lost in a pause is only known from its length.
-        lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
+    for a, k in zip(edges, pauses, strict=False):
+        # The samples lost in a pause are known from its length alone, of which a late delivery comes back.
+        level = late[max(a, k + 1 - width) : k + 1].min()
+        lost[k + 1] += max(round(float(late[k + 1 : k + 1 + STALL_STEPS].min() - level)), 0)
     if not lost.any():
         return period, np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
     # The ticks overwrite the losses, to save memory for a log of 1e8 rows.

@@ -41,6 +41,8 @@ REGULAR = 0.12
 """Share of samples lost at regular intervals above which a coarse grid is the more likely cause."""
 PAUSE_STEPS = 50.0
 """Number of usual steps above which a step is a pause of the logger, not a loss to be counted."""
+STALL_STEPS = 120
+"""Longest stall of the link, in rows; a longer one is a pause."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,8 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
         w = time_s[s : s + width]
         cuts = np.concatenate([[0], np.flatnonzero(np.diff(w) > PAUSE_STEPS * usual) + 1, [width]])
         longest = int(np.argmax(np.diff(cuts)))
-        piece = w[cuts[longest] : cuts[longest + 1]]
+        # Rows that a stall held back come together behind it and are none of the period's.
+        piece = w[cuts[longest] + (STALL_STEPS if longest else 0) : cuts[longest + 1]]
         if len(piece) >= min(64, width // 2) and piece[-1] > piece[0]:
             kept.append(piece - piece[0])
     if not kept:
@@ -176,9 +179,11 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     """The period's frequency per mean distance of rows, or ``None`` where none is significant."""
     peaks = spectrum.peaks()
     if line > 0.0:
-        # Rounding to a grid never makes a step shorter than the whole grid steps in a period, which excludes aliases.
+        # Multiples of a grid have the same power at f and at line - f. Rounding alone never makes a step shorter than
+        # the whole grid steps in a period, which excludes aliases; a late timestamp does, but below line / 2 is none.
         in_period = np.floor(line / spectrum.per_step[peaks] + 0.02)
-        peaks = peaks[(shortest * line > in_period - 0.5) | (in_period < 1)]
+        fits = (shortest * line > in_period - 0.5) | (in_period < 1)
+        peaks = peaks[fits | (spectrum.per_step[peaks] < 0.5 * line)]
     power, per_step = spectrum.power[peaks], spectrum.per_step[peaks]
     near = 2 * spectrum.lobe * spectrum.width
     multiple = np.rint(per_step / line) if line else np.zeros(len(peaks))

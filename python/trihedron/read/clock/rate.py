@@ -23,11 +23,23 @@ def steps_of(time_s: FloatArray) -> Steps:
     return Steps(*_core.timestamp_steps(np.asarray(time_s, dtype=np.float64)))
 
 
+RESET = 100.0
+"""Usual steps between the largest value and a power of two from which on a counter was reset and did not wrap: samples
+lost at the wrap itself widen the distance, and a reset comes as close by chance once in rows / 100 logs."""
+
+
+def modulus_of(counter: FloatArray) -> float:
+    """The power of two, 2^8 or more, that the largest of whole numbers (n,) approaches; 0 where none can be a wrap."""
+    largest = float(counter.max())
+    modulus = 2.0 ** max(8, int(largest).bit_length())
+    is_whole = counter.min() >= 0 and np.all(counter == np.rint(counter))
+    return modulus if is_whole and modulus - largest <= RESET * usual_step(counter) else 0.0
+
+
 def steps_of_counter(counter: FloatArray) -> FloatArray:
-    """Steps (n - 1,) of a counter of 8, 16 or 32 bits, continued where it wraps."""
+    """Steps (n - 1,) of a counter, continued where it wraps."""
     step = np.diff(counter)
-    bits = next((bits for bits in (8, 16, 32) if counter.max() < 2.0**bits), 0) if counter.min() >= 0 else 0
-    return np.where(step < 0, step + 2.0**bits, step) if bits else step
+    return np.where(step < 0, step + modulus_of(counter), step)
 
 
 def usual_step(time_s: FloatArray) -> float:
