@@ -12,7 +12,7 @@ from trihedron.report.diagnosis_words import OF_SAMPLES, dependent, named_effect
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
-from trihedron.report.numbers import listed
+from trihedron.report.numbers import capital, listed
 
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
@@ -56,8 +56,10 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return " ".join(steps) + _by_themselves(diagnosis)
     if not is_carried:
         use = f"Keep using {model}: its parameters agree with this log." if is_file else use
-        alone = "No effect goes with them: none is corrected in another log."
-        return f"{_in_the_next_log(diagnosis)}{use} {alone}{_by_themselves(diagnosis)}"
+        named = ids_in_print(dict.fromkeys(of_session))
+        verb = "belongs" if len(set(of_session)) == 1 else "belong"
+        of_log = f"{capital(named)} {verb} to this recording: no other log is corrected by it."
+        return f"{use} {of_log}{_by_themselves(diagnosis)}{_in_the_next_log(diagnosis)}"
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     return f"{store}{beside}.{_by_themselves(diagnosis)}"
@@ -76,7 +78,7 @@ def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
     """What to do about the first effect of this session alone."""
     advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
-    return next((f"Against {id_in_print(name)}: {said}. " for name, said in advice if said), "")
+    return next((f" Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:
