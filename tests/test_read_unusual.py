@@ -164,7 +164,7 @@ NAMES = "ax,ay,az,gx,gy,gz"
 
 
 def stated(path, clock, names, remark="", force=FORCE, rate=RATE):
-    return texts.stated(path, *texts.table(clock, force, rate), header=names, remark=remark)
+    return texts.written(path, *texts.table(clock, force, rate), header=names, remark=remark)
 
 
 def doubts(recording):
@@ -301,7 +301,7 @@ def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_p
     t, force, rate = motion(n_poses=3)
     names = [form.format(d=d, c=c) for d in devices for c in ("ax", "ay", "az", "gx", "gy", "gz")]
     columns = [*texts.table(t, force, rate), *texts.table(t, 2.0 * force, -rate)[1:]]
-    log = texts.stated(tmp_path / "log.csv", *columns, header=",".join(["t", *names]))
+    log = texts.written(tmp_path / "log.csv", *columns, header=",".join(["t", *names]))
     for device, factor, sign in zip(devices, (1.0, 2.0), (1.0, -1.0), strict=True):
         recording = read_recording(log, instance=device)
         np.testing.assert_allclose(recording.accelerometer, factor * force, atol=1e-5)
