@@ -154,6 +154,18 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n):
     assert abs(near.chi2 / careful.chi2 - 1.0) < 1e-6
 
 
+def test_noise_by_pose_is_noise_by_reading():
+    rng, settings = np.random.default_rng(2), _core.NormSettings(G)
+    raw, pose = np.tile(readings(cube_poses(), 1), (3, 1)) + rng.normal(size=(54, 3)), np.tile(np.arange(18), 3)
+    noise = np.array([np.diag([1.0, 2.0, 1.0 + k]) for k in range(18)])
+    by_pose, by_reading = _core.fit_norm(raw, noise, settings, None, pose), _core.fit_norm(raw, noise[pose], settings)
+    np.testing.assert_array_equal(by_pose.S, by_reading.S)
+    np.testing.assert_array_equal(by_pose.b, by_reading.b)
+    for few, owner in ((noise[:17], pose), (noise, pose[1:])):
+        with pytest.raises(ValueError, match=r"\w"):
+            _core.fit_norm(raw, few, settings, None, owner)
+
+
 def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():
     rng = np.random.default_rng(6)
     S, b = np.array([[1.3, 0.0, 0.0], [0.2, 0.8, 0.0], [-0.1, 0.3, 1.1]]), np.array([0.3, -0.2, 0.5])
