@@ -167,15 +167,6 @@ def test_a_periodic_line_is_found_with_its_amplitude(quiet):
     assert present(noise.axes[0]) == {"N", "K"}
 
 
-def test_filtering_is_recognised_before_terms_are_quoted(quiet):
-    filtered = np.convolve(quiet, np.full(5, 0.2), mode="valid")
-    noise = identify_noise(filtered, RATE)
-    assert FindingCode.SPECTRUM_LOW_PASS in codes(noise)
-    assert noise.axes[0].highest_hz < 10.0
-    # What the filter takes below the frequency where it is noticed: 2.5 % of N.
-    assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.025)
-
-
 def test_rows_written_twice_are_told_from_coarse_readings(quiet):
     held = np.repeat(quiet[::4], 4)
     noise = identify_noise(np.column_stack([held, held[::-1]]), RATE)

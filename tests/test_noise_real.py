@@ -80,7 +80,10 @@ def axes_of(x):
 @pytest.mark.parametrize("low_pass", [([0.2], [1.0, -0.8]), ([0.2] * 5, [1.0])], ids=["recursive", "mean of five"])
 def test_white_noise_behind_a_low_pass_lies_inside_its_interval(low_pass):
     x = lfilter(*low_pass, 1e-3 * np.random.default_rng(100).normal(size=(N, 3)), axis=0)
-    for white in axes_of(x)[1]:
+    result, found = axes_of(x)
+    for axis, white in zip(result.axes, found, strict=True):
+        assert FindingCode.SPECTRUM_LOW_PASS in codes(axis)
+        assert axis.highest_hz < RATE / 4.0
         # It was 1 to 3 % low, by four to eight of its standard errors.
         assert white.lower < WHITE < white.upper
         assert white.estimate == pytest.approx(WHITE, rel=0.02)

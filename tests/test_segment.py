@@ -220,14 +220,6 @@ def test_error_bars_of_means_cover_under_white_noise():
     assert 0.8 < z.std() < 1.05
 
 
-def test_a_log_that_never_rests_is_a_serious_finding():
-    rng = np.random.default_rng(3)
-    walk = np.cumsum(rng.normal(size=(3000, 6)), axis=0)
-    segments = segment_recording(Recording(np.arange(3000) / 100.0, walk[:, :3], walk[:, 3:], 100.0))
-    assert segments.n_poses == 0
-    assert FindingCode.NOT_STATIC in codes(segments)
-
-
 @pytest.mark.parametrize(("scatter", "is_said"), [(0.2, False), (1.2, True)])
 def test_a_hovering_flight_is_not_taken_for_poses_in_silence(scatter, is_said):
     """0.2 m/s² a sample is a very noisy part, 1.2 m/s² the rotors of a flight."""

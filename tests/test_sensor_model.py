@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_north_up, normal_gravity
+from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import in_frame, other_form, other_form_jacobian, reframing
 from trihedron.units import (
@@ -121,12 +121,6 @@ def test_normal_gravity_has_its_published_values_and_impossible_places_are_refus
     for latitude, height in ((91.0, 0.0), (float("nan"), 0.0), (0.0, 1e6)):
         with pytest.raises(ValueError, match="must be between"):
             normal_gravity(latitude, height)
-
-
-def test_earth_rate_is_split_by_latitude():
-    north, up = earth_rate_north_up(30.0)
-    assert np.hypot(north, up) == pytest.approx(EARTH_RATE_RAD_S)
-    assert up == pytest.approx(EARTH_RATE_RAD_S / 2)
 
 
 def test_units_have_the_sizes_of_the_international_system():

@@ -9,7 +9,7 @@ from scipy import stats
 from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.session.solved import calibrate_moves
-from trihedron.simulate import Clock, NoiseTerms, list_scenarios, make_noise, scenario_by_name, simulate
+from trihedron.simulate import Clock, NoiseTerms, make_noise, scenario_by_name, simulate
 from true_segments import segments_from_truth
 
 
@@ -55,13 +55,10 @@ def test_labels_cover_the_recording_and_holds_stand_still():
     for before, after in zip(truth.segments, truth.segments[1:], strict=False):
         assert before.stop == after.start
     for pose in truth.poses:
-        assert not truth.angular_rate_rad_s[pose.start : pose.stop].any()
-
-
-def test_every_named_scenario_says_what_it_is():
-    for name, sentence in list_scenarios().items():
-        assert scenario_by_name(name).name == name
-        assert sentence.endswith(".")
+        rows = slice(pose.start, pose.stop)
+        assert not truth.angular_rate_rad_s[rows].any()
+        assert np.ptp(truth.specific_force_m_s2[rows], axis=0).max() == 0.0
+        assert np.linalg.norm(truth.specific_force_m_s2[pose.start]) == pytest.approx(truth.gravity_m_s2, rel=1e-14)
 
 
 def slow_allan_variance(x, m):
