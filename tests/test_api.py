@@ -165,6 +165,14 @@ def test_a_keyword_that_is_nearly_right_is_offered_its_name_and_several_logs_the
         trihedron.calibrate(["log.csv", "log.csv"], gravity_m_s2=9.81)
 
 
+def test_a_sensor_shows_its_numbers_and_its_bias_is_what_the_reading_is_too_much():
+    S, bias = np.array([[0.99, 0.0, 0.0], [0.01, 1.02, 0.0], [-0.02, 0.005, 1.01]]), np.array([0.1, -0.2, 0.3])
+    sensitivity = np.linalg.norm(np.linalg.inv(S), axis=1)
+    one = trihedron.SensorCalibration(S, -S @ (bias * sensitivity), np.zeros((12, 12)), "m/s^2", "m/s^2", "test")
+    np.testing.assert_allclose(one.bias, bias, atol=1e-14)
+    assert "0.99, 1.02, 1.01" in repr(one)
+
+
 def test_the_public_names_are_those_that_are_imported_on_use():
     """A literal, which editors follow; ``_PUBLIC`` names the modules."""
     assert trihedron.__all__ == sorted([*trihedron._HOME, "__version__"])
