@@ -51,15 +51,11 @@ def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real
         assert not axis.terms[TermName.QUANTISATION].is_present
 
 
-def gyroscopes_of(real_data, name, tmp_path):
-    """A published curve without its accelerometers, of which nothing is stated here."""
-    lines = (real_data / "allan_curves" / name).read_text().splitlines()
-    (tmp_path / name).write_text("\n".join(lines[:1] + [line for line in lines if "Gyro" in line]) + "\n")
-    return tmp_path / name
-
-
 def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_data, tmp_path):
-    curve = noise_of_curve(gyroscopes_of(real_data, "adis_av.csv", tmp_path), gyroscope_unit="deg/s")
+    # Without its accelerometers, of which nothing is stated here.
+    lines = (real_data / "allan_curves" / "adis_av.csv").read_text().splitlines()
+    (tmp_path / "curve.csv").write_text("\n".join(lines[:1] + [line for line in lines if "Gyro" in line]) + "\n")
+    curve = noise_of_curve(tmp_path / "curve.csv", gyroscope_unit="deg/s")
     for axis, logged in zip(curve.axes, adis.axes[:3], strict=True):
         # The filter still takes 1 % where the curve is believed.
         assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)

@@ -164,10 +164,6 @@ def test_the_logs_own_time_and_other_columns_stay_where_they_were(tmp_path):
 QUIET = {FindingCode.COLUMNS_RECOGNISED, FindingCode.UNIT_DETECTED, FindingCode.TIME_UNIT_DETECTED}
 
 
-def static_norm(recording, samples=slice(0, 100)) -> float:
-    return float(np.linalg.norm(recording.accelerometer[samples].mean(axis=0)))
-
-
 def test_mimu4444_one_of_eight_devices(real_data):
     path = real_data / "mimu4444" / "exp_3.npz"
     with pytest.raises(ReadError, match="8 devices"):
@@ -178,7 +174,7 @@ def test_mimu4444_one_of_eight_devices(real_data):
         np.testing.assert_array_equal(recording.gyroscope, archive["counts"][:, 4, 3:])
     assert recording.rate_hz == pytest.approx(62.5, rel=1e-3)
     assert recording.accelerometer_unit is AccelerationUnit.COUNTS
-    assert static_norm(recording) == pytest.approx(2048, rel=0.1)
+    assert np.linalg.norm(recording.accelerometer[:100].mean(axis=0)) == pytest.approx(2048, rel=0.1)
     # The last 100 s are violent: the gyro leaves its range on every axis.
     clipped = finding(recording, FindingCode.CLIPPING)
     assert clipped.numbers["sample"] > 0.75 * recording.n_samples
