@@ -167,19 +167,3 @@ fn spacing(gaps: &[f64], near: f64) -> Option<f64> {
     let on = places.iter().filter(is_on).count();
     (n > 0 && on as f64 / n as f64 >= ON_GRID).then_some(step)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::step;
-
-    #[test]
-    fn counts_without_every_code_have_a_whole_step() {
-        let levels: Vec<f64> = [
-            0.0, 2.0, 4.0, 10.0, 12.0, 18.0, 20.0, 22.0, 30.0, 36.0, 38.0,
-        ]
-        .to_vec();
-        assert_eq!(step(&levels, 100), Some(2.0));
-        assert_eq!(step(&levels[..1], 100), None);
-        assert_eq!(step(&[], 0), None);
-    }
-}

@@ -100,33 +100,3 @@ pub fn block_differences(
     }
     (sum, n)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{block_differences, means_by_owner};
-
-    #[test]
-    fn rows_with_a_missing_reading_belong_to_no_mean() {
-        let rows = [[1.0, 2.0, 3.0], [f64::NAN, 0.0, 0.0], [3.0, 4.0, 8.0]];
-        let (mean, count) = means_by_owner(&rows, &[[0, 2], [2, 3]], &[0, 0], 2);
-        assert_eq!((mean[0], count[0]), ([2.0, 3.0, 5.5], 2));
-        assert!(mean[1][0].is_nan() && count[1] == 0);
-    }
-
-    #[test]
-    fn neighbouring_blocks_differ_by_what_their_means_do() {
-        let rows: Vec<[f64; 3]> = (0..8).map(|k| [f64::from(k), 1.0, 0.0]).collect();
-        // Means 0.5, 2.5, 4.5, 6.5: three differences of 2, each ½ 2² times two rows.
-        let as_one = ([12.0, 0.0, 0.0], 3);
-        assert_eq!(block_differences(&rows, &[[0, 8]], &[0], 2), as_one);
-        assert_eq!(
-            block_differences(&rows, &[[0, 3], [3, 8]], &[4, 4], 2),
-            as_one
-        );
-        // Three rows are no four blocks, nor are those of two owners together.
-        assert_eq!(
-            block_differences(&rows, &[[0, 3], [3, 6]], &[0, 1], 2),
-            ([0.0; 3], 0)
-        );
-    }
-}

@@ -17,9 +17,6 @@ mod session_model;
 #[path = "kernels/stillness.rs"]
 mod stillness;
 
-#[path = "kernels/kalman.rs"]
-mod kalman;
-
 #[path = "kernels/allan.rs"]
 mod allan;
 #[path = "kernels/simulate.rs"]

@@ -84,11 +84,6 @@ def slow(rng, n, size, seconds):
     return size * x[lead:] / np.sqrt((1 + pole**2) / (1 - pole**2) ** 3)
 
 
-def small_turn(v):
-    """(n, 3, 3) rotations by vectors of some degrees, one elementary turn after another."""
-    return turn(0, v[:, 0]) @ turn(1, v[:, 1]) @ turn(2, v[:, 2])
-
-
 def readings(rng, u, C, path, step, unsteady):
     """Gyro [rad/s] and accelerometer [m/s²], and the walk (n, 3) of the gyro's bias [rad/s]; white noise besides.
 
@@ -132,7 +127,8 @@ def truth(
     lead, ppm = rng.uniform(-0.05, 0.05), rng.uniform(-300, 300)
     k = np.arange(0, len(t), STEP)
     size = np.radians(size_deg or np.exp(rng.uniform(np.log(0.1), np.log(2))))
-    error = small_turn(slow(rng, len(k), size, lasting_s or np.exp(rng.uniform(np.log(4), np.log(40)))))
+    v = slow(rng, len(k), size, lasting_s or np.exp(rng.uniform(np.log(4), np.log(40))))
+    error = turn(0, v[:, 0]) @ turn(1, v[:, 1]) @ turn(2, v[:, 2])
     seen = error @ C[k] if rng.uniform() < 0.5 else C[k] @ error
     seen = jittered(seen, rng, np.radians(0.05))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None

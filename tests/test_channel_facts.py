@@ -50,6 +50,9 @@ def test_readings_on_no_grid_have_no_step_and_resampled_ones_none_that_matters(s
     assert adc_step(x.astype(np.float32).astype(float)) == 0.0  # the last bit of a float is no step of an ADC
     assert adc_step(np.interp(np.arange(8000) * 0.9771, np.arange(8000), np.round(x))) < 1e-2
     assert adc_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
+    # Counts without every code have a whole step, and one level has none.
+    assert adc_step(np.tile([0.0, 2.0, 4.0, 10.0, 12.0, 18.0, 20.0, 22.0, 30.0, 36.0, 38.0], 9)) == 2.0
+    assert adc_step(np.zeros(100)) == adc_step(np.zeros(0)) == 0.0
 
 
 def test_a_recording_carries_its_facts_and_another_has_its_own():

@@ -52,11 +52,6 @@ def numbers(text):
     return [float(word) for word in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", text)]
 
 
-def assignments(text):
-    """`name = {...};` of the xio export."""
-    return {m[1]: np.array(numbers(m[2])) for m in re.finditer(r"(\w+) = \{([^}]*)\};", text)}
-
-
 @pytest.mark.parametrize(("handed", "frame"), [(1.0, "lower"), (-1.0, "lower"), (1.0, "symmetric")])
 def test_python_snippet_runs_and_agrees(handed, frame):
     known = in_frame(calibration("counts", handed), frame)
@@ -292,7 +287,8 @@ def test_counts_are_refused_or_converted_by_the_size_of_a_count(target):
 
 def test_xio_scales_the_difference_then_aligns_to_g_and_degrees():
     known = calibration("counts")
-    parts = assignments(export_calibration(known, "xio"))
+    said = re.finditer(r"(\w+) = \{([^}]*)\};", export_calibration(known, "xio"))
+    parts = {m[1]: np.array(numbers(m[2])) for m in said}
     wanted = (("accelerometer", known.accelerometer, 1 / 9.80665), ("gyroscope", known.gyroscope, 180 / np.pi))
     for name, sensor, unit in wanted:
         M = parts[f"{name}Misalignment"].reshape(3, 3)

@@ -23,9 +23,27 @@ def test_means_over_ranges_pass_over_what_is_no_number():
         np.testing.assert_allclose(found[k], np.nanmean(rows, axis=0), rtol=1e-14)
     assert np.isnan(found[[0, 3]]).all()
     assert np.isnan(found[2]).tolist() == [False, False, True, False]
+    # Of readings of three axes one missing number excludes the row.
+    found, count = _core.means_by_owner(values[:, :3].copy(), ranges, owner, 5)
+    whole = [k for k in [*range(10), *range(20, 30)] if np.isfinite(values[k, :3]).all()]
+    np.testing.assert_allclose(found[1], values[whole, :3].mean(axis=0), rtol=1e-14)
+    assert count.tolist()[:3] == [0, len(whole), 0]
+    assert np.isnan(found[[0, 2, 3]]).all()
     for wrong in ([[0, 51]], [[-1, 3]], [[3, 1]]):
         with pytest.raises(ValueError, match="50 rows"):
             _core.column_means(values, np.array(wrong), np.array([0]), 1)
+
+
+def test_neighbouring_blocks_differ_by_what_their_means_do():
+    rows = np.column_stack([np.arange(8.0), np.ones(8), np.zeros(8)])
+    # Means 0.5, 2.5, 4.5, 6.5: three differences of 2, each ½ 2² times two rows. Three rows are no four blocks, nor are
+    # those of two owners together.
+    for ranges, owner, size, n in (
+        ([[0, 8]], [0], 12, 3),
+        ([[0, 3], [3, 8]], [4, 4], 12, 3),
+        ([[0, 3], [3, 6]], [0, 1], 0, 0),
+    ):
+        assert _core.block_differences(rows, np.array(ranges), np.array(owner), 2) == ([size, 0, 0], n)
 
 
 def test_moments_of_moves_are_trapezoids_over_the_rows_that_are_numbers():
@@ -44,6 +62,16 @@ def test_moments_of_moves_are_trapezoids_over_the_rows_that_are_numbers():
         # Sixty products of one size.
         np.testing.assert_allclose(found[k], twin, rtol=0.0, atol=1e-12 * np.abs(product).max())
     assert found[2] is None
+
+
+def test_the_share_of_a_gyro_foretells_the_changes_that_it_made_although_one_axis_is_dead():
+    rng = np.random.default_rng(3)
+    truth, mean, rate = rng.normal(size=12), rng.normal(size=(60, 3)), rng.normal(size=(60, 3)) * [1.0, 0.0, 1.0]
+    change = np.cross(mean, rate @ truth[:9].reshape(3, 3).T + truth[9:])
+    found = np.array(_core.share_of_gyroscope(change, mean, rate, [1.0] * 3))
+    # Half of the digits remain; the dead axis is undetermined.
+    np.testing.assert_allclose(np.cross(mean, rate @ found[:9].reshape(3, 3).T + found[9:]), change, atol=1e-6)
+    assert np.abs(found[[1, 4, 7]]).max() < 1e-6
 
 
 def explained(t, x, f):

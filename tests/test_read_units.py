@@ -11,7 +11,7 @@ from test_read import HEADER, codes, finding, write
 from trihedron.read import read_recording
 from trihedron.read.names import parse_name
 from trihedron.records import FindingCode, Severity
-from trihedron.units import AccelerationUnit, RateUnit
+from trihedron.units import RateUnit
 
 RATE_HZ = 100.0
 
@@ -22,19 +22,6 @@ def session(n_poses=6, turn_s=1.0):
 
 def saved(path, time_s, force, rate, header=HEADER):
     return write(path, np.round(np.column_stack([time_s, force, rate]), 9), header)
-
-
-@pytest.mark.parametrize(
-    ("scale", "unit"),
-    [(1.0, AccelerationUnit.M_S2), (1 / 9.80665, AccelerationUnit.G), (1000 / 9.80665, AccelerationUnit.MG)],
-)
-def test_the_accelerometer_unit_is_told_by_gravity(tmp_path, scale, unit):
-    time_s, force, rate = session()
-    recording = read_recording(saved(tmp_path / "log.csv", time_s, force * scale, rate))
-    assert recording.accelerometer_unit is unit
-    assert finding(recording, FindingCode.TIME_UNIT_DETECTED)
-    shown = unit.value.replace("^2", "²")
-    assert any(shown in f.seen for f in recording.findings if f.code is FindingCode.UNIT_DETECTED)
 
 
 @pytest.mark.parametrize(
@@ -77,15 +64,6 @@ def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_ser
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, noise, rate))
     assert finding(recording, FindingCode.GRAVITY_MISSING).severity is Severity.SERIOUS
-
-
-def test_whole_numbers_are_counts(tmp_path):
-    time_s, force, rate = session()
-    recording = read_recording(
-        saved(tmp_path / "log.csv", time_s, np.rint(force * 400 + 32768), np.rint(rate * 5000 + 32768))
-    )
-    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
-    assert recording.gyroscope_unit is RateUnit.COUNTS
 
 
 @pytest.mark.parametrize("gyro_first", [False, True])
@@ -145,6 +123,7 @@ MEANINGS = {
     ("supply", "", ""): "vdd | Supply Voltage",
     ("counter", "", ""): "PacketCounter | n_samples | seq",
     ("bare", "x", ""): "x",
+    ("bare", "z", ""): "Z (m/s^2)",
     ("", "x", ""): "угловое_ускорение_x | Winkelbeschleunigung x | 角度X(°) | скачок_x | \ufffd\ufffd\ufffd_x",
 }
 NAMES = [(name, meaning) for meaning, names in MEANINGS.items() for name in names.split(" | ")]
@@ -165,11 +144,6 @@ OTHERS = (
 @pytest.mark.parametrize("name", ["", *OTHERS.split(" | ")])
 def test_what_is_neither_sensor_nor_time_is_not_taken_for_one(name):
     assert parse_name(name).role == ""
-
-
-def test_units_of_other_columns_do_not_hide_their_role():
-    assert parse_name("temp_C").role == "temperature"
-    assert parse_name("Z (m/s^2)").role == "bare"
 
 
 def test_raw_readings_rank_above_corrected_ones():

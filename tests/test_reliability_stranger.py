@@ -1,16 +1,21 @@
-"""What a stranger's system does to a command: closed streams, odd locales, two writers, a log that still grows."""
+"""What a stranger's system does to a command: signals, closed streams, odd locales, two writers, a log that grows."""
 
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import trihedron
-from small_session import G, copied, leftovers, run, started
+from small_session import G, copied, leftovers, made_once, run, started
+from trihedron import _core
 from trihedron.documents import DocumentError, parse_json
 from trihedron.read import read_recording
 from written_session import usual
@@ -115,3 +120,106 @@ def test_names_of_files_break_no_line_of_a_repr_and_those_that_are_no_text_are_s
     assert "\\udcff\\udcfe.csv" in said
     with open(out, encoding="utf-8") as stream:
         assert json.load(stream)
+
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+ONE_SECOND = 1.0
+LOADED = 4.0
+"""A machine with ten busy processes on two cores gives a process a fifth of one."""
+
+
+@pytest.fixture(scope="module")
+def long_log(tmp_path_factory):
+    """Five million rows: every command on it takes seconds."""
+    import polars
+
+    path = tmp_path_factory.mktemp("long") / "long.csv"
+    rng = np.random.default_rng(1)
+    n = 5_000_000
+    noise = np.round(rng.normal([0.0, 0.0, 9.8, 0.0, 0.0, 0.0], 0.01, (1000, 6)), 4)
+    columns = {"t": np.arange(n) / 1000.0}
+    columns |= {name: np.tile(noise[:, k], n // 1000) for k, name in enumerate(("ax", "ay", "az", "gx", "gy", "gz"))}
+    polars.DataFrame(columns).write_csv(path)
+    return path
+
+
+def wait_until_it_listens(process):
+    """Until the command has its handlers: the interpreter itself starts for some 50 ms."""
+    while True:
+        with open(f"/proc/{process.pid}/status") as status:
+            caught = next(int(line.split()[1], 16) for line in status if line.startswith("SigCgt"))
+        if caught >> (signal.SIGTERM - 1) & 1 or process.poll() is not None:
+            return
+        time.sleep(0.005)
+
+
+def interrupted(process, number, after_s):
+    """Status, stderr and how long the process lived on."""
+    wait_until_it_listens(process)
+    time.sleep(after_s)
+    if process.poll() is not None:
+        process.communicate()
+        pytest.fail("the command ended before it was interrupted")
+    began = time.monotonic()
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    return process.returncode, err.decode(), time.monotonic() - began
+
+
+@pytest.mark.parametrize(("number", "status", "after_s"), [(signal.SIGINT, 130, 0.0), (signal.SIGTERM, 143, 0.5)])
+def test_a_command_ends_within_a_second_and_says_so(long_log, tmp_path, number, status, after_s):
+    target = tmp_path / "c.json"
+    target.write_text("old")
+    process = started("calibrate", long_log, "--gravity", "9.8", "-o", target, "--force")
+    ended, err, took = interrupted(process, number, after_s)
+    assert ended == status, err
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    # One line, or the erased remains of a progress bar before it.
+    assert err.strip().splitlines()[-1].endswith("interrupted; what was not finished was not written.")
+    assert took < (ONE_SECOND if os.getloadavg()[0] < 2 else LOADED)
+    assert target.read_text() == "old"
+    assert leftovers(tmp_path) == []
+
+
+def test_a_library_that_does_not_listen_is_ended_all_the_same():
+    # A mutex locked twice holds the main thread for ever, whatever signals come, as a busy library would for minutes.
+    code = (
+        "import ctypes, trihedron.interruption as i; i.install(); c = ctypes.CDLL(None); m = bytes(64); "
+        "c.pthread_mutex_lock(m); print('ready', flush=True); c.pthread_mutex_lock(m)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout.readline() == b"ready\n"
+    ended, err, took = interrupted(process, signal.SIGTERM, 0.1)
+    assert ended == 143
+    assert took < (ONE_SECOND if os.getloadavg()[0] < 2 else LOADED)
+    assert err == "trihedron: interrupted; what was not finished was not written.\n"
+
+
+def test_a_long_kernel_ends_between_blocks_when_python_is_interrupted():
+    # Half a minute of noise; the signal comes from a thread, the handler runs in the kernel's binding.
+    n = 30_000_000
+    # A shell's background job begins with SIGINT ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    # In seconds of the processor, of which a loaded machine gives no more.
+    began = time.process_time()
+    with pytest.raises(KeyboardInterrupt):
+        _core.simulate_noise(n, 0.01, [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3)
+    signal.signal(signal.SIGINT, before)
+    assert time.process_time() - began < (0.4 + LOADED) * os.cpu_count()
+    # And the next one is not harmed.
+    assert _core.simulate_noise(5, 0.01, [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3).shape == (5, 3)
+
+
+def test_nothing_is_said_about_an_interruption_that_was_told_to_be_ignored():
+    # nohup and background jobs of a shell start commands with SIGINT ignored.
+    with started(
+        "segment", made_once() / "log.csv", preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ) as process:
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert out

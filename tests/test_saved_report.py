@@ -1,14 +1,17 @@
-"""A saved result is laid out again: the same report from its JSON, as text, as a page and in pictures."""
+"""A saved result is laid out again: the same report from its JSON, as text that fits its terminal, as a page."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import trihedron
-from trihedron.cli import main
+from trihedron.cli import COMMANDS, main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.domains import DOMAINS
@@ -17,7 +20,7 @@ from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel, Points, Scale, Span, Sphere
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.document import Document, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
 from trihedron.report.findings import combined, findings_block
 from trihedron.report.findings.wording import filled
@@ -26,7 +29,7 @@ from trihedron.report.machine import json_text
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.page import to_html
 from trihedron.report.saved import report_of, with_report
-from trihedron.report.text import to_text
+from trihedron.report.text import Style, to_text
 from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from written_session import G, simulated, usual
@@ -204,3 +207,70 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
     y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
+
+
+HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
+
+
+def long_document():
+    table = Table(HEAD, (ROW, ROW), "What every domain says, " + "at length, " * 12)
+    facts = Facts((("a label that is far longer than half of a narrow terminal has columns", "text " * 40),))
+    section = Section("Where", (table, facts, Paragraph("word " * 80)))
+    return Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
+    text = to_text(long_document(), width=width)
+    assert max(len(line) for line in text.splitlines()) <= width
+    # Heads, and names of rows, may stand on several lines.
+    said = text.split()
+    for cell in (*HEAD, *ROW):
+        assert all(word in said for word in cell.split())
+    for cell in ROW[1:]:
+        assert cell in text
+
+
+def test_names_from_a_log_steer_no_terminal_and_stay_one_line_of_a_page():
+    hostile = Document("t", "log\x1b[2J.csv", "v", True, (Section("S", (Paragraph("a\x9bb"),)),))
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", to_text(hostile, style=Style(80)))
+    page = to_html(
+        Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, (Section("Poses of a\nb", ()),))
+    )
+    assert r"/logs/a\nNOT TO BE TRUSTED\t.csv" in page
+    assert "a\nNOT TO BE" not in page
+    assert not re.search("a\nb|[\x00-\x09\x0b-\x1f\x7f-\x9f]", page)
+
+
+def piped(*words, **environment):
+    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
+    program = [sys.executable, "-m", "trihedron", *words]
+    return subprocess.run(program, env=known | environment, capture_output=True, check=True).stdout
+
+
+def test_a_pipe_gets_no_colour_columns_are_obeyed_and_without_utf_8_it_is_ascii():
+    out = piped("plan", COLUMNS="64", PYTHONIOENCODING="cp1252").decode("ascii")
+    assert "deg/s/sqrt(Hz)" in out
+    assert "?" not in out
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= 64
+
+
+@pytest.mark.parametrize("command", [None, *(c.__name__ for c in COMMANDS)])
+def test_help_fits_the_terminal_and_its_examples_name_real_options(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    assert main([*([] if command is None else [command]), "--help"]) == 0
+    out = capsys.readouterr().out
+    if command is None:
+        # Whole sentences, none cut off.
+        assert "..." not in out.split("\n", 1)[1].replace("B C ...", "")
+    # Examples are there to be copied and are not wrapped.
+    prose = [line for line in out.splitlines() if not line.lstrip().startswith(("$", "trihedron"))]
+    assert max(map(len, prose)) <= 60
+    for line in [line for line in out.splitlines() if line.lstrip().startswith("$ trihedron")]:
+        used = line.split()[2]
+        main([used, "--help"])
+        known = capsys.readouterr().out
+        for option in re.findall(r" (--?[a-z][a-z-]*)", line):
+            assert option in known, (line, option)

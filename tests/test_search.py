@@ -1,4 +1,4 @@
-"""The one search by one evidence: what joins, what is swapped, what every candidate's row says."""
+"""The one search by one evidence: what is named, what joins, what is swapped, what every candidate's row says."""
 
 from dataclasses import replace
 from functools import cache
@@ -127,3 +127,37 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     thermal = effects["gyro-thermal-bias"]
     assert thermal.confounded_with == ("gyro-bias-drift",)
     assert "temperature" in thermal.separating_experiment
+
+
+CASES = {
+    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
+    "timing-jitter": {"jitter_s": 1e-3},
+}
+
+
+@pytest.mark.parametrize("effect_id", CASES)
+def test_the_mechanism_is_named_first(effect_id):
+    diagnosis = diagnosed(effect_id, n_poses=14, **CASES[effect_id])
+    assert diagnosis.verdict == "missing-physics"
+    assert diagnosis.effects[0].id == effect_id
+
+
+def test_missing_codes_are_counted_and_lost_ones_by_chance_are_not():
+    # Every fourth code of 20 to 60 visited per axis is missing; healthy adis has codes that chance left empty.
+    diagnosis = diagnosed("quantisation", 5, 14, grade="adis", sensor="accelerometer", missing_every=4)
+    assert diagnosis.effects[0].id == "quantisation"
+    missing = [p.value for p in diagnosis.effects[0].parameters if p.name.startswith("missing_codes")]
+    assert len(missing) == 3
+    assert min(missing) >= 5
+    assert all(e.id != "quantisation" for e in diagnosed("", 5, 14, "adis").effects)
+
+
+def test_a_dead_band_is_measured():
+    # Gyro readings within 60 counts of zero do not move; half-width to one count of 60.
+    diagnosis = diagnosed("quantisation", 6, 14, sensor="gyroscope", dead_band=60.0)
+    assert diagnosis.effects[0].id == "quantisation"
+    scale = np.abs(np.diag(np.array(diagnosis.extended.gyroscope["S"])))
+    for axis, name in enumerate("xyz"):
+        found = [p.value for p in diagnosis.effects[0].parameters if p.name == f"dead_band_g{name}"]
+        assert found
+        assert abs(found[0] / scale[axis] - 60.0) < 2.0

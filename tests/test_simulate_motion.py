@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from trihedron import _core
-from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate, hand_session
+from trihedron.simulate import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate
 from trihedron.simulate.motion.attitude import attitude_with_up, up_in_body
 from trihedron.simulate.motion.plan import plan_motion
 
@@ -107,17 +107,6 @@ def test_a_move_ends_with_the_asked_direction_up_and_a_turn_leaves_it():
     want = np.array([0.2, -3.0, 1.0]) / np.linalg.norm([0.2, -3.0, 1.0])
     for row in q:
         assert np.abs(up_in_body(tuple(row)) - want).max() < 1e-14
-
-
-def test_a_hold_shows_gravity_and_nothing_else():
-    plan = plan_motion(hand_session(), np.random.default_rng(0))
-    for label in plan.labels:
-        if label.kind == "pose":
-            q, w, a, f = plan.evaluate(np.linspace(label.start_s + 1e-9, label.stop_s - 1e-9, 7), G)
-            assert not w.any()
-            assert not a.any()
-            assert np.abs(np.linalg.norm(f, axis=1) - G).max() < 1e-13
-            assert np.ptp(q, axis=0).max() == 0.0
 
 
 def test_a_motion_without_steps_or_with_a_step_of_no_duration_is_refused():

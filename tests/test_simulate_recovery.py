@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from trihedron import _core
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.session.solved import calibrate_moves
-from trihedron.simulate import Clock, NoiseTerms, list_scenarios, make_noise, scenario_by_name, simulate
+from trihedron.simulate import Clock, NoiseTerms, make_noise, scenario_by_name, simulate
 from true_segments import segments_from_truth
 
 
@@ -53,19 +55,10 @@ def test_labels_cover_the_recording_and_holds_stand_still():
     for before, after in zip(truth.segments, truth.segments[1:], strict=False):
         assert before.stop == after.start
     for pose in truth.poses:
-        assert not truth.angular_rate_rad_s[pose.start : pose.stop].any()
-
-
-def test_every_named_scenario_says_what_it_is():
-    for name, sentence in list_scenarios().items():
-        assert scenario_by_name(name).name == name
-        assert sentence.endswith(".")
-
-
-def slow_allan_variance(x, m):
-    """Overlapping Allan variance of rate data by block means, straight from its definition."""
-    means = np.lib.stride_tricks.sliding_window_view(x, m).mean(axis=1)
-    return 0.5 * np.mean((means[m:] - means[:-m]) ** 2)
+        rows = slice(pose.start, pose.stop)
+        assert not truth.angular_rate_rad_s[rows].any()
+        assert np.ptp(truth.specific_force_m_s2[rows], axis=0).max() == 0.0
+        assert np.linalg.norm(truth.specific_force_m_s2[pose.start]) == pytest.approx(truth.gravity_m_s2, rel=1e-14)
 
 
 DT = 0.02
@@ -92,16 +85,14 @@ EXPECTED = {
 }
 
 
-def realisations(term, size=1.0):
-    terms = NoiseTerms(**{term: (size, size, size)})
-    return np.concatenate([make_noise(terms, N_SAMPLES, DT, seed, "gyroscope").T for seed in range(N_SEEDS)])
-
-
 @pytest.mark.parametrize("term", list(EXPECTED))
 def test_the_allan_variance_of_a_term_is_the_one_that_defines_it(term):
-    series = realisations(term)
+    terms = NoiseTerms(**{term: (1.0,) * 3})
+    series = np.concatenate([make_noise(terms, N_SAMPLES, DT, seed, "gyroscope").T for seed in range(N_SEEDS)])
     for m in CLUSTERS:
-        variances = np.array([slow_allan_variance(x, m) for x in series])
+        # Overlapping, by block means, straight from its definition.
+        means = np.lib.stride_tricks.sliding_window_view(series, m, axis=1).mean(axis=2)
+        variances = 0.5 * np.mean((means[:, m:] - means[:, :-m]) ** 2, axis=1)
         error = variances.std(ddof=1) / np.sqrt(len(variances))
         # Four standard errors of the mean over realisations; the 1/f spectrum itself is made to 3 %, and the ramp has
         # no randomness but rounding.
@@ -119,6 +110,73 @@ def test_terms_axes_sensors_and_seeds_have_independent_streams():
     assert np.abs(correlation).max() < 4.5 / np.sqrt(20_000)
 
 
-def test_a_negative_coefficient_is_refused():
-    with pytest.raises(ValueError, match="noise term N"):
-        NoiseTerms(N=(-1.0, 0.0, 0.0))
+def test_white_noise_has_the_normal_distribution():
+    x = make_noise(NoiseTerms(N=(1.0,) * 3), 700_000, 1.0, 11, "gyroscope").ravel()
+    n = len(x)
+    # The last two reach into the ziggurat's tail. Four standard deviations of a binomial count.
+    for edge in (-1.0, 0.0, 0.3, 2.0, 3.7, -4.2):
+        p = stats.norm.cdf(edge)
+        assert abs(np.sum(x < edge) - n * p) < 4.0 * np.sqrt(n * p * (1.0 - p)), edge
+    assert abs(x.mean()) < 4.0 / np.sqrt(n)
+    assert abs(np.mean(x**2) - 1.0) < 4.0 * np.sqrt(2.0 / n)
+
+
+def three(values):
+    """(n, 3) one signal in three channels."""
+    return np.tile(np.reshape(values, (-1, 1)), 3).astype(float)
+
+
+def test_a_resonator_settles_on_a_step_as_its_closed_form_says():
+    dt, f0, q = 1e-3, 12.0, 2.5
+    w = 2.0 * np.pi * f0
+    damping, ringing, c = w / (2.0 * q), w * np.sqrt(1.0 - 1.0 / (4.0 * q * q)), 1.0 / (q * w)
+
+    def integral(t):
+        """Of the step's response."""
+        swing = c * np.cos(ringing * t) + (c * damping - 1.0) / ringing * np.sin(ringing * t)
+        return np.where(t > 0.0, t - c + np.exp(-damping * t) * swing, 0.0)
+
+    t = dt * np.arange(400)
+    found = _core.simulate_second_order(three(t > 0.0), dt, [f0] * 3, [q] * 3)
+    # Straight lines between samples: the step is a ramp of one dt.
+    np.testing.assert_allclose(found[:, 0], (integral(t) - integral(t - dt)) / dt, rtol=0, atol=1e-11)
+
+
+def test_stages_rest_at_rest_and_far_too_stiff_ones_follow_at_once():
+    x = _core.simulate_second_order(np.full((50, 3), 3.0), 0.01, [5.0] * 3, [0.7] * 3)
+    x = _core.simulate_creep(_core.simulate_first_order(x, 0.01, [1.0] * 3), 0.01, [0.01] * 3, [20.0] * 3)
+    np.testing.assert_allclose(_core.simulate_play(x, [1.0] * 3, [0.1] * 3), 3.0, rtol=0, atol=1e-12)
+    # 5 kHz and Q = 0.02: the slow root of an overdamped pair sits at 100 Hz, still settled within one 0.1 s step.
+    ramp = _core.simulate_second_order(three(np.arange(50)), 0.1, [5000.0] * 3, [0.02] * 3)
+    assert ramp[40, 1] == pytest.approx(40.0 - 1.0 / (0.02 * 2.0 * np.pi * 5000.0) / 0.1, abs=1e-9)
+    with pytest.raises(ValueError, match=r"\w"):
+        _core.simulate_second_order(ramp, 0.1, [0.0] * 3, [1.0] * 3)
+    with pytest.raises(ValueError, match=r"\w"):
+        _core.simulate_first_order(ramp, 0.1, [-1.0] * 3)
+
+
+def test_mismatched_plates_keep_rest_at_zero_and_the_small_signal_gain_at_one():
+    h = 1e-3
+    x = _core.simulate_bridge(three([0.0, h, -h]), [1e-3] * 3, [0.0] * 3, [0.0] * 3, [0.05, -0.1, 0.0])
+    np.testing.assert_allclose(x[0], 0.0, atol=1e-12)
+    np.testing.assert_allclose((x[1] - x[2]) / (2.0 * h), 1.0, rtol=0, atol=1e-9)
+
+
+def test_resampling_is_exact_for_cubics_and_refuses_what_lies_outside():
+    f = np.polynomial.Polynomial([1.0, 2.0, -0.5, 0.25])
+    signal, times = three(f(0.1 * np.arange(20) - 0.3)), np.array([-0.3, -0.25, 0.0, 0.777, 1.5, 1.6])
+    found = _core.simulate_resample(signal, -0.3, 0.1, times)
+    np.testing.assert_allclose(found[:, 0], f(times), rtol=0, atol=1e-13)
+    for few, at in ((signal, 1.7), (signal[:3], 0.0)):
+        with pytest.raises(ValueError, match=r"\w"):
+            _core.simulate_resample(few, -0.3, 0.1, np.array([at]))
+
+
+def test_a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band():
+    x = three([0.6, 1.1, 2.4, 2.6, 9.0, -9.0])
+    out = _core.simulate_convert(x, 0.5, -4.0, 4.0, 0.8, [0.0, 1.0, 0.0], 5)
+    # Code 5 (2.5) and code 0 are missing; 0.6 is asleep in channels 1 (at 0, whose code is missing) and 2 (at 1).
+    assert out[:2].tolist() == [[-0.5, 1.0, -0.5], [1.0] * 3]
+    assert out[2:, 0].tolist() == [2.0, 2.0, 4.0, -4.0]
+    with pytest.raises(ValueError, match=r"\w"):
+        _core.simulate_convert(x, 0.5, 5.0, 4.0, 0.8, [0.0, 1.0, 0.0], 5)

@@ -1,10 +1,10 @@
-//! Poisson integration: closed forms, order of convergence, sensitivities against differences, bad input.
+//! Poisson integration: every instruction set against single steps. Order, derivatives, input: `tests/test_attitude.py`.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use trihedron::poisson::{
     MoveRange, PreparedMove, RateModel, RateNoise, Turn, prepare, step_weights,
 };
-use trihedron::rotation::{exp, exp_and_left_jacobian, log, skew};
+use trihedron::rotation::{exp, exp_and_left_jacobian, skew};
 use trihedron::simd::Instructions;
 
 const MODELS: [RateModel; 3] = [RateModel::Constant, RateModel::Linear, RateModel::Coning];
@@ -43,10 +43,6 @@ fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMov
     prepare(time, raw, &range(time), model).expect("a valid move")
 }
 
-fn run(p: &PreparedMove, s: &Matrix3<f64>, b0: &Vector3<f64>, b1: &Vector3<f64>) -> Turn {
-    p.integrate(s, b0, b1, &QUIET)
-}
-
 /// A rate whose direction wanders, so that the commutator matters.
 fn wandering(t: f64) -> Vector3<f64> {
     Vector3::new(
@@ -62,124 +58,6 @@ fn sampled(time: &[f64], magnitude: f64) -> Vec<Vector3<f64>> {
 
 fn scale() -> Matrix3<f64> {
     Matrix3::new(1.1, 0.02, -0.03, 0.01, 0.9, 0.04, -0.05, 0.02, 1.05)
-}
-
-#[test]
-fn each_model_converges_at_its_order_on_irregular_timestamps() {
-    let reference = {
-        let time = timestamps(40_001, 2.0, 0.0);
-        let raw = sampled(&time, 1.0);
-        run(
-            &prepared(&time, &raw, RateModel::Coning),
-            &scale(),
-            &Vector3::zeros(),
-            &Vector3::zeros(),
-        )
-        .rotation
-    };
-    for (model, order) in MODELS.into_iter().zip([1.0, 2.0, 4.0]) {
-        let error = |n: usize| {
-            let time = timestamps(n, 2.0, 0.2);
-            let p = prepared(&time, &sampled(&time, 1.0), model);
-            let b = run(&p, &scale(), &Vector3::zeros(), &Vector3::zeros()).rotation;
-            log(&(b * reference.transpose())).norm()
-        };
-        let seen = (error(101) / error(1601)).log2() / 4.0;
-        // Jitter scatters the leading coefficient by some ten per cent: a quarter of an order over four octaves.
-        assert!(
-            (seen - order).abs() < 0.3,
-            "{model:?} converges with order {seen}"
-        );
-    }
-}
-
-#[test]
-fn sensitivities_match_differences_at_zero_tiny_and_ordinary_rates() {
-    for model in MODELS {
-        for magnitude in [0.0, 1e-7, 1.0] {
-            let time = timestamps(60, 2.5, 0.2);
-            let p = prepared(&time, &sampled(&time, magnitude), model);
-            let (b0, b1) = (
-                Vector3::new(0.01, -0.02, 0.005) * magnitude,
-                Vector3::new(-0.03, 0.01, 0.02) * magnitude,
-            );
-            let turn = run(&p, &scale(), &b0, &b1);
-            let step = 1e-5;
-            // Central differences: truncation ~ step² |∫w'|³ < 1e-9, rounding 1e-15/step = 1e-10.
-            let check =
-                |plus: Matrix3<f64>, minus: Matrix3<f64>, theta: Vector3<f64>, what: &str| {
-                    let numeric = (plus - minus) / (2.0 * step);
-                    let gap = (numeric - turn.derivative(&theta)).norm();
-                    assert!(
-                        gap < 3e-9,
-                        "{model:?} at {magnitude}: {what} is off by {gap}"
-                    );
-                };
-            for i in 0..3 {
-                for j in 0..3 {
-                    let mut d = Matrix3::zeros();
-                    d[(i, j)] = step;
-                    check(
-                        run(&p, &(scale() + d), &b0, &b1).rotation,
-                        run(&p, &(scale() - d), &b0, &b1).rotation,
-                        turn.wrt_scale.column(3 * i + j).into(),
-                        "S",
-                    );
-                }
-                let mut d = Vector3::zeros();
-                d[i] = step;
-                check(
-                    run(&p, &scale(), &(b0 + d), &b1).rotation,
-                    run(&p, &scale(), &(b0 - d), &b1).rotation,
-                    turn.wrt_bias_before.column(i).into(),
-                    "bias before",
-                );
-                check(
-                    run(&p, &scale(), &b0, &(b1 + d)).rotation,
-                    run(&p, &scale(), &b0, &(b1 - d)).rotation,
-                    turn.wrt_bias_after.column(i).into(),
-                    "bias after",
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn lost_rows_and_repeated_timestamps_are_bridged() {
-    let time = timestamps(101, 2.0, 0.0);
-    let w = Vector3::new(0.4, 0.1, -0.2);
-    let mut raw = vec![w; 101];
-    raw[40] = Vector3::repeat(f64::NAN);
-    let mut stamped = time.clone();
-    stamped[60] = stamped[59];
-    for model in MODELS {
-        let turn = run(
-            &prepared(&stamped, &raw, model),
-            &Matrix3::identity(),
-            &Vector3::zeros(),
-            &Vector3::zeros(),
-        );
-        assert!(
-            (turn.rotation - exp(&(-w * 2.0))).norm() < 1e-13,
-            "{model:?}"
-        );
-    }
-}
-
-#[test]
-fn a_range_outside_the_record_is_refused() {
-    let time = timestamps(10, 1.0, 0.0);
-    let raw = vec![Vector3::zeros(); 10];
-    let mut wrong = range(&time);
-    wrong.stop = 11;
-    assert!(prepare(&time, &raw, &wrong, RateModel::Linear).is_err());
-    let mut backward = time.clone();
-    backward.swap(3, 4);
-    assert!(prepare(&backward, &raw, &range(&time), RateModel::Linear).is_err());
-    let mut merged = range(&time);
-    merged.anchor_after_s = merged.anchor_before_s;
-    assert!(prepare(&time, &raw, &merged, RateModel::Linear).is_err());
 }
 
 /// The sums of equation (5.4), one step and one matrix product after the other.

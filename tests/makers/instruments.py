@@ -5,35 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from hand_made_sessions import G
-from makers.layout import COUNTS, EPOCH_S, SI, Layout, dates, in_si, layout, nanoseconds, session, written
+from makers.layout import EPOCH_S, SI, Layout, dates, in_si, layout, nanoseconds, session, text, written
 
 
-@layout
-def euroc() -> Layout:
+@text("ETH ASL (EuRoC)", "data.csv", 200)
+def euroc(s, a, w):
     """ASL dataset format (ETH ASL, EuRoC MAV): imu0/data.csv."""
-    s = session(200)
-    a, w = in_si(s)
     head = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
     head += "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n"
-    return Layout(
-        "ETH ASL (EuRoC)", {"data.csv": (head + written(nanoseconds(s), *w.T, *a.T)).encode()}, 200, a, w, SI, s.n
-    )
+    return head + written(nanoseconds(s), *w.T, *a.T)
 
 
-@layout
-def kalibr() -> Layout:
+@text("Kalibr", "imu0.csv", 200)
+def kalibr(s, a, w):
     """Kalibr wiki, 'Bag format': imu0.csv of bagcreater and bagextractor, omega [rad/s], alpha [m/s²], ns."""
-    s = session(200)
-    a, w = in_si(s)
     head = "timestamp,omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z\n"
-    return Layout("Kalibr", {"imu0.csv": (head + written(nanoseconds(s), *w.T, *a.T)).encode()}, 200, a, w, SI, s.n)
+    return head + written(nanoseconds(s), *w.T, *a.T)
 
 
-@layout
-def movella_dot() -> Layout:
+@text("Movella DOT", "dot.csv", 60, ("m/s^2", "deg/s"))
+def movella_dot(s, a, w):
     """Movella DOT app and Data Exporter: preamble, SampleTimeFine in microseconds, FreeAcc beside Acc, Gyr in deg/s."""
-    s = session(60)
-    a, w = np.round(s.force, 6), np.round(np.degrees(s.rate), 6)
     head = "sep=,\nDeviceTag:,Movella DOT 1\nFirmwareVersion:,2.4.0\nAppVersion:,2023.6.1\nSyncStatus:,Synced\n"
     head += "OutputRate:,60Hz\nFilterProfile:,General\nMeasurement Mode:,Custom Mode 5\n"
     head += "StartTime:,2024-03-01_12-00-00_000\n© Movella Technologies B. V. 2005-2023\n\n"
@@ -42,21 +34,17 @@ def movella_dot() -> Layout:
     k = np.arange(s.n)
     fine = (4186350000 + np.rint(k * 1e6 / 60)).astype(np.int64) % 2**32
     other = [np.round(0.01 * np.random.default_rng(i).standard_normal(s.n), 6) for i in range(9)]
-    body = written(k, fine, *other[:6], *a.T, *w.T, *other[6:], end=",\n")
-    return Layout("Movella DOT", {"dot.csv": (head + body).encode()}, 60, a, w, ("m/s^2", "deg/s"), s.n)
+    return head + written(k, fine, *other[:6], *a.T, *w.T, *other[6:], end=",\n")
 
 
-@layout
-def xsens_mt_manager() -> Layout:
+@text("Xsens MTi (MT Manager)", "MT_0380.txt", 100)
+def xsens_mt_manager(s, a, w):
     """MT Manager ASCII export: // lines, then names and tabs; SampleTimeFine counts 100 µs."""
-    s = session(100)
-    a, w = in_si(s)
     head = "// Start Time: Unknown\n// Update Rate: 100.0Hz\n// Filter Profile: general\n// Firmware Version: 1.8.2\n"
     head += "PacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tMag_X\tMag_Y\tMag_Z\n"
     k = np.arange(s.n)
     mag = [np.round(0.4 + 0.001 * np.random.default_rng(i).standard_normal(s.n), 6) for i in range(3)]
-    body = written(k + 100, 51000 + 100 * k, *a.T, *w.T, *mag, separator="\t", form="{}")
-    return Layout("Xsens MTi (MT Manager)", {"MT_0380.txt": (head + body).encode()}, 100, a, w, SI, s.n)
+    return head + written(k + 100, 51000 + 100 * k, *a.T, *w.T, *mag, separator="\t", form="{}")
 
 
 @layout
@@ -72,30 +60,18 @@ def ardupilot_csv() -> Layout:
             numbers = ",".join(repr(float(v)) for v in values)
             lines.append(f"{EPOCH_S + us * 1e-6:.8f},{us},{i},{numbers},0,0,{40 + i},1,1,2000,2000\n")
     a, w = np.round(second.force, 7), np.round(second.rate, 9)
-    return Layout(
-        "ArduPilot (mavlogdump CSV, 2 IMUs)",
-        {"IMU.csv": (head + "".join(lines)).encode()},
-        50,
-        a,
-        w,
-        SI,
-        2 * first.n,
-        {"instance": 1},
-    )
+    files = {"IMU.csv": (head + "".join(lines)).encode()}
+    return Layout("ArduPilot (mavlogdump CSV, 2 IMUs)", files, 50, a, w, SI, 2 * first.n, {"instance": 1})
 
 
-@layout
-def px4_ulog2csv() -> Layout:
+@text("PX4 (ulog2csv)", "log_sensor_combined_0.csv", 250)
+def px4_ulog2csv(s, a, w):
     """pyulog's ulog2csv: sensor_combined, microseconds."""
-    s = session(250)
-    a, w = in_si(s)
     head = "timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],gyro_integral_dt,accelerometer_timestamp_relative,"
     head += "accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2],accelerometer_integral_dt\n"
     us = 112500000 + 4000 * np.arange(s.n)
     fill = np.full(s.n, 4000)
-    body = written(us, *w.T, fill, 0 * fill, *a.T, fill)
-    name = "log_sensor_combined_0.csv"
-    return Layout("PX4 (ulog2csv)", {name: (head + body).encode()}, 250, a, w, SI, s.n)
+    return head + written(us, *w.T, fill, 0 * fill, *a.T, fill)
 
 
 @layout
@@ -113,11 +89,9 @@ def px4_ulog2csv_two_topics() -> Layout:
     return Layout("PX4 (ulog2csv, two topics)", files, 200, a, w, SI, 2 * s.n, {}, True)
 
 
-@layout
-def rostopic_echo() -> Layout:
+@text("ROS (rostopic echo -p)", "imu.csv", 100)
+def rostopic_echo(s, a, w):
     """rostopic echo -b -p /imu: ``field.header.stamp`` in ns, covariances between."""
-    s = session(100)
-    a, w = in_si(s)
     cov = [f"field.{{}}_covariance{i}" for i in range(9)]
     names = ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id"]
     names += [f"field.orientation.{x}" for x in "xyzw"] + [c.format("orientation") for c in cov]
@@ -127,104 +101,75 @@ def rostopic_echo() -> Layout:
     timestamps = nanoseconds(s)
     q = [np.zeros(s.n)] * 3 + [np.ones(s.n)]
     body = written(timestamps, np.arange(s.n), timestamps, ["imu"] * s.n, *q, *zeros, *w.T, *zeros, *a.T, *zeros)
-    return Layout("ROS (rostopic echo -p)", {"imu.csv": (",".join(names) + "\n" + body).encode()}, 100, a, w, SI, s.n)
+    return ",".join(names) + "\n" + body
 
 
-@layout
-def shimmer_consensys() -> Layout:
+@text("Shimmer (Consensys)", "shimmer.csv", 128, ("m/s^2", "deg/s"), (9, 9))
+def shimmer_consensys(s, a, w):
     """ConsensysPRO export: sep line, names, units; two accelerometers, battery in mV, Unix ms."""
-    s = session(128)
-    a, w = np.round(s.force, 9), np.round(np.degrees(s.rate), 9)
     prefix = "Shimmer_7EEB_"
-    names = [
-        "Timestamp_Unix_CAL",
-        *(f"Accel_LN_{x}_CAL" for x in "XYZ"),
-        "Battery_CAL",
-        *(f"Gyro_{x}_CAL" for x in "XYZ"),
-    ]
+    names = ["Timestamp_Unix_CAL", *(f"Accel_LN_{x}_CAL" for x in "XYZ"), "Battery_CAL"]
+    names += [f"Gyro_{x}_CAL" for x in "XYZ"]
     units = ["ms", *["m/(s^2)"] * 3, "mV", *["deg/s"] * 3]
     head = '"sep=\t"\n' + "\t".join(prefix + n for n in names) + "\t\n" + "\t".join(units) + "\t\n"
     ms = 1000 * EPOCH_S + 1000 * s.time_s
-    body = written(ms, *a.T, np.full(s.n, 4100.5), *w.T, separator="\t", end="\t\n")
-    return Layout("Shimmer (Consensys)", {"shimmer.csv": (head + body).encode()}, 128, a, w, ("m/s^2", "deg/s"), s.n)
+    return head + written(ms, *a.T, np.full(s.n, 4100.5), *w.T, separator="\t", end="\t\n")
 
 
-@layout
-def shimmer_four_lines() -> Layout:
+@text("Shimmer (Capture)", "capture.dat", 51.2, ("m/s^2", "deg/s"))
+def shimmer_four_lines(s, a, w):
     """Shimmer Capture and LogAndStream: device, names, CAL/RAW, units."""
-    s = session(51.2)
-    a, w = np.round(s.force, 6), np.round(np.degrees(s.rate), 6)
     names = ["Timestamp", *(f"Accelerometer {x}" for x in "XYZ"), *(f"Gyroscope {x}" for x in "XYZ")]
     rows = [["Shimmer 8A5B"] * 7, names, ["CAL"] * 7, ["mSecs", *["m/(sec^2)"] * 3, *["deg/sec"] * 3]]
     head = "".join("\t".join(r) + "\n" for r in rows)
-    body = written(1000 * s.time_s, *a.T, *w.T, separator="\t")
-    return Layout("Shimmer (Capture)", {"capture.dat": (head + body).encode()}, 51.2, a, w, ("m/s^2", "deg/s"), s.n)
+    return head + written(1000 * s.time_s, *a.T, *w.T, separator="\t")
 
 
-@layout
-def betaflight() -> Layout:
+@text("Betaflight (blackbox_decode)", "LOG00001.01.csv", 500, counts=(2048, 1))
+def betaflight(s, a, w):
     """blackbox_decode: blanks behind the commas, gyroADC in whole deg/s (gyro_scale 1), accSmooth with acc_1G 2048."""
-    s = session(500)
-    a, w = np.rint(2048 * s.force / G), np.rint(np.degrees(s.rate))
     names = ["loopIteration", "time (us)", *(f"axisP[{i}]" for i in range(3)), *(f"gyroADC[{i}]" for i in range(3))]
     names += [*(f"accSmooth[{i}]" for i in range(3)), *(f"motor[{i}]" for i in range(4)), "flightModeFlags (flags)"]
     k = np.arange(s.n)
     zeros = [np.zeros(s.n, dtype=int)] * 3
     motors = [np.full(s.n, 48)] * 4
-    body = written(
-        4 * k, 9_000_000 + 2000 * k, *zeros, *w.astype(int).T, *a.astype(int).T, *motors, ["0"] * s.n, separator=", "
-    )
-    text = ", ".join(names) + "\n" + body
-    return Layout("Betaflight (blackbox_decode)", {"LOG00001.01.csv": text.encode()}, 500, a, w, COUNTS, s.n)
+    body = written(4 * k, 9_000_000 + 2000 * k, *zeros, *w.T, *a.T, *motors, ["0"] * s.n, separator=", ")
+    return ", ".join(names) + "\n" + body
 
 
-@layout
-def actigraph() -> Layout:
+@text("ActiGraph GT9X", "IMU.csv", 100, ("g", "deg/s"))
+def actigraph(s, a, w):
     """ActiGraph GT9X Link IMU export of ActiLife: ten lines of preamble, month first, seven digits of a second."""
-    s = session(100)
-    a, w = np.round(s.force / G, 6), np.round(np.degrees(s.rate), 6)
     head = "------------ Data Table File Created By ActiGraph GT9X Link ActiLife v6.13.4 Firmware v1.7.2 "
     head += "date format M/d/yyyy at 100 Hz  Filter Normal -----------\nSerial Number: TAS1D48140206\n"
     head += "Start Time 12:00:00\nStart Date 3/1/2024\nEpoch Period (hh:mm:ss) 00:00:00\nDownload Time 13:25:46\n"
     head += "Download Date 3/2/2024\nCurrent Memory Address: 0\nCurrent Battery Voltage: 4.18     Mode = 12\n"
     head += "--------------------------------------------------\n"
-    head += (
-        "Timestamp,Accelerometer X,Accelerometer Y,Accelerometer Z,Temperature,Gyroscope X,Gyroscope Y,Gyroscope Z\n"
-    )
+    head += "Timestamp," + "".join(f"Accelerometer {x}," for x in "XYZ")
+    head += "Temperature,Gyroscope X,Gyroscope Y,Gyroscope Z\n"
     timestamps = [x + "0" for x in dates(s, "%m/%d/%Y %H:%M:%S.%f")]
-    body = written(timestamps, *a.T, np.full(s.n, 26.5), *w.T)
-    return Layout("ActiGraph GT9X", {"IMU.csv": (head + body).encode()}, 100, a, w, ("g", "deg/s"), s.n)
+    return head + written(timestamps, *a.T, np.full(s.n, 26.5), *w.T)
 
 
-@layout
-def axivity() -> Layout:
+@text("Axivity AX6", "ax6.csv", 100, ("g", "deg/s"))
+def axivity(s, a, w):
     """Axivity AX6 by OmGui or cwa-convert: no names, a date, g and deg/s."""
-    s = session(100)
-    a, w = np.round(s.force / G, 6), np.round(np.degrees(s.rate), 6)
-    body = written(dates(s, "%Y-%m-%d %H:%M:%S.%f", 3), *a.T, *w.T)
-    return Layout("Axivity AX6", {"ax6.csv": body.encode()}, 100, a, w, ("g", "deg/s"), s.n)
+    return written(dates(s, "%Y-%m-%d %H:%M:%S.%f", 3), *a.T, *w.T)
 
 
-@layout
-def ximu3() -> Layout:
+@text("x-io x-IMU3", "Inertial.csv", 100, ("g", "deg/s"))
+def ximu3(s, a, w):
     """x-IMU3 software: Inertial.csv, microseconds, deg/s and g."""
-    s = session(100)
-    a, w = np.round(s.force / G, 6), np.round(np.degrees(s.rate), 6)
     names = ["Timestamp (us)", *(f"Gyroscope {x} (deg/s)" for x in "XYZ"), *(f"Accelerometer {x} (g)" for x in "XYZ")]
-    us = 392093562 + 10000 * np.arange(s.n)
-    text = ",".join(names) + "\n" + written(us, *w.T, *a.T)
-    return Layout("x-io x-IMU3", {"Inertial.csv": text.encode()}, 100, a, w, ("g", "deg/s"), s.n)
+    return ",".join(names) + "\n" + written(392093562 + 10000 * np.arange(s.n), *w.T, *a.T)
 
 
-@layout
-def st_mems() -> Layout:
+@text("ST MEMS Studio", "lsm6dso.csv", 104, ("mg", "mdeg/s"), (0, 0))
+def st_mems(s, a, w):
     """ST MEMS Studio and Unicleo: mg and mdps in brackets, microseconds."""
-    s = session(104)
-    a, w = np.rint(1000 * s.force / G), np.rint(1000 * np.degrees(s.rate))
     names = ["time[us]", *(f"acc_{x}[mg]" for x in "xyz"), *(f"gyro_{x}[mdps]" for x in "xyz")]
     us = np.rint(np.arange(s.n) * 1e6 / 104).astype(int)
-    text = ",".join(names) + "\n" + written(us, *a.astype(int).T, *w.astype(int).T)
-    return Layout("ST MEMS Studio", {"lsm6dso.csv": text.encode()}, 104, a, w, ("mg", "mdeg/s"), s.n)
+    return ",".join(names) + "\n" + written(us, *a.astype(int).T, *w.astype(int).T)
 
 
 @layout
@@ -232,6 +177,6 @@ def empatica() -> Layout:
     """Empatica E4 ACC.csv: start, then rate, then whole numbers of 1/64 g."""
     s = session(32)
     a = np.rint(64 * s.force / G)
-    text = "1709294400.000000, 1709294400.000000, 1709294400.000000\n32.000000, 32.000000, 32.000000\n"
-    text += written(*a.astype(int).T)
-    return Layout("Empatica E4", {"ACC.csv": text.encode()}, 32, a, None, ("counts", "rad/s"), s.n)
+    content = "1709294400.000000, 1709294400.000000, 1709294400.000000\n32.000000, 32.000000, 32.000000\n"
+    content += written(*a.astype(int).T)
+    return Layout("Empatica E4", {"ACC.csv": content.encode()}, 32, a, None, ("counts", "rad/s"), s.n)

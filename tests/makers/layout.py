@@ -12,12 +12,13 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from hand_made_sessions import motion
+from hand_made_sessions import G, motion
 
 EPOCH = datetime(2024, 3, 1, 12, 0, 0)
 EPOCH_S = 1709294400.0
 SI = ("m/s^2", "rad/s")
 COUNTS = ("counts", "counts")
+SIZES = {"m/s^2": 1.0, "g": G, "mg": 1e-3 * G, "rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3}
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,35 @@ LAYOUTS: dict[str, Callable[[], Layout]] = {}
 def layout(make: Callable[[], Layout]) -> Callable[[], Layout]:
     LAYOUTS[make.__name__] = make
     return make
+
+
+def text(
+    maker: str,
+    file: str,
+    rate_hz: float,
+    units: tuple[str, str] = SI,
+    digits: tuple[int, int] = (6, 6),
+    counts: tuple[float, float] | None = None,
+    options: dict[str, object] | None = None,
+) -> Callable[[Callable[..., str]], Callable[[], Layout]]:
+    """A layout of one file of both sensors, of which the function writes the text; ``counts`` per g and per deg/s."""
+
+    def registered(write: Callable[..., str]) -> Callable[[], Layout]:
+        def make() -> Layout:
+            s = session(rate_hz)
+            if counts:
+                a, w = (
+                    np.rint(n * v).astype(int) for n, v in zip(counts, (s.force / G, np.degrees(s.rate)), strict=True)
+                )
+            else:
+                a, w = (np.round(v / SIZES[u], n) for v, u, n in zip((s.force, s.rate), units, digits, strict=True))
+            unit = COUNTS if counts else units
+            return Layout(maker, {file: write(s, a, w).encode()}, rate_hz, a, w, unit, s.n, options or {})
+
+        LAYOUTS[write.__name__] = make
+        return make
+
+    return registered
 
 
 def session(rate_hz: float, seed: int = 1) -> Session:

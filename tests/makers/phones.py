@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 
 from hand_made_sessions import G
-from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, session, written
+from makers.layout import SI, Layout, dates, in_si, layout, nanoseconds, session, text, written
 
 
 @layout
@@ -18,9 +18,8 @@ def gnsslogger() -> Layout:
     a, w = in_si(s, 7)
     head = "# \n# Header Description:\n# \n# Version: v3.0.6.4 Platform: 14 Manufacturer: Google Model: Pixel 7\n# \n"
     head += "# Raw,utcTimeMillis,TimeNanos,LeapSecond,TimeUncertaintyNanos,FullBiasNanos\n# \n"
-    head += (
-        "# Fix,Provider,LatitudeDegrees,LongitudeDegrees,AltitudeMeters,SpeedMps,AccuracyMeters,UnixTimeMillis\n# \n"
-    )
+    head += "# Fix,Provider,LatitudeDegrees,LongitudeDegrees,AltitudeMeters,SpeedMps,AccuracyMeters,"
+    head += "UnixTimeMillis\n# \n"
     head += "# UncalAccel,utcTimeMillis,elapsedRealtimeNanos,UncalAccelXMps2,UncalAccelYMps2,UncalAccelZMps2,"
     head += "BiasXMps2,BiasYMps2,BiasZMps2\n# \n"
     head += "# UncalGyro,utcTimeMillis,elapsedRealtimeNanos,UncalGyroXRadPerSec,UncalGyroYRadPerSec,"
@@ -34,8 +33,8 @@ def gnsslogger() -> Layout:
             lines.append(f"Raw,{ms},{ns},18,12.5,-1393284000000")
             lines.append(f"Fix,GPS,59.94,30.31,12.0,0.0,3.8,{ms}")
             others += 2
-    text = head + "\n".join(lines) + "\n"
-    return Layout("GnssLogger", {"gnss_log.txt": text.encode()}, 100, a, w, SI, 2 * s.n + others, {}, False, True)
+    content = head + "\n".join(lines) + "\n"
+    return Layout("GnssLogger", {"gnss_log.txt": content.encode()}, 100, a, w, SI, 2 * s.n + others, {}, False, True)
 
 
 def _zip(members: dict[str, bytes]) -> bytes:
@@ -97,11 +96,9 @@ def sensor_logger_zip() -> Layout:
     return Layout("Sensor Logger (zip)", {"walk.zip": _zip(members)}, 100, s.force, s.rate, SI, rows, {}, False, True)
 
 
-@layout
-def sensorlog_ios() -> Layout:
+@text("SensorLog (iOS)", "sensorlog.csv", 100, ("g", "rad/s"))
+def sensorlog_ios(s, a, w):
     """SensorLog (B. Thomas, iOS): long names with units, gravity in g in accelerometerAcceleration."""
-    s = session(100)
-    a, w = np.round(s.force / G, 6), np.round(s.rate, 6)
     names = ["loggingTime(txt)", "loggingSample(N)", "accelerometerTimestamp_sinceReboot(s)"]
     names += [f"accelerometerAcceleration{x}(G)" for x in "XYZ"] + ["gyroTimestamp_sinceReboot(s)"]
     names += [f"gyroRotation{x}(rad/s)" for x in "XYZ"] + [f"motionUserAcceleration{x}(G)" for x in "XYZ"]
@@ -109,15 +106,12 @@ def sensorlog_ios() -> Layout:
     zeros = [np.round(0.001 * np.random.default_rng(i).standard_normal(s.n), 6) for i in range(3)]
     timestamps = dates(s, "%Y-%m-%dT%H:%M:%S.%f", 3)
     body = written([f"{x}+01:00" for x in timestamps], np.arange(1, s.n + 1), t, *a.T, t, *w.T, *zeros)
-    text = ",".join(names) + "\n" + body
-    return Layout("SensorLog (iOS)", {"sensorlog.csv": text.encode()}, 100, a, w, ("g", "rad/s"), s.n)
+    return ",".join(names) + "\n" + body
 
 
-@layout
-def androsensor() -> Layout:
+@text("AndroSensor", "Sensor_record.csv", 50, digits=(4, 4))
+def androsensor(s, a, w):
     """AndroSensor: semicolons, names with units, a date whose milliseconds follow a colon."""
-    s = session(50)
-    a, w = np.round(s.force, 4), np.round(s.rate, 4)
     names = [f"ACCELEROMETER {x} (m/s²)" for x in "XYZ"] + [f"GRAVITY {x} (m/s²)" for x in "XYZ"]
     names += [f"LINEAR ACCELERATION {x} (m/s²)" for x in "XYZ"] + [f"GYROSCOPE {x} (rad/s)" for x in "XYZ"]
     names += ["Time since start in ms", "YYYY-MO-DD HH-MI-SS_SSS"]
@@ -125,8 +119,7 @@ def androsensor() -> Layout:
     timestamps = [x.replace(".", ":") for x in dates(s, "%Y-%m-%d %H:%M:%S.%f", 3)]
     ms = np.rint(1000 * s.time_s).astype(int)
     body = written(*a.T, *a.T, *linear, *w.T, ms, timestamps, separator=";")
-    text = ";".join(names) + "\n" + body
-    return Layout("AndroSensor", {"Sensor_record.csv": text.encode()}, 50, a, w, SI, s.n)
+    return ";".join(names) + "\n" + body
 
 
 @layout
@@ -157,24 +150,16 @@ def metabase() -> Layout:
     return Layout("MbientLab MetaBase", files, 100, a, w, ("g", "deg/s"), 2 * s.n, {}, True)
 
 
-@layout
-def physics_toolbox() -> Layout:
+@text("Physics Toolbox", "physics.csv", 100, ("g", "rad/s"), (4, 4))
+def physics_toolbox(s, a, w):
     """Physics Toolbox Sensor Suite, multi record: g-force in g, linear acceleration beside it, angular velocity."""
-    s = session(100)
-    a, w = np.round(s.force / G, 4), np.round(s.rate, 4)
     names = ["time", "gFx", "gFy", "gFz", "TgF", "ax", "ay", "az", "wx", "wy", "wz"]
     linear = [np.round(0.02 * np.random.default_rng(i).standard_normal(s.n), 4) for i in range(3)]
-    text = ",".join(names) + "\n" + written(np.round(s.time_s, 4), *a.T, np.full(s.n, 1.0), *linear, *w.T)
-    return Layout("Physics Toolbox", {"physics.csv": text.encode()}, 100, a, w, ("g", "rad/s"), s.n)
+    return ",".join(names) + "\n" + written(np.round(s.time_s, 4), *a.T, np.full(s.n, 1.0), *linear, *w.T)
 
 
-@layout
-def mars_logger() -> Layout:
+@text("MARS logger", "gyro_accel.csv", 200)
+def mars_logger(s, a, w):
     """MARS logger (Android, iOS): gyro_accel.csv, ns, units in brackets without blanks."""
-    s = session(200)
-    a, w = in_si(s)
     head = "Timestamp[nanosec],gx[rad/s],gy[rad/s],gz[rad/s],ax[m/s^2],ay[m/s^2],az[m/s^2],Unix time[nanosec]\n"
-    ns = 15219875000000 + 5000000 * np.arange(s.n)
-    return Layout(
-        "MARS logger", {"gyro_accel.csv": (head + written(ns, *w.T, *a.T, nanoseconds(s))).encode()}, 200, a, w, SI, s.n
-    )
+    return head + written(15219875000000 + 5000000 * np.arange(s.n), *w.T, *a.T, nanoseconds(s))
