@@ -14,9 +14,10 @@ from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.comparison.model import _with_shared_effects
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
+from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
-from trihedron.records.diagnosis import ParameterDifference
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.diagnosis_numbers import differing_numbers
 from trihedron.report.document import Picture
@@ -46,6 +47,17 @@ def test_of_a_group_that_differs_the_parameters_that_differ_are_named_or_the_one
     ]
     said = differing_numbers(SimpleNamespace(parameters=group))
     assert [one.split()[2] for one in said] == named
+
+
+@pytest.mark.parametrize(("seen", "is_surplus"), [(3.3e-5, False), (-0.4e-5, True)])
+def test_what_the_simulation_has_is_surplus_where_the_recording_excludes_its_size(seen, is_surplus):
+    def vertical(value, std):
+        return (EffectParameter("vertical", value, std, "rad/s"), EffectParameter("north_azimuth", 90.0, 5.0, "deg"))
+
+    given = AcceptedEffect("earth-rate", "", vertical(5.6e-5, 0.3e-5), 1e-9, 40.0, ())
+    tried = Candidate("earth-rate", 0.9, True, size=vertical(seen, 1.5e-5))
+    found = SimpleNamespace(effects=(), domains=(), remaining=(), candidates=(tried,))
+    assert bool(compare_effects([given], found, alpha=0.01).surplus) is is_surplus
 
 
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():

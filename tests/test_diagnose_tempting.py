@@ -92,6 +92,14 @@ def test_play_and_creep_are_told_apart(variant, size):
     assert first.model["variant"] == variant
 
 
+def test_the_earth_is_no_force_on_the_gyro_where_clipped_moves_break_the_chain_of_headings():
+    # Its vertical part along gravity is an isotropic g-sensitivity; its horizontal part needs headings.
+    turning = with_effect(session("tactical"), "earth-rate", latitude_deg=55.0, heading_deg=40.0)
+    found = {one.id for one in diagnosed(with_effect(turning, "gyro-saturation", limit=2.2)).effects}
+    assert "earth-rate" in found
+    assert "gyro-g-sensitivity" not in found
+
+
 def test_a_wrong_scale_is_not_lost_samples():
     scenario = session()
     known = trihedron.calibrate(simulate(scenario, 1)[0], gravity_m_s2=9.80665).calibration
