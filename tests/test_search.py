@@ -30,6 +30,14 @@ def fitted(effect_id="", seed=3, n_poses=14, **size):
     return hypothesis(obs, start_state(obs, calibration), None)
 
 
+def test_a_move_is_found_by_its_pose_whichever_moves_were_left_out_before():
+    # Moves at the gyro's limit were numbered among all moves, and left out of those at no limit of the accelerometer.
+    obs = fitted().obs
+    begins = set(obs.move_poses[[4, 9], 0].tolist())
+    left = obs.without_moves([0, 2, 4])
+    assert [left.move_ranges[m] for m in left.moves_from(begins)] == [obs.move_ranges[9]]
+
+
 def refitted(model, strengths):
     """The model's session without effects at given strengths."""
     state = model.fitted.state

@@ -79,10 +79,10 @@ def _with_one(observed: Observed, effect: DirectEffect, evidence: Evidence, star
     gain, fitted = float(evidence.strength), observed.fitted
     if evidence.reweigh is not None:
         found = [*(one.evidence for one in observed.seen), evidence]
-        obs = evidence.reweigh(observed.obs) if evidence.touched is None else _changed(observed.bare, found)
+        obs = evidence.reweigh(observed.obs) if evidence.begins is None else _changed(observed.bare, found)
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
         fitted = tune_noise(obs, begin, fitted.prior)
-        if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
+        if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.begins):
             return replace(observed, rejected=observed.rejected | {effect.id})
         gain = _explained(observed.fitted, fitted)
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
@@ -99,36 +99,36 @@ def _explained(before: Fit, after: Fit) -> float:
 
 def _changed(bare: Observations, found: list[Evidence]) -> Observations:
     """The bare observations with all corrections; inserted samples come first, as they rebuild the observations."""
-    for evidence in sorted(found, key=lambda one: one.touched is None):
+    for evidence in sorted(found, key=lambda one: one.begins is None):
         if evidence.reweigh is not None:
             bare = evidence.reweigh(bare)
     return bare
 
 
-def _mends(before: Fit, after: Fit, touched: tuple[int, ...] | None) -> bool:
+def _mends(before: Fit, after: Fit, begins: frozenset[int] | None) -> bool:
     """Whether corrected readings (samples inserted, timestamps made even) are predicted better when held out.
 
-    Where only some moves were ``touched``, the misfit of gravity and velocity after these must fall, in units of the
-    dispersion of the other moves: after a jolt that looks like a loss it does not.
+    Where only the moves that begin at some poses were changed, the misfit of gravity and velocity after these must
+    fall, in units of the dispersion of the other moves: after a jolt that looks like a loss it does not.
     """
     was, now = (predict_held_out(fitted, folds_of(fitted)) for fitted in (before, after))
     stays = np.maximum(now.per_row, 1.0)
     gain = float(((was.per_row - now.per_row) * now.n_rows / stays).sum())
     if gain <= 0.0 or not (now.per_row < VISIBLE * was.per_row).any():
         return False
-    if touched is None:
+    if begins is None:
         return True
-    (there, others), (there_after, _) = (_of_moves(*pair, touched) for pair in ((before, was), (after, now)))
+    (there, others), (there_after, _) = (_of_moves(*pair, begins) for pair in ((before, was), (after, now)))
     # The upper quartile: up to a quarter of the other moves may have lost samples too.
     usual = max(float(np.quantile(others, 0.75) / chdtri(1, 0.25)) if len(others) else 1.0, 1.0)
     fall = float(there.sum() - there_after.sum())
     return fall > MIN_FALL * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
 
 
-def _of_moves(fitted: Fit, prediction: Prediction, moves: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Squared held-out residuals of the rows of some moves, and those of all other moves."""
+def _of_moves(fitted: Fit, prediction: Prediction, begins: Collection[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Squared held-out residuals of the rows of the moves that begin at these poses, and those of all other moves."""
     system = fitted.system
     rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
-    named = np.isin(system.segment, moves)
+    named = np.isin(system.segment, fitted.obs.moves_from(begins))
     squared = prediction.residual**2
     return squared[rows & named], squared[rows & ~named]

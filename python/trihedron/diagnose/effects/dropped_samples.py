@@ -297,5 +297,5 @@ class DroppedSamples(DirectEffect):
         p = float(np.exp(-0.5 * clearest)) * n_intervals * most_lost(obs.recording.rate_hz)
         return Evidence(
             p, gain, parameters, statement, "timing", where,
-            reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),
+            reweigh=reweigh, begins=frozenset(obs.move_poses[[loss.move for loss in losses], 0].tolist()),
         )  # fmt: skip

@@ -103,6 +103,7 @@ class _Saturation(DirectEffect):
         if not contradicts and not is_rail:
             return None
         touched = self._near_limit(context, runs, touched, raw)
+        begins = set(obs.move_poses[touched, 0].tolist())
         t = obs.time_s
         times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
         channels = tuple(sorted({"ag"[self.sensor] + AXES[r.axis] for r in runs}))
@@ -116,7 +117,8 @@ class _Saturation(DirectEffect):
         p = min(p, ONE_CODE) if is_rail else p
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
-            Where(channels, obs.move_names(touched[:8]), times), reweigh=lambda old: old.without_moves(touched),
+            Where(channels, obs.move_names(touched[:8]), times),
+            reweigh=lambda old: old.without_moves(old.moves_from(begins)),
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had biased the scale factors
         )  # fmt: skip
 

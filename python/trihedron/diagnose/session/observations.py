@@ -75,6 +75,10 @@ class Observations(SessionReadings):
         keep = [m for m in range(self.n_moves) if m not in bad]
         return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
 
+    def moves_from(self, poses: Collection[int]) -> list[int]:
+        """The moves that begin at these poses. Where moves were left out before, their numbers are others."""
+        return [m for m, (before, _) in enumerate(self.move_poses.tolist()) if before in poses]
+
     @property
     def readings(self) -> FloatArray:
         """(n, 6) readings of both sensors; (n, 3) without a gyro."""
