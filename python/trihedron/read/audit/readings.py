@@ -137,9 +137,10 @@ def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
     n = repeats.n - 1
     expected = float(np.prod(repeats.rates[:, :3], axis=1).mean())
     seen = repeats.count[3] / n
-    # Six standard deviations above the chance of three independent axes, and at least twice that chance.
+    # Six standard deviations above the chance of three independent axes, and at least twice the odds of that chance:
+    # where three of four rows are repeated, each axis repeats as often, and twice that chance is out of reach.
     limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
-    if seen <= max(limit, 2.0 * expected) or repeats.count[3] < 5:
+    if seen <= max(limit, 2.0 * expected / (1.0 + expected)) or repeats.count[3] < 5:
         return []
     longest = int(repeats.longest[3])
     return [
