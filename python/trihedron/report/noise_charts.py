@@ -102,6 +102,10 @@ def part_names(curve: AllanCurve, axes: Sequence[NoiseAxis]) -> list[str]:
     return [part.name for axis in axes if axis.sample_sigma > 0 for part in parts_of(axis, _times(curve))]
 
 
+def _labelled(unit: str) -> str:
+    return f"Allan deviation [{unit}]" if unit else "Allan deviation"
+
+
 def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
     """Curves of one sensor, a panel per axis with equal scales."""
     chosen = [curve.names.index(axis.name) for axis in axes]
@@ -109,7 +113,7 @@ def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Char
     last_s = float(curve.tau_s[-1]) * 1.4
     x = replace(TIME, limits=(float(curve.tau_s[0]) / 1.4, last_s))
     printed = unit_in_print(unit)
-    y = Scale(f"Allan deviation [{printed}]", printed, is_log=True, limits=y_limits)
+    y = Scale(_labelled(printed), printed, is_log=True, limits=y_limits)
     panels = tuple(
         Panel(x, y, _marks(curve, c, axis, k, last_s), title=axis_in_print(axis.name), height_px=270)
         for k, (axis, c) in enumerate(zip(axes, chosen, strict=True))
@@ -127,7 +131,7 @@ def curve_chart(curve: AllanCurve) -> Chart:
         marks.append(Line(curve.tau_s, deviation[:, c], name, AXIS_COLOURS[c % 3]))
     units = {unit_in_print(unit) for unit in curve.units if unit}
     unit = units.pop() if len(units) == 1 else ""
-    y = Scale(f"Allan deviation [{unit}]" if unit else "Allan deviation", unit, is_log=True)
+    y = Scale(_labelled(unit), unit, is_log=True)
     return Chart((Panel(TIME, y, tuple(marks), height_px=270),))
 
 
@@ -156,7 +160,7 @@ def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseA
                 # Placed on the measured curve: the minimum of the fitted sum may be off it.
                 found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
                 marks.append(Points(np.array([best[0]]), np.array([found]), [tip], None, BEST, "accent"))
-        y = Scale(f"Allan deviation [{printed}]", printed, is_log=True)
+        y = Scale(_labelled(printed), printed, is_log=True)
         # Curves before points, so that the axes are together in the legend.
         marks.sort(key=lambda mark: isinstance(mark, Points))
         panels.append(Panel(TIME, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))

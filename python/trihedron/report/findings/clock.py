@@ -61,7 +61,7 @@ _TIMESTAMPS = {
         "The unit of the time column is uncertain: taken as {unit:unit}, its median interval of {step:.6g} makes "
         "{rate_hz:.4g} Hz{has_others:?; {others:&, } would be possible too|}.",
         "The interval alone does not determine the unit; every rate and every noise density depends on it.",
-        "If the time column is not in {unit:unit}, give --time-unit s, ms, us or ns; --rate HZ if it counts rows.",
+        "Confirm {unit:unit} or correct it with --time-unit s, ms, us or ns; --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(
