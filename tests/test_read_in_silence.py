@@ -250,5 +250,7 @@ def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
 def test_a_log_whose_time_counts_rows_says_so_where_its_calibration_is_refused(tmp_path):
     t, force, rate = motion(n_poses=12)
     log = written(tmp_path / "log.csv", *table(range(len(t)), force, rate), header=HEADER.replace("t,", "time,"))
-    with pytest.raises(ValueError, match=r"Poses found: \d\. The unit .* taken as ms.*rate_hz if it counts rows"):
+    with pytest.raises(
+        ValueError, match=r"Poses found: \d\. The unit .* taken as ms.*rate_hz if the column counts rows"
+    ):
         trihedron.calibrate(str(log), gravity_m_s2=G)
