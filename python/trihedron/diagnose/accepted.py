@@ -109,8 +109,7 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
     for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
         is_behind = effect.is_spread or (own is not None and share < HEADLINE)
         is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
-        # What belongs to the motion of one session comes after what belongs to the instrument.
-        rows.append(((is_behind, effect.is_of_motion, -share, is_beside), replace(record, share=share)))
+        rows.append(((is_behind, -share, is_beside), replace(record, share=share)))
     return tuple(record for _, record in sorted(rows, key=lambda row: row[0]))
 
 
