@@ -101,9 +101,7 @@ def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
 
 def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
     if doubted:
-        lacks = f"`trihedron check {doubted[0]}` shows what is missing" if len(doubted) == 1 else ""
-        said = f"Leave out {listed(doubted)}, or record again{f' ({lacks})' if lacks else ''}"
-        return f"{said}, and diagnose the recordings together then."
+        return f"Leave out {listed(doubted)}, or record again, and diagnose the recordings together then."
     if found.findings:
         return found.findings[0].action
     if own:

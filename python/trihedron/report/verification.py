@@ -100,8 +100,7 @@ def use_in_words(v: Verification, what: str) -> str:
         look = "See what the errors are: `trihedron diagnose LOG --calibration FILE`."
         use = f"{look} Where they are acceptable: u{use[1:]}"
     if above and v.is_passed:
-        look = "What differs: `trihedron diagnose LOG --calibration FILE`."
-        return f"{above[0].action} {look} Where the errors are acceptable it may be used as it is."
+        return f"{above[0].action} Where the errors are acceptable it may be used as it is."
     return above[0].action if above else use
 
 

@@ -111,7 +111,8 @@ ENTRIES = {
         "{is_single:?Look at pose {worst_pose}; if it was static, calibrate|{is_bias:?Let the sensor warm up, then "
         "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_offset:?Check gravity (--gravity, "
         "--latitude) and unit; if both are right, calibrate|{is_far:?Check that file, sensor and unit belong together; "
-        "if they do, calibrate|Calibrate}}}}} again near the conditions of use.",
+        "if they do, calibrate|See what differs: `trihedron diagnose LOG --calibration FILE`; or calibrate}}}}} "
+        "again near the conditions of use.",
         or_severity=SERIOUS,
         numbers=("is_far",),
     ),

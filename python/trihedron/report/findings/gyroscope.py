@@ -177,7 +177,8 @@ _MOVES = {
         "since; else samples were lost or the gyro clipped}}}.",
         "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_bias:?Let the sensor "
         "warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that "
-        "file, sensor and unit belong together; if they do, calibrate|Calibrate}}}} again near the conditions of use.",
+        "file, sensor and unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG "
+        "--calibration FILE`; or calibrate}}}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }
