@@ -77,7 +77,7 @@ def calibration_report(
 
 def _headlines(calibration: Calibration) -> list[Headline]:
     """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
-    errors = _errors(calibration)
+    errors = errors_of(calibration)
     held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
     return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
 
@@ -102,7 +102,7 @@ def scale_headlines(calibration: Calibration) -> list[Headline]:
     return uncertain
 
 
-def _errors(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
+def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
     """Gravity and tilt error, how many times the noise alone they are, and whether they are cross-validated."""
     out = []
     quality = calibration.accelerometer.quality
@@ -132,7 +132,7 @@ def errors_in_words(calibration: Calibration) -> str:
     """Cross-validated errors, and how many times the noise they are; empty without any."""
     said = [
         f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
-        for line, times, is_held in _errors(calibration)
+        for line, times, is_held in errors_of(calibration)
         if is_held and times < 1.0 / TINY
     ]
     return f"{listed(said)}, {HELD_OUT}" if said else ""

@@ -10,7 +10,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.records.results import CalibrationResult
-from trihedron.report.calibration import calibration_report
+from trihedron.report.calibration import calibration_report, errors_of
 from trihedron.report.calibration_pictures import orientation_picture
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
@@ -63,11 +63,15 @@ def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:
-    """Cross-validated errors with the effects, beside those without them."""
+    """Cross-validated errors with the effects, beside those of the S and b that a calibration without them saves."""
+    own = getattr(diagnosis, "calibration", None)
+    known = () if own is None else errors_of(own)
+    alone = {line.what: f"S and b alone {with_unit(line.value, line.unit)}" for line, _, is_held in known if is_held}
     found = []
     for linear, one in diagnosis.predicted:
         factor, unit = shown(one.unit)
-        beside = f"without them {with_unit(plain_number(factor * linear.rms), unit)}"
+        without = f"without them {with_unit(plain_number(factor * linear.rms), unit)}"
+        beside = alone.get(MEANING[one.domain], without)
         found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 

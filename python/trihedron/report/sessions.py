@@ -33,6 +33,10 @@ REPEATS = "session to session (1 σ)"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
 NEXT = f"Use the common parameters: {USES}."
+NEXT_DEVICE = (
+    "Use the common parameters for a device that is not calibrated itself: `trihedron apply FILE OTHER_LOG -o "
+)
+NEXT_DEVICE += "corrected.csv`, `trihedron export FILE --to c -o calibration.h`."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -73,7 +77,7 @@ def sessions_report(model: SessionsModel) -> Document:
         sections=tuple(sections),
         headlines=_headlines(model),
         lead=_lead(model),
-        next_step=NEXT if model.is_trustworthy else "",
+        next_step=(NEXT_DEVICE if model.by == "device" else NEXT) if model.is_trustworthy else "",
     )
 
 

@@ -67,6 +67,7 @@ _MOVES = {
         "axes are reversed.",
         "{is_stated:?Leave --axis-signs out, or check its signs|Check the axis directions of the board and state the "
         "accelerometer's with --axis-signs, for example --axis-signs=-++}; the calibration itself corrects the gyro's.",
+        or_severity=SERIOUS,
     ),
     (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
         "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
