@@ -40,7 +40,7 @@ pub struct Loss {
 pub struct Joints {
     /// Losses, clearest first, none within a window of another.
     pub losses: Vec<Loss>,
-    /// Number of joints at which a missing sample would be one.
+    /// Number of joints at which as many missing samples as the median loss has would be one.
     pub telling: usize,
 }
 
@@ -189,28 +189,42 @@ pub fn joints(
         .flat_map(|&[a, b]| a + HALF - 1..b.saturating_sub(HALF + 1).max(a + HALF - 1))
         .filter(|&k| !is_broken[k + 1 - HALF..=k + HALF + 1].contains(&true))
         .collect();
-    let one = |&sample: &usize| {
-        let at = |skipped| known.iter().map(|s| s.window(sample, skipped)).collect();
-        let (whole, cut): (Vec<Window>, Vec<Window>) = (at(0), at(1));
-        if !whole
-            .iter()
-            .chain(&cut)
-            .flatten()
-            .flatten()
-            .all(|v| v.is_finite())
-        {
-            return (None, false);
-        }
-        let loss = likeliest(&known, (sample, &whole), (&coarse, most), least);
-        let cut = likeliest(&known, (sample, &cut), (&[1], 1), least);
-        let is_loss = loss.gain > least && loss.count < most;
-        (is_loss.then_some(loss), cut.over_unrelated > least)
+    let at = |sample: usize, skipped: usize| -> Option<Vec<Window>> {
+        let windows: Vec<Window> = known.iter().map(|s| s.window(sample, skipped)).collect();
+        let is_whole = windows.iter().flatten().flatten().all(|v| v.is_finite());
+        is_whole.then_some(windows)
     };
-    let seen: Vec<(Option<Loss>, bool)> = places.par_iter().map(one).collect();
-    Ok(Joints {
-        telling: seen.iter().filter(|(_, tells)| *tells).count(),
-        losses: apart(seen.iter().filter_map(|(loss, _)| *loss).collect()),
-    })
+    let seen = |&sample: &usize| {
+        at(sample, 0).map(|whole| likeliest(&known, (sample, &whole), (&coarse, most), least))
+    };
+    let losses = apart(
+        places
+            .par_iter()
+            .filter_map(seen)
+            .filter(|loss| loss.gain > least && loss.count < most)
+            .collect(),
+    );
+    // More samples show at more joints than one does.
+    let lost = median_count(&losses, least);
+    let tells = |&&sample: &&usize| {
+        let last = sample + HALF + lost;
+        let cut = (last < n && !is_broken[sample + HALF + 1..=last].contains(&true))
+            .then(|| at(sample, lost))
+            .flatten();
+        cut.is_some_and(|cut| {
+            likeliest(&known, (sample, &cut), (&[lost], lost), least).over_unrelated > least
+        })
+    };
+    let telling = places.par_iter().filter(tells).count();
+    Ok(Joints { losses, telling })
+}
+
+/// The median number of samples missing at losses that nothing else explains; one where there are none.
+fn median_count(losses: &[Loss], least: f64) -> usize {
+    let certain = losses.iter().filter(|one| one.over_unrelated > least);
+    let mut counts: Vec<usize> = certain.map(|one| one.count).collect();
+    counts.sort_unstable();
+    counts.get(counts.len() / 2).copied().unwrap_or(1)
 }
 
 /// The clearest losses, none within a window of another.

@@ -11,9 +11,9 @@ from confidence.sessions import hand
 from diagnosed_session import unit_of
 from trihedron import calibrate
 from trihedron.estimate.gyroscope.lost_samples import could_be_remade, missing_samples
-from trihedron.records import FindingCode, Severity
+from trihedron.records import FindingCode, Recording, Severity
 from trihedron.segment import segment_recording
-from trihedron.simulate import hand_session, simulate
+from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 STEP_S = 0.01
 ROWS = np.arange(60_000)
@@ -90,3 +90,20 @@ def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
     for seed in (5, 6):
         log = session(0.0, seed, move_s, grade)
         assert missing_samples(log, segment_recording(log), 1e-3) == []
+
+
+def test_several_samples_lost_at_a_time_are_counted_at_the_joints_that_show_as_many():
+    # Joints at which one lost sample would show are fewer: the share came out half as large again.
+    beyond, variance = 0.0, 0.0
+    for seed in (4, 5, 6):
+        made, _ = simulate(scenario_by_name("hand-session"), seed)
+        is_lost = np.zeros(made.n_samples, dtype=bool)
+        for first in np.flatnonzero(np.random.default_rng(seed).random(made.n_samples) < 0.01):
+            is_lost[first : first + 3] = True
+        units = {"accelerometer_unit": made.accelerometer_unit, "gyroscope_unit": made.gyroscope_unit}
+        readings = made.accelerometer[~is_lost], made.gyroscope[~is_lost]
+        log = Recording.from_arrays(None, *readings, rate_hz=made.rate_hz, **units)
+        (found,) = missing_samples(log, segment_recording(log), 1e-4)
+        beyond += found.numbers["lost_share"] - is_lost.mean()
+        variance += found.numbers["sigma_lost_share"] ** 2
+    assert abs(beyond) < 3.0 * np.sqrt(variance)

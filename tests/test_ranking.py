@@ -10,7 +10,7 @@ import trihedron
 from test_export import export_calibration
 from trihedron.cli import main
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
-from trihedron.records import FindingCode, Severity
+from trihedron.records import FindingCode, Recording, Severity
 from trihedron.report.ranking import said_of
 
 DRIFT = FindingCode.GYRO_BIAS_DRIFT
@@ -90,6 +90,19 @@ def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
     assert not any(one.is_rejected for one in ranking.candidates)
     one = next(one for one in ranking.candidates if one.maker == "kalibr")
     assert "has no bias" in said_of(one)
+
+
+def test_an_extended_calibration_is_ranked_on_the_poses_of_the_others(session):
+    log, known = session
+    bent = {"id": "accel-quadratic", "model": {"variant": "", "values": [0.0, 0.0, 0.0]}}
+    extended = replace(known, extensions={"effects": [bent]})
+    # Readings without the effects may be segmented into other poses than these, which are those of the first part.
+    part = log.n_samples * 4 // 5
+    units = {"accelerometer_unit": log.accelerometer_unit, "gyroscope_unit": log.gyroscope_unit}
+    first = log.accelerometer[:part], log.gyroscope[:part]
+    fewer = trihedron.segment(Recording.from_arrays(log.time_s[:part], *first, **units))
+    ranking = trihedron.rank([known, extended], log, segments=fewer, gravity_m_s2=9.81)
+    assert [len(one.verification.norm_error) for one in ranking.candidates] == [len(fewer.poses)] * 2
 
 
 def wide(sensor):

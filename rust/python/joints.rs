@@ -20,8 +20,8 @@ type Seen<'py> = (
 );
 
 /// Samples missing in moves `(m, 2)`: the samples behind which they are missing, clearest first, their numbers, gains in
-/// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which one missing
-/// sample would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise; `is_broken` `(n,)`: no joint
+/// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which as many
+/// missing samples as the median loss has would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise; `is_broken` `(n,)`: no joint
 /// is asked near the sample.
 #[pyfunction]
 fn motion_joints<'py>(

@@ -24,6 +24,7 @@ from trihedron.records import Calibration, Finding, FindingCode, Recording, Segm
 from trihedron.records.progress import Progress
 from trihedron.records.ranking import Ranked, Ranking
 from trihedron.records.results import VerificationResult
+from trihedron.segment import resegment
 from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, mg_from_m_s2, rate_to_si
 
 
@@ -249,7 +250,8 @@ def _judge(
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     if known.extensions.get("effects"):
-        segments = segments_of(None, recording, None)
+        # The same poses as those of the other calibrations, of the readings without the effects.
+        segments = resegment(recording, segments)
         known = with_bias_of_log(known, segments, gravity_m_s2)
     judged = verify_calibration(known, recording, segments, gravity_m_s2, source, own)
     findings = (*recording.findings, *segments.findings, *judged.findings, *more)

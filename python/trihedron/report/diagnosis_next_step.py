@@ -56,9 +56,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return " ".join(steps) + _by_themselves(diagnosis)
     if not is_carried:
         use = f"Keep using {model}: its parameters agree with this log." if is_file else use
-        named = ids_in_print(dict.fromkeys(of_session))
-        verb = "belongs" if len(set(of_session)) == 1 else "belong"
-        of_log = f"{capital(named)} {verb} to this recording: no other log is corrected by it."
+        verb = "is" if len(set(of_session)) == 1 else "are"
+        of_log = f"{capital(ids_in_print(dict.fromkeys(of_session)))} {verb} not corrected in another log."
         return f"{use} {of_log}{_by_themselves(diagnosis)}{_in_the_next_log(diagnosis)}"
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""

@@ -16,7 +16,8 @@ ALL_NUMBERS = 9
 FEWEST_SETS = 2
 LEAST_WORTH = 0.01
 """Uncertainty of a scale from which an experiment adds little: data sheets state 1 to 3 % without one."""
-LITTLE = " A data sheet states 1 to 3 % without an experiment: more poses, quicker turns, or noise in another unit?"
+LITTLE = " A data sheet states 1 to 3 % without an experiment: more poses, turns that are larger or better known, "
+LITTLE += "or noise in another unit?"
 
 
 def plan_report(plan: ExperimentPlan) -> Document:

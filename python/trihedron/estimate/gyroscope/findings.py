@@ -94,8 +94,12 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
             )
         case 0, 3:
             is_stated = float(np.linalg.det(S_accelerometer)) < 0.0
-            grave = Severity.SERIOUS if is_stated else Severity.WARNING
-            yield Finding.of(FindingCode.LEFT_HANDED, "both-sensors", severity=grave, is_stated=is_stated)
+            yield Finding.of(
+                FindingCode.LEFT_HANDED,
+                "both-sensors",
+                severity=Severity.SERIOUS if is_stated else Severity.WARNING,
+                is_stated=is_stated,
+            )
         case 2, 0:
             yield Finding.of(FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved)
         case 2, 3:
