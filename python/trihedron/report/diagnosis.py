@@ -45,7 +45,7 @@ from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
-from trihedron.report.reference import beside_reference
+from trihedron.report.reference import beside_reference, hidden_by
 from trihedron.report.segments import pose_lines
 
 _CAPTIONS = {
@@ -105,7 +105,9 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
-        verdict=verdict_in_words(diagnosis) + _distrust(diagnosis),
+        verdict=verdict_in_words(diagnosis)
+        + _distrust(diagnosis)
+        + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),

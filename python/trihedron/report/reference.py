@@ -141,6 +141,14 @@ def _slow(error: ReferenceError) -> str:
     return f"{plain_number(degrees_from_radians(error.slow_rad[0]), 2)}° in {plain_number(error.slow_s, 2)} s"
 
 
+def hidden_by(found: AgainstReference | None) -> str:
+    """What a reference that agrees is by itself wrong by, in a sentence; empty without one."""
+    if found is None:
+        return ""
+    drift = _error(found).partition(";")[0].partition(",")[0]
+    return f" The reference by itself {drift}; a smaller misfit of the log does not show."
+
+
 def _error(found: AgainstReference) -> str:
     """The reference's own error in words."""
     error = found.error
