@@ -243,7 +243,7 @@ def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
         if share > 100.0 * LEAST_SHARE
     )
     for k, effect in enumerate(diagnosis.effects):
-        if effect.held_out:
+        if effect.held_out and effect.side == "recording":
             held = effect.held_out[0]
             after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
             before = size_in_words(held.rms_before, held.unit)

@@ -87,6 +87,8 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" {_within(summary)}"
     if strays:
         verdict += f" {_named(strays)} outside the others."
+    if summary.passed_over:
+        verdict += f" Not compared: {summary.passed_over}."
     if moved:
         verdict += f" {_named(moved)} changed between sessions, or the logs are of several units."
     return Document(
