@@ -5,12 +5,6 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 _MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "
 _MANY += "after the change."
 
-_LESS_ACCURATE = "The calibration is less accurate here than required}."
-_LOOK_AGAIN = (
-    "See what the errors are: `trihedron diagnose LOG --calibration FILE`. Then calibrate again}, or accept a "
-)
-_LOOK_AGAIN += "wider limit."
-
 _CALIBRATE = {
     (Code.GRAVITY_DEFAULTED, "", WARNING): Words(
         "Gravity was not given; {gravity_m_s2} m/s² was used. Where people live it lies between {low_m_s2:.3f} and "
@@ -156,14 +150,18 @@ _USE = {
     (Code.LIMIT_EXCEEDED, "static", SERIOUS): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms ({rms_m_s2:.3g mg}); the limit is "
         "{limit_mg:g} mg{is_below_noise:?, less than the noise of this log's poses alone|}.",
-        "{is_below_noise:?Poses too short, or too noisy a sensor, for this limit|" + _LESS_ACCURATE,
-        "{is_below_noise:?Record longer poses|" + _LOOK_AGAIN,
+        "{is_below_noise:?Poses too short, or too noisy a sensor, for this limit|The calibration is less accurate "
+        "here than required}.",
+        "{is_below_noise:?Record longer poses|See what the errors are: `trihedron diagnose LOG --calibration FILE`. "
+        "Then calibrate again}, or accept a wider limit.",
     ),
     (Code.LIMIT_EXCEEDED, "moves", SERIOUS): Words(
         "The tilt error after a rotation is {rms_deg:.3g} deg rms; the limit is {limit_deg:g} deg"
         "{is_below_noise:?, less than the noise of this log's rotations alone|}.",
-        "{is_below_noise:?Rotations too slow, or too noisy a sensor, for this limit|" + _LESS_ACCURATE,
-        "{is_below_noise:?Record quicker rotations between longer poses|" + _LOOK_AGAIN,
+        "{is_below_noise:?Rotations too slow, or too noisy a sensor, for this limit|The calibration is less accurate "
+        "here than required}.",
+        "{is_below_noise:?Record quicker rotations between longer poses|See what the errors are: "
+        "`trihedron diagnose LOG --calibration FILE`. Then calibrate again}, or accept a wider limit.",
     ),
     (Code.SAME_RECORDING, "", SERIOUS): Words(
         "The calibration was made from this recording: a verification with it proves nothing.",
