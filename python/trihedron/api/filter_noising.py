@@ -119,11 +119,9 @@ def filter_noise(
     if reference is None and own is None:
         raise InputError(_no_noise(recording, segments, static))
     known = _static(static) if static is not None else _sensors(own)
-    findings = (
-        *recording.findings,
-        *_doubts(own if static is None else static),
-        *(said if reference is not None else ()),
-    )
+    # The log's own rest is no other log: its faults are those of the recording already.
+    of_static = _not_noise(own) if static is None else _doubts(static)
+    findings = (*recording.findings, *of_static, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
         motion = motion_of(reference, reference_columns)
@@ -236,19 +234,21 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
     return known
 
 
-def _doubts(static: Noise | str | os.PathLike[str] | None) -> tuple[Finding, ...]:
-    """Serious findings on a static log, and those of what is in its K beside noise."""
-    if static is None:
-        return ()
+def _not_noise(static: Noise | None) -> tuple[Finding, ...]:
+    """Findings of what is in the K of a static log beside noise."""
+    return tuple(one for one in (() if static is None else static.findings) if one.code in NOT_OF_THE_SENSOR)
+
+
+def _doubts(static: Noise | str | os.PathLike[str]) -> tuple[Finding, ...]:
+    """Serious findings on a static log, under its name, and those of what is in its K beside noise."""
     said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
     name = as_arguments(static.source) if isinstance(static, Noise) else shlex.quote(os.fspath(static))
-    return (
-        *(
-            Finding.of(FindingCode.FILTER_NOISE_STATIC, "doubted", name=name, seen=words("quoted", sentence=one.seen))
-            for one in said
-            if one.severity is Severity.SERIOUS
-        ),
-        *(one for one in said if one.code in NOT_OF_THE_SENSOR and one.severity is not Severity.SERIOUS),
+    return tuple(
+        Finding.of(FindingCode.FILTER_NOISE_STATIC, "doubted", name=name, seen=words("quoted", sentence=one.seen))
+        if one.severity is Severity.SERIOUS
+        else one
+        for one in said
+        if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR
     )
 
 

@@ -33,7 +33,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
         return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "unexplained":
-        experiments = [one.experiment for one in diagnosis.relations if one.experiment]
+        experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
         left = {one.domain for one in diagnosis.domains if one.disagrees}
         clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
         again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "

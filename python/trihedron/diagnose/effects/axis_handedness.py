@@ -34,10 +34,13 @@ class AxisHandedness(DirectEffect):
             return None
         reversed_axes, kept = ([AXES[j] for j in np.flatnonzero(one)] for one in (signs < 0, signs > 0))
         n, moved = len(reversed_axes), [AXES[j] for j in range(3) if main[j] != j]
-        # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
-        statement = self.reported(
-            "reversed", is_one=n == 1, is_two=n == 2, is_three=n == 3, reversed=reversed_axes, kept=kept,
-        ) if not moved else self.reported("exchanged", moved=moved, is_turned=n not in (0, 3))  # fmt: skip
+        if moved:
+            statement = self.reported("exchanged", moved=moved, is_turned=n not in (0, 3))
+        else:
+            # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
+            statement = self.reported(
+                "reversed", is_one=n == 1, is_two=n == 2, is_three=n == 3, reversed=reversed_axes, kept=kept,
+            )  # fmt: skip
         parameters = per_axis_parameters("gyro_sign", signs, np.zeros(3), "1")
         return Evidence(
             0.0, CERTAIN, parameters, statement, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes))
