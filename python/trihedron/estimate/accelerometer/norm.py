@@ -98,7 +98,7 @@ def _assemble(
         covariance = fit.covariance * np.outer(turn, turn) * scale
     observability = design.observability(relative_sigma)
     quality = replace(
-        gravity_quality(residual, sigma, (apart[:, 0], apart[:, 1])),
+        gravity_quality(residual, sigma, dof, (apart[:, 0], apart[:, 1])),
         weights=np.ones(len(values)),
         n_iterations=fit.n_iterations,
         stopped_because=words(fit.stopped_because),
@@ -134,19 +134,21 @@ def _assemble(
 N_PARAMETERS = 9
 
 
-def gravity_quality(residual: FloatArray, sigma: FloatArray, held: tuple[FloatArray, FloatArray] | None) -> FitQuality:
-    """Gravity errors (n,) in static poses and their noise, m/s²; ``held``: the held-out ones (NaN where there is none)
-    and their standard errors."""
-    dof, total = max(len(residual) - N_PARAMETERS, 0), float(np.sum(residual**2))
+def gravity_quality(
+    residual: FloatArray, sigma: FloatArray, dof: int, held: tuple[FloatArray, FloatArray] | None
+) -> FitQuality:
+    """Gravity errors (n,) in static poses and their noise, m/s², with ``dof`` degrees of freedom; ``held``: the
+    held-out ones (NaN where there is none) and their standard errors."""
+    total = float(np.sum(residual**2))
     known = None if held is None else held[0][np.isfinite(held[0])]
     return FitQuality(
         unit="m/s^2",
         residual=residual,
         sigma=sigma,
         chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
-        dof=dof,
+        dof=max(dof, 0),
         rms=float(np.sqrt(total / len(residual))),
-        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        rms_dof=float(np.sqrt(total / dof)) if dof > 0 else float("nan"),
         floor=float(np.sqrt(np.mean(sigma**2))),
         held_out=None if held is None else held[0],
         held_out_sigma=None if held is None else held[1],

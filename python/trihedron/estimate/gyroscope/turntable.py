@@ -183,9 +183,8 @@ def _of_poses(sensor: SensorCalibration, quality: FitQuality, segments: Segments
     if len(quality.residual) != segments.n_poses:
         return quality
     residual = norms(segments.accelerometer_mean, sensor.S, sensor.b)[0] - gravity_m_s2
-    seen = gravity_quality(residual, quality.sigma, None)
-    rms_dof = seen.rms_dof * np.sqrt(seen.dof / quality.dof) if quality.dof else float("nan")
-    return replace(quality, residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=float(rms_dof))
+    seen = gravity_quality(residual, quality.sigma, quality.dof, None)
+    return replace(quality, residual=residual, chi2=seen.chi2, rms=seen.rms, rms_dof=seen.rms_dof)
 
 
 # A rate table at known speeds, the unit on it in any orientation.

@@ -25,13 +25,20 @@ from trihedron.session.noise import along_gradient
 
 N_GYROSCOPE = 9
 N_FOLDS = 5
-"""Folds of the cross-validation: a fifth of the poses, then of the moves."""
+"""Folds of the cross-validation: a fifth of the poses, then of the moves; a single one where fewer would remain."""
 
 
 def norm_quality(solution: SessionSolution, held: tuple[FloatArray, FloatArray] | None) -> FitQuality:
     """Gravity errors in static poses at the saved S, b of the accelerometer; ``held`` (n,) are the held-out ones with
-    their standard errors."""
-    found = gravity_quality(*norm_errors(solution.observed, solution.S_a, solution.b_a), held)
+    their standard errors.
+
+    Moves determine S and b too: the poses lose less than nine degrees of freedom to them.
+    """
+    observed, S, b = solution.observed, solution.S_a, solution.b_a
+    residual, sigma = norm_errors(observed, S, b)
+    of_fit = _of_model(observed, S, b, solution.covariance[:12, :12])
+    lost = min(float(np.sum(np.minimum(of_fit / sigma**2, 1.0))), N_PARAMETERS)
+    found = gravity_quality(residual, sigma, round(len(residual) - lost), held)
     return replace(
         found,
         n_iterations=solution.iterations,
@@ -59,41 +66,42 @@ class HeldOut:
 
 
 def held_out(measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution) -> HeldOut | None:
-    """Cross-validation over every k-th pose, then every k-th move; ``None`` where too few would remain.
+    """Cross-validation over every k-th pose, then every k-th move, of few over each; ``None`` where too few would remain.
 
     Noise strengths, and the factors on the moves' errors, are those of the whole session; a fit without the fold is one
     linear step from the optimum (eq. 11.15).
     """
     observed = solution.observed
     n, m = len(observed.pose_force), len(observed.before)
-    if m - -(-m // N_FOLDS) < N_GYROSCOPE // 2 + 1 or n - -(-n // N_FOLDS) < N_PARAMETERS:
+    enough = [k for k in (N_FOLDS, m) if m - -(-m // k) > N_GYROSCOPE // 2 and n - -(-n // k) >= N_PARAMETERS]
+    if not enough:
         return None
+    n_folds = enough[0]
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
     is_pose = is_reading & (labels[:, 0] == STATIC_ACCEL)
     is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
-    is_of_fold = labels[:, 1] % N_FOLDS == np.arange(N_FOLDS)[:, None]
+    is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
     rests = core.without(np.concatenate([is_pose & is_of_fold, is_move & is_of_fold]), observed.force_origin)
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
-    for fold, (S, b, _, covariance) in enumerate(rests[:N_FOLDS]):
-        holds = np.arange(n) % N_FOLDS == fold
-        residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
+    for fold, (S, b_centred, _, covariance) in enumerate(rests[:n_folds]):
+        holds, b = np.arange(n) % n_folds == fold, b_centred - S @ observed.force_origin
+        residual, noise = norm_errors(observed, S, b)
         norm[holds] = residual[holds]
         norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
     which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
     models = [
-        Linear(which[fold::N_FOLDS], S, b - S @ observed.force_origin, S_w)
-        for fold, (S, b, S_w, _) in enumerate(rests[N_FOLDS:])
+        Linear(which[fold::n_folds], S, b - S @ observed.force_origin, S_w)
+        for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
     ]
     return HeldOut(norm, norm_sigma, carried_each(measured, anchors_s, models))
 
 
-def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
+def _of_model(observed: Observed, S: FloatArray, b: FloatArray, covariance: FloatArray) -> FloatArray:
     """(n,) variance of the norm by the uncertainty of S, b: ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
-    origin = observed.force_origin
-    _, jacobian = norms(observed.pose_force + origin, S, b_centred - S @ origin)
+    _, jacobian = norms(observed.pose_force + observed.force_origin, S, b)
     return np.asarray(np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0))
 
 

@@ -269,13 +269,9 @@ def calibrate_joint(
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
     found = solved(log, nominal_scale)
-    solution, left_out, alone = found.solution, found.held_out, accelerometer.quality
+    solution, left_out = found.solution, found.held_out
     held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
     quality = norm_quality(solution, held)
-    if left_out is None and alone is not None:
-        quality = replace(
-            quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
-        )
     calibration = Calibration(
         accelerometer=SensorCalibration(
             S=solution.S_a,
