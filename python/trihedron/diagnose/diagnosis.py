@@ -101,7 +101,8 @@ def _diagnosed(
     answer = _run(obs, start_state(obs, begin), prior, alpha, notify)
     model = answer.found.model
     relations = records(answer.found.related)
-    verdict = verdict_of(answer, has_relations=bool(relations))
+    is_determined = prior is None or not prior.is_weak
+    verdict = verdict_of(answer, has_relations=bool(relations), is_determined=is_determined)
     # Without missing effects S and b are those of a calibration of this recording.
     base = answer.bare.fitted
     final = base if verdict == "consistent" else answer.numbers.fitted
@@ -250,8 +251,9 @@ def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[Dom
     return _disagreeing(domains, {one.domain: float(np.exp(-0.5 * one.score)) for one in found.relations})
 
 
-def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
-    """One word; ``not-testable`` where no pose domain could be tested and the samples show nothing either.
+def verdict_of(answer: Answer, *, has_relations: bool, is_determined: bool) -> Verdict:
+    """One word; ``not-testable`` where the poses do not determine the model, or no pose domain could be tested, and the
+    samples show nothing either.
 
     Minor effects (a disturbed pose, a faint line) leave it at ``unexplained`` while something else disagrees.
     """
@@ -261,6 +263,6 @@ def verdict_of(answer: Answer, *, has_relations: bool) -> Verdict:
     if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.
-    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in answer.domains):
+    if not is_determined or not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in answer.domains):
         return "not-testable"
     return "consistent"

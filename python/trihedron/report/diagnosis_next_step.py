@@ -22,7 +22,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
     serious = own_serious(diagnosis)
-    if serious is not None and diagnosis.verdict != "not-testable":
+    if serious is not None:
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."

@@ -78,24 +78,31 @@ class _Inside(NamedTuple):
 
 def _levels(context: Context, sensor: int, axis: int, inside: _Inside) -> tuple[FloatArray, float] | None:
     """State in every pose, between -1 and 1, and what it gains in log-likelihood; ``None`` with one level."""
-    error, up = _static_errors(context, sensor), context.fitted.state.up
+    error, state, obs = _static_errors(context, sensor), context.fitted.state, context.obs
+    up = state.up
     if sensor:
+        assert obs.pose_rate_noise is not None
         reading, seen = error @ np.linalg.inv(context.gyro_axes)[axis], np.ones(len(error))
         known = np.ones((len(error), 1))
+        noise = np.sqrt(obs.pose_rate_noise**2 @ state.gyro_S[axis] ** 2)
     else:
         # Gravity shows the component along the vertical only, less what S and b take of it.
         reading, seen = np.einsum("ni,ni->n", up, error), up @ context.accel_axes[:, axis]
         known = np.column_stack([up, *(up[:, j] * up[:, k] for j in range(3) for k in range(j, 3))])
+        noise = obs.norm_sigma(up @ state.accel_S)
     rest = np.eye(len(error)) - known @ np.linalg.pinv(known)
-    state = _states(rest @ reading, seen, rest, inside)
-    if min(np.count_nonzero(state < 0.0), np.count_nonzero(state > 0.0)) < FEWEST_AT_A_LEVEL:
+    level = _states(rest @ reading, seen, rest, inside)
+    if (
+        len(error) <= known.shape[1]
+        or min(np.count_nonzero(level < 0.0), np.count_nonzero(level > 0.0)) < FEWEST_AT_A_LEVEL
+    ):
         return None
     # The level of a pose without a switch is one of two, chosen by the mean that it is to explain.
     gain = inside.gain - float(np.log(2.0)) * np.count_nonzero(~inside.switches)
-    time, dof = context.time_s[: len(error)], float(np.trace(rest))
-    levels = np.column_stack([known, seen * state])
-    gain += _likelihood(reading, levels, time, dof) - _likelihood(reading, known, time, dof)
-    return state, gain - 0.5 * float(np.log(len(error)))
+    time, scatter = context.time_s[: len(error)], _Scatter(float(np.median(noise**2)), len(error) - known.shape[1])
+    levels = np.column_stack([known, seen * level])
+    gain += _likelihood(reading, levels, time, scatter) - _likelihood(reading, known, time, scatter)
+    return level, gain - 0.5 * float(np.log(len(error)))
 
 
 def _static_errors(context: Context, sensor: int) -> FloatArray:
@@ -109,10 +116,17 @@ def _static_errors(context: Context, sensor: int) -> FloatArray:
     return np.asarray(error if effects is None else error - effects[: len(error)] @ state.effect)
 
 
-def _likelihood(reading: FloatArray, known: FloatArray, time: FloatArray, dof: float) -> float:
+class _Scatter(NamedTuple):
+    """``least`` variance of readings about their combination, that of their noise, and the degrees of freedom."""
+
+    least: float
+    dof: int
+
+
+def _likelihood(reading: FloatArray, known: FloatArray, time: FloatArray, scatter: _Scatter) -> float:
     """Largest log-likelihood of a ``reading`` that scatters and walks at random about a combination of ``known``.
 
-    The size of the scatter is integrated over with ``dof`` degrees of freedom.
+    A scatter below the noise of the means would reward a combination of as many columns as there are poses.
     """
     walk = np.minimum.outer(time, time) - time.min()
     walk /= max(float(np.median(np.diff(time))), TINY)
@@ -121,7 +135,9 @@ def _likelihood(reading: FloatArray, known: FloatArray, time: FloatArray, dof: f
         root = np.linalg.cholesky(np.eye(len(time)) + share * walk)
         y, x = np.linalg.solve(root, reading), np.linalg.solve(root, known)
         y = y - x @ np.linalg.lstsq(x, y)[0]
-        best = max(best, -float(np.log(np.diag(root)).sum() + 0.5 * dof * np.log(max(float(y @ y), TINY))))
+        variance = max(float(y @ y) / scatter.dof, scatter.least)
+        fit = scatter.dof * np.log(variance) + float(y @ y) / variance
+        best = max(best, -float(np.log(np.diag(root)).sum() + 0.5 * fit))
     return best
 
 
