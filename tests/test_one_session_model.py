@@ -287,3 +287,27 @@ def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(xsens)
     assert f"| {1e3 * quality.held_out_rms:.2f} mm/s² cross-validated (noise alone {1e3 * quality.floor:.2f})" in row
     assert f"tilt {figures['tilt_error_after_rotations']['held_out_rms']:.3f}° after unseen rotations" in row
     assert d.to_dict()["figures"] == figures
+
+
+def _drawn(n_poses: int, seed: int):
+    motion = hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0)
+    recording, truth = simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)
+    return recording, {"gravity_m_s2": truth.gravity_m_s2}
+
+
+def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_leave_them() -> None:
+    found = [calibrate(log, **gravity).accelerometer.quality for log, gravity in (_drawn(12, k) for k in range(16))]
+    chi2, dof = (sum(getattr(one, name) for one in found) for name in ("chi2", "dof"))
+    # The poses alone would leave 3 each; χ² of all scatters by sqrt(2 dof), dof is a whole number of each.
+    assert dof > 16 * 5
+    assert abs(chi2 - dof) < 3.0 * np.sqrt(2.0 * dof) + 0.5 * np.sqrt(16.0)
+    held = [one.held_out_rms / one.floor for one in found]
+    assert np.median(held) < 1.6  # a twelfth pose is predicted by eleven and their moves
+
+
+@pytest.mark.parametrize(
+    ("n_poses", "verdict"), [(6, "not-testable"), (10, "consistent")], ids=["undetermined", "one-row-left-by-the-norms"]
+)
+def test_few_poses_are_consistent_only_where_they_determine_the_model(n_poses: int, verdict: str) -> None:
+    log, gravity = _drawn(n_poses, 7001)
+    assert diagnose(log, **gravity).verdict == verdict

@@ -66,7 +66,7 @@ class HeldOut:
 
 
 def held_out(measured: MoveMeasurements, anchors_s: FloatArray, solution: SessionSolution) -> HeldOut | None:
-    """Cross-validation over every k-th pose, then every k-th move, of few over each; ``None`` where too few would remain.
+    """Cross-validation over every k-th pose, then every k-th move, or every one; ``None`` where too few would remain.
 
     Noise strengths, and the factors on the moves' errors, are those of the whole session; a fit without the fold is one
     linear step from the optimum (eq. 11.15).
