@@ -21,6 +21,7 @@ CONSEQUENCE = (
     FindingCode.SENSORS_EXCHANGED,
     FindingCode.GRAVITY_MISSING,
     FindingCode.UNIT_CONTRADICTED,
+    FindingCode.TURNTABLE,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
     FindingCode.NOT_TESTED,

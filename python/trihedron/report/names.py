@@ -47,6 +47,7 @@ FINDINGS = {
     "spectrum-low-pass": "low-pass in the spectrum",
     "spectrum-unexplained": "spectrum unlike the fitted terms",
     "table-tilt": "faces that contradict each other",
+    "turntable": "turntable speeds that moves and poses contradict",
     "time-duplicate": "equal timestamps",
     "time-unit-detected": "time unit uncertain",
     "turn-not-a-multiple": "turn excluded",

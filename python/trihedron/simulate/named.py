@@ -90,7 +90,7 @@ def _imperfect() -> Scenario:
 
 
 def _lossy() -> Scenario:
-    scenario = with_effect(_of(MPU, hand_session()), "dropped-samples", losses=[(30.0, 7), (60.0, 25)])
+    scenario = with_effect(_of(MPU, hand_session()), "dropped-samples", losses=[(28.0, 7), (61.0, 25)])
     return with_effect(scenario, "timing-jitter", jitter_s=3e-4)
 
 

@@ -271,8 +271,10 @@ def on_turntable(
         raise InputError(f"turntable_sigma is a relative error such as 0.001, not {relative_sigma}.")
     if speeds_deg_s is None:
         raise InputError("turntable_sigma is the error of turntable_deg_s: give the speeds, too.")
-    if calibration.gyroscope is None or recording.gyroscope is None:
-        raise InputError("a turntable calibrates the gyro, and this log has none; log poses and moves as well.")
+    if recording.gyroscope is None:
+        raise InputError("a turntable calibrates the gyro, and this log has none.")
+    if calibration.gyroscope is None:
+        return calibration  # a finding says why the poses leave the gyro out
     found = plateaus(recording, segments)
     speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0
