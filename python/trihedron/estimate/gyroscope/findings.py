@@ -9,6 +9,7 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
+from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import chdtrc, fdtrc
 from trihedron.records.calibration import PARAMETER_NAMES, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
@@ -137,6 +138,9 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Fi
         rate_axis=rate + 1,
         force_axis=force + 1,
         scatter_left=attitude.scatter_left,
+        # Its vertical part turns with gravity as a bias in proportion to it does.
+        may_be_earth=bool(per_g.max() <= EARTH_RATE_RAD_S),
+        earth_rad_s=EARTH_RATE_RAD_S,
         largest_rad_s_per_m_s2=np.max(np.abs(S @ attitude.A)),
     )
 

@@ -94,8 +94,8 @@ _MOVES = {
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
         "fitted without it; S and b alone cannot correct it.",
-        "g-sensitivity of the gyro.",
-        "See whether it is that or a bias that differs from pose to pose: `trihedron diagnose LOG`; the first is "
+        "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
+        "See whether it is that or a bias that differs from pose to pose: `trihedron diagnose LOG`; g-sensitivity is "
         "fitted with --extended.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
