@@ -78,8 +78,9 @@ pub(super) fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Se
 /// Spread of the specific forces in |g| (half a degree) below which all poses are one, or `S` has collapsed.
 pub(super) const SMALLEST_SPREAD: f64 = 1e-2;
 
-pub(super) const WORTHLESS: &str = "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses hardly differ, or are not \
-                         still; hold the sensor still in clearly different orientations";
+/// The minimum S = 0, |b| = |g|, which any readings have.
+pub(super) const WORTHLESS: &str = "the poses do not determine the scales: they are too few, hardly differ, or are not still; \
+                         hold the sensor still in nine or more clearly different orientations";
 
 /// Root mean square size of `S (a' - mean)`, m/s².
 pub(super) fn spread(model: &Model, standard: &Standardisation) -> f64 {
