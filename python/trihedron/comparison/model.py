@@ -122,8 +122,9 @@ def compared(
     noise = (*noise, *(_factor(one) for one in numbers.factors))
     differ = any(p.significant for p in parameters) or any(n.significant for n in noise)
     verdict: Verdict = found.verdict
-    if found.verdict not in ("unexplained", "not-testable"):
-        verdict = "parameters-differ" if differ else "consistent"
+    if found.verdict != "unexplained":
+        agreed: Verdict = "not-testable" if found.verdict == "not-testable" else "consistent"
+        verdict = "parameters-differ" if differ else agreed
         if effects.differ:
             verdict = "missing-physics"
     elif found.verdict == "unexplained" and effects.surplus:
