@@ -14,6 +14,7 @@ from trihedron.records.reference import ReferenceMotion
 
 G = 9.81
 FINE_HZ = 1000
+LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
 
 
 def turn(axis, angle):
@@ -190,9 +191,6 @@ def measured_table(seed, seconds=90, wobble_deg=0.15):
         timestamps - timestamps[0], rate=rate[k] + 1e-4 * rng.normal(size=(len(k), 3)), source="table.csv"
     )
     return Trial(log, motion, u, lead - timestamps[0], ppm, np.zeros(3))
-
-
-LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
 
 
 def commanded_table(seed, pose_s=6.0, wobble_deg=0.05, lag_s=0.15):

@@ -12,6 +12,7 @@ G = 9.81
 S_A = np.array([[0.997, -0.015, -0.007], [0.009, 1.002, 0.002], [0.014, 0.002, 1.023]])
 B_A = np.array([0.54, -0.62, 0.40])
 SIX = np.array([1, -1, 2, -2, 3, -3])
+SIGMA = 0.0003
 
 
 def face_readings(faces, sigma: float, seed: int, tilt_deg: float = 0.0) -> np.ndarray:
@@ -99,9 +100,6 @@ def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_calle
     assert FindingCode.LEFT_HANDED not in codes(silent)
     _, findings = calibrate_faces(face_readings(SIX, 1e-3, 5) / 9.80665, 1e-4, G, raw_unit="m/s^2")
     assert FindingCode.SCALE_NOT_NOMINAL in codes(findings)
-
-
-SIGMA = 0.0003
 
 
 def on_a_table(rng, tilt, headings):

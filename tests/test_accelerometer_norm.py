@@ -20,6 +20,9 @@ G = 9.81744
 S_TRUE = np.array([[2.41e-3, 0.0, 0.0], [-8.6e-6, 2.43e-3, 0.0], [-2.2e-5, -5.2e-5, 2.41e-3]])
 B_TRUE = np.array([-79.9, -80.5, -75.6])
 SIGMA = np.array([0.35, 0.30, 0.42])  # counts: about 0.8 mm/s²
+GRAVITY = 9.81
+SCATTER, BENDS = 8e-3, 2e-2
+"""m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
 
 
 def cube_poses() -> np.ndarray:
@@ -207,9 +210,6 @@ def test_poses_are_advised_first_where_parameters_are_undetermined():
     assert "+X up" not in [str(one) for one in design.advice(1e-4, 2)]
 
 
-GRAVITY = 9.81
-
-
 def design_of(up):
     """(n, 9) what |f| of a pose changes by with each of the nine parameters, which it is linear in."""
     pairs = [(j, k) for j in range(3) for k in range(j + 1)]
@@ -268,10 +268,6 @@ def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_
         assert result.calibration.is_trustworthy != is_bent
         if said:
             assert said[0].numbers["shift_sigma"] > 5.0  # no chance of the stated errors
-
-
-SCATTER, BENDS = 8e-3, 2e-2
-"""m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
 
 
 def errors(rng, n, name):

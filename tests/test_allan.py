@@ -9,6 +9,8 @@ from trihedron import _core
 from trihedron.estimate.noise.allan import KINDS, TYPES, allan_deviation
 from trihedron.estimate.noise.streamed import stream_noise
 
+NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
+
 
 def weighted_variance(x, m):
     """As above, means over the readings present; weight 2 c1 c2 / (m (c1 + c2))."""
@@ -33,9 +35,6 @@ def weighted_hadamard(x, m):
             total += w * (c.mean() - 2 * b.mean() + a.mean()) ** 2
             weight += w
     return total / (6 * weight)
-
-
-NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
 
 
 # NIST SP 1065 (2008), tables 30 and 31, as printed: seven digits.

@@ -16,6 +16,9 @@ import trihedron
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from written_session import usual
 
+# A device, several recordings or minutes: the tutorials run these.
+SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
+
 
 @pytest.fixture(scope="module")
 def recording():
@@ -125,10 +128,6 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
     assert not below.has_data()
     with pytest.raises(ValueError, match="needs 2 axes, one a panel; ax has 3"):
         result.plot("residuals", ax=[above, below, above])
-
-
-# A device, several recordings or minutes: the tutorials run these.
-SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
 def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(tmp_path, monkeypatch):

@@ -25,6 +25,20 @@ MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session"
     "errors.py",
 }
 LONGEST_FILE, LONGEST_FUNCTION = 350, 79
+# One model whose files still take each other's types.
+ONE_PIECE = {"session_model"}
+# Names that others call by: typer, http.server, notebooks, the catalogue that gathers effects by their base class.
+CALLED_BY_NAME = re.compile(r"^(__\w+__|do_GET|do_POST|log_message|handle_error|_repr_\w+_)$")
+# Ours, with a letter before the point where a page numbers its own; a number of three parts is another book's.
+NUMBER = r"(?:\d+|[A-Z])\.\d+[a-z]?(?!\.?\d)"
+CITED = re.compile(rf"\b(?:eqs?|equations?)\.? ?\(?({NUMBER}(?:(?:-|, | to | and ){NUMBER})*)", re.IGNORECASE)
+# At the head of an indented line, at its end, or before a paragraph that is the statement in words.
+STATED = [
+    re.compile(rf"^    \(({NUMBER})\) ", re.MULTILINE),
+    re.compile(rf"^    .*\s\(({NUMBER})\)$", re.MULTILINE),
+    re.compile(rf"\\tag\{{({NUMBER})\}}"),
+    re.compile(rf"^\(({NUMBER})\) [A-Z]", re.MULTILINE),
+]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -101,10 +115,6 @@ def test_no_module_imports_itself_by_way_of_others():
                 found |= {one if one in names else node.module for one in whole}
         arrows[name] = found - {name}
     assert circles(arrows) == []
-
-
-# One model whose files still take each other's types.
-ONE_PIECE = {"session_model"}
 
 
 def code_of(path: Path) -> str:
@@ -194,10 +204,6 @@ def test_no_function_outgrows_its_reader():
     assert not {name for name, n in functions() if n > LONGEST_FUNCTION}
 
 
-# Names that others call by: typer, http.server, notebooks, the catalogue that gathers effects by their base class.
-CALLED_BY_NAME = re.compile(r"^(__\w+__|do_GET|do_POST|log_message|handle_error|_repr_\w+_)$")
-
-
 def test_everything_that_is_named_is_used():
     package = list(PACKAGE.rglob("*.py"))
     beside = [
@@ -216,18 +222,6 @@ def test_everything_that_is_named_is_used():
         named += [t.id for n in top if isinstance(n, ast.Assign) for t in n.targets if isinstance(t, ast.Name)]
         unused |= {f"{path.name}:{name}" for name in named if used[name] < 2 and not CALLED_BY_NAME.match(name)}
     assert unused == set()
-
-
-# Ours, with a letter before the point where a page numbers its own; a number of three parts is another book's.
-NUMBER = r"(?:\d+|[A-Z])\.\d+[a-z]?(?!\.?\d)"
-CITED = re.compile(rf"\b(?:eqs?|equations?)\.? ?\(?({NUMBER}(?:(?:-|, | to | and ){NUMBER})*)", re.IGNORECASE)
-# At the head of an indented line, at its end, or before a paragraph that is the statement in words.
-STATED = [
-    re.compile(rf"^    \(({NUMBER})\) ", re.MULTILINE),
-    re.compile(rf"^    .*\s\(({NUMBER})\)$", re.MULTILINE),
-    re.compile(rf"\\tag\{{({NUMBER})\}}"),
-    re.compile(rf"^\(({NUMBER})\) [A-Z]", re.MULTILINE),
-]
 
 
 def stated():

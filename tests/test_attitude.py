@@ -22,6 +22,9 @@ from trihedron.units import (
     rate_to_si,
 )
 
+QUIET, NO_BIAS = _core.RateNoise(np.zeros(3), 0.0, np.inf), np.zeros((2, 3))
+MOVED = np.array([[1.1, 0.02, -0.03], [0.01, 0.9, 0.04], [-0.05, 0.02, 1.05]])
+
 
 def uneven(n: int, span: float, seed: int = 3) -> np.ndarray:
     """Instants whose steps differ by a factor of 2.3 at most: beyond 3 the cubic gives way to a straight line."""
@@ -132,10 +135,6 @@ def test_bad_samples_are_refused_by_their_number(change, words):
 def test_a_start_that_is_no_attitude_is_refused(option, words):
     with pytest.raises(ValueError, match=words):
         trihedron.integrate_rate([0.0, 1.0], np.zeros((2, 3)), **option)
-
-
-QUIET, NO_BIAS = _core.RateNoise(np.zeros(3), 0.0, np.inf), np.zeros((2, 3))
-MOVED = np.array([[1.1, 0.02, -0.03], [0.01, 0.9, 0.04], [-0.05, 0.02, 1.05]])
 
 
 def of_move(time_s, raw, degree, S=MOVED, b=NO_BIAS):

@@ -35,6 +35,17 @@ from trihedron.records.plain import as_plain, from_plain
 from trihedron.records.reference import Estimate, FitToReference
 from written_session import usual
 
+OF_DIAGNOSIS = {
+    "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": EffectParameter, "effect": AcceptedEffect,
+    "candidate": Candidate, "linear": LinearModel, "residuals": DomainResiduals, "finding": Finding,
+    "parameter_difference": ParameterDifference, "noise_difference": NoiseDifference, "relation": Relation,
+    "stage": Stage,
+    "estimate": Estimate, "against_reference_sensor": FitToReference,
+}  # fmt: skip
+OF_CALIBRATION = {"residuals": FitQuality, "observability": Observability}
+EVERY = [("diagnosis", *item) for item in OF_DIAGNOSIS.items()]
+EVERY += [("calibration", *item) for item in OF_CALIBRATION.items()]
+
 
 @pytest.fixture(scope="module")
 def session():
@@ -128,18 +139,6 @@ def test_a_changed_file_is_refused_with_the_place_named(session, tmp_path, path,
     with pytest.raises(CalibrationFileError, match=r"c\.json") as caught:
         read_calibration(file)
     assert said in str(caught.value)
-
-
-OF_DIAGNOSIS = {
-    "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": EffectParameter, "effect": AcceptedEffect,
-    "candidate": Candidate, "linear": LinearModel, "residuals": DomainResiduals, "finding": Finding,
-    "parameter_difference": ParameterDifference, "noise_difference": NoiseDifference, "relation": Relation,
-    "stage": Stage,
-    "estimate": Estimate, "against_reference_sensor": FitToReference,
-}  # fmt: skip
-OF_CALIBRATION = {"residuals": FitQuality, "observability": Observability}
-EVERY = [("diagnosis", *item) for item in OF_DIAGNOSIS.items()]
-EVERY += [("calibration", *item) for item in OF_CALIBRATION.items()]
 
 
 @pytest.mark.parametrize(("which", "name", "record"), EVERY, ids=lambda v: getattr(v, "__name__", v))

@@ -26,6 +26,7 @@ from trihedron.simulate.motion.steps import Motion, MoveTo, Pose
 from trihedron.simulate.noise import stream
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 class FollowingHand:
@@ -211,9 +212,6 @@ def test_the_page_opens_once_with_its_token_and_only_for_its_own_address(led):
         assert told["instruction"] == "Done."
     finally:
         page.close()
-
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium or Chrome on this machine to look at the page with")

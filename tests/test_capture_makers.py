@@ -15,6 +15,8 @@ from trihedron.simulate.device.faults import Faults, Sent
 from trihedron.simulate.device.serving import Device
 
 N = 300
+# Half of the last digit: 16 g and 2000 deg/s in 2^15 steps, three and six digits, floats.
+STEPS = [("witmotion", 0.0024, 5.4e-4), ("witmotion-clock", 0.0024, 5.4e-4), ("vectornav", 5.1e-4, 5.1e-7)]
 
 
 def still(rate_hz=100.0) -> Recording:
@@ -26,10 +28,6 @@ def still(rate_hz=100.0) -> Recording:
 
 def sent_as(board: str, recording: Recording, faults: Faults | None = None) -> bytes:
     return b"".join(data for _, data in Device(recording, board, faults or Faults(), seed=3).pieces(Sent()))
-
-
-# Half of the last digit: 16 g and 2000 deg/s in 2^15 steps, three and six digits, floats.
-STEPS = [("witmotion", 0.0024, 5.4e-4), ("witmotion-clock", 0.0024, 5.4e-4), ("vectornav", 5.1e-4, 5.1e-7)]
 
 
 @pytest.mark.parametrize(("board", "force", "rate"), [*STEPS, ("sbg", 1e-6, 1e-8)])

@@ -25,6 +25,19 @@ from trihedron.simulate.device.faults import Faults, Sent, parse_faults
 from trihedron.simulate.device.serving import Device
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+INPUT_ERRORS = [
+    (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
+    (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
+    (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
+    (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
+    (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
+    (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
+    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
+    (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
+    (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
+    (["capture", "NOISE"], "name the log to write"),
+    (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
+]
 
 
 def capture(port, path, **options):
@@ -169,21 +182,6 @@ def test_kill_9_loses_at_most_a_second_and_the_file_reads(tmp_path):
     assert process.returncode == -signal.SIGKILL
     back = trihedron.read(log)
     assert back.n_samples > 300
-
-
-INPUT_ERRORS = [
-    (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
-    (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
-    (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
-    (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
-    (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
-    (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
-    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
-    (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
-    (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
-    (["capture", "NOISE"], "name the log to write"),
-    (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
-]
 
 
 @pytest.mark.parametrize(("words", "sentence"), INPUT_ERRORS)

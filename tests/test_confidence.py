@@ -16,6 +16,9 @@ from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
 
+RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
+NOISE = 0.02
+
 
 def gyro_z(result, truth):
     """Errors of the gyro's scale in standard errors, and the largest in parts of the scale."""
@@ -179,10 +182,6 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
     f, w, rate, _, _ = hand(9002, move_s=1.5, gyro_flicker=np.radians(20.0 / 3600.0), accel_flicker=0.3e-3 * G)
     assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"
-
-
-RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
-NOISE = 0.02
 
 
 def log(seed, size=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):

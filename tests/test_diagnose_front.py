@@ -34,6 +34,15 @@ from trihedron.simulate.scenario import Scenario
 
 K2 = (3e-4, -2e-4, 2e-4)
 GRAVITY = ("--gravity", "9.80665")
+# What is simulated, and the values of its model.
+TAKEN_OFF = {
+    "accel-quadratic": ("k2", K2),
+    "accel-scale-asymmetry": ("asymmetry", (1e-3, -1.5e-3, 1e-3)),
+    "gyro-g-sensitivity": ("matrix", ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))),
+    "accel-thermal-bias": ("per_k", (0.004, -0.006, 0.01)),
+    "gyro-thermal-bias": ("per_k", (2e-4, -3e-4, 2e-4)),
+    "accel-size-effect": ("places_m", ((0, 0, 0), (0.004, 0.001, -0.002), (0.003, -0.004, 0.001))),
+}
 
 
 def scenario(layout=1, n_poses=18):
@@ -114,17 +123,6 @@ def test_what_cannot_be_taken_off_is_said(folder):
     named = ("accelerometer thermal bias", "earth rate", "of the future")
     assert [name for text, name in zip(said, named, strict=True) if name in text] == list(named)
     assert "no temperature" in said[0]
-
-
-# What is simulated, and the values of its model.
-TAKEN_OFF = {
-    "accel-quadratic": ("k2", K2),
-    "accel-scale-asymmetry": ("asymmetry", (1e-3, -1.5e-3, 1e-3)),
-    "gyro-g-sensitivity": ("matrix", ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))),
-    "accel-thermal-bias": ("per_k", (0.004, -0.006, 0.01)),
-    "gyro-thermal-bias": ("per_k", (2e-4, -3e-4, 2e-4)),
-    "accel-size-effect": ("places_m", ((0, 0, 0), (0.004, 0.001, -0.002), (0.003, -0.004, 0.001))),
-}
 
 
 @pytest.mark.parametrize("effect_id", TAKEN_OFF)

@@ -17,6 +17,13 @@ from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
+RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
+POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
+STEP = 1e-4
+SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
+"""Noise of a reading, SI."""
+pytestmark = pytest.mark.usefixtures("without_corners")
+
 
 def model(accel_size, gyro_size, units=("m/s^2", "rad/s")):
     """Triads that read ``size`` times the truth, sides of one per cent between the axes."""
@@ -92,13 +99,6 @@ def test_gravity_of_the_other_sign_is_said_pose_by_pose_and_only_of_one_protocol
     assert sign_of_gravity((trihedron.segment(other), known), (segments, known)) is None
 
 
-RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
-POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
-STEP = 1e-4
-SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
-"""Noise of a reading, SI."""
-
-
 def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
     sigma = np.r_[np.full(9, 1e-5), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
     return FittedModel(
@@ -128,9 +128,6 @@ def log(
     clock = {"time_s": time} if timed else {"time_s": None, "rate_hz": RATE_HZ}
     made = Recording.from_arrays(**clock, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
     return sampled(made, POSES, numbers())
-
-
-pytestmark = pytest.mark.usefixtures("without_corners")
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,8 @@ from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 
+NAMED = threshold(0.01)
+
 
 def _with_gyro_bias(seed, bias):
     """A healthy session whose second gyro reads ``bias`` (rad/s; poses, samples, generator) more, and gravity."""
@@ -110,9 +112,6 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
     # To one sample or one in ten of what is missing: gravity cannot count a loss in a turn about the vertical.
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1, abs=1.0), what
-
-
-NAMED = threshold(0.01)
 
 
 @cache

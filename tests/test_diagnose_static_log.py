@@ -13,6 +13,8 @@ from trihedron.report.diagnosis import diagnosis_report
 from trihedron.session.static_lines import means_beside_lines
 
 DEG = np.pi / 180.0
+RATE_HZ = 100.0
+SIGMA = 0.02
 
 
 def still(n, rate_hz, seed, force=(0.3, -0.2, 9.79)):
@@ -114,10 +116,6 @@ def test_a_log_in_motion_names_nothing():
     d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
     assert d.effects == ()
-
-
-RATE_HZ = 100.0
-SIGMA = 0.02
 
 
 def poses(seed, n_poses, amplitude, colour=0.0):

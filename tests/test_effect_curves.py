@@ -26,6 +26,7 @@ from trihedron.report.findings.wording import places
 from trihedron.report.text import to_text
 
 G = 9.80665
+DEG = np.pi / 180.0
 
 
 @pytest.mark.parametrize(
@@ -173,9 +174,6 @@ def test_an_effect_of_a_users_own_file_brings_its_own_words():
     assert own.separating_experiment() == "wait a fortnight"
     with pytest.raises(KeyError):
         own.reported("no such case")
-
-
-DEG = np.pi / 180.0
 
 
 def session(seed, n_poses=30):

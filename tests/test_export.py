@@ -21,6 +21,18 @@ READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
 
 # Residue of writing numbers with all digits and evaluating in another order.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
+NOISE = ExportOptions(
+    SensorNoise(NoiseFigure(2e-3), NoiseFigure(4e-5, is_limit=True)),
+    SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
+    rate_hz=200.0,
+    topic="/imu",
+    current_parameters="none",
+)
+SIX = (
+    "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
+    "update_rate", "rostopic",
+)  # fmt: skip
+RAW = ExportOptions(current_parameters="none")
 
 
 def export_calibration(known, target, options=None):
@@ -123,19 +135,6 @@ def test_rust_module_compiles_without_warnings_and_agrees(tmp_path):
     np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope)[:5], **ROUNDING)
 
 
-NOISE = ExportOptions(
-    SensorNoise(NoiseFigure(2e-3), NoiseFigure(4e-5, is_limit=True)),
-    SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
-    rate_hz=200.0,
-    topic="/imu",
-    current_parameters="none",
-)
-SIX = (
-    "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
-    "update_rate", "rostopic",
-)  # fmt: skip
-
-
 def with_g_sensitivity(known):
     G = 1e-3 * np.array([[1.0, -2.0, 0.5], [0.3, 0.7, -1.1], [2.0, 0.0, -0.4]])
     parameters = [{"name": f"G_{i}{j}", "value": G[a, b]} for a, i in enumerate("xyz") for b, j in enumerate("xyz")]
@@ -211,9 +210,6 @@ def test_ros_covariances_are_those_of_one_message():
     np.testing.assert_allclose(np.reshape(document["linear_acceleration_covariance"], (3, 3)), np.eye(3) * 4e-6 * 200)
     np.testing.assert_allclose(np.reshape(document["angular_velocity_covariance"], (3, 3)), np.eye(3) * 1e-8 * 200)
     assert document["orientation_covariance"][0] == -1.0
-
-
-RAW = ExportOptions(current_parameters="none")
 
 
 @pytest.mark.parametrize("target", ["px4", "ardupilot"])

@@ -15,6 +15,20 @@ from trihedron.files.formats.autopilot import orientation, parameters_in
 from trihedron.records import Calibration, Onboard, SensorCalibration
 
 AXES = "XYZ"
+TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
+        "INS_GYR1_CALTEMP": 40.0, "INS_TCAL1_ACC1_X": 900.0, "INS_TCAL1_ACC2_Y": -30.0, "INS_TCAL1_ACC3_Z": 0.7,
+        "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
+
+
+ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
+ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
+ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
+ARDUPILOT |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0}
+PX4 = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
+PX4 |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
+PX4 |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
+TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
+      "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
 
 
 def turn(roll, pitch, yaw):
@@ -158,22 +172,6 @@ def with_temperature(known, reference=28.0):
         })  # fmt: skip
     extensions = {**known.extensions, "effects": effects, "references": {"temperature_degc": reference}}
     return replace(known, extensions={**extensions, "valid_range": {"temperature_degc": [15.0, 55.0]}})
-
-
-TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
-        "INS_GYR1_CALTEMP": 40.0, "INS_TCAL1_ACC1_X": 900.0, "INS_TCAL1_ACC2_Y": -30.0, "INS_TCAL1_ACC3_Z": 0.7,
-        "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
-
-
-ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
-ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
-ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
-ARDUPILOT |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0}
-PX4 = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
-PX4 |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
-PX4 |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
-TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
-      "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
 
 
 @pytest.mark.parametrize(

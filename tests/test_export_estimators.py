@@ -18,6 +18,14 @@ from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, exp
 
 RATE, STEPS = 200.0, 1000
 DT = 1.0 / RATE
+SIM_RATE, SECONDS, G = 100.0, 1000, 9.81
+WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
+OPTIONS = ExportOptions(
+    *(SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(WALK[s])) for s in ("accelerometer", "gyroscope")),
+    rate_hz=SIM_RATE,
+)
+N = int(SIM_RATE * SECONDS)
+TRUTH = {"accelerometer": np.tile([0.0, 0.0, G], (N, 1)), "gyroscope": np.zeros((N, 3))}
 
 
 def orb_slam3(text):
@@ -123,16 +131,6 @@ def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     (tmp_path / "moving.json").write_text(json.dumps(moving))
     assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "moving.json")]) == 2
     assert "It moves." in capsys.readouterr().err
-
-
-SIM_RATE, SECONDS, G = 100.0, 1000, 9.81
-WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
-OPTIONS = ExportOptions(
-    *(SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(WALK[s])) for s in ("accelerometer", "gyroscope")),
-    rate_hz=SIM_RATE,
-)
-N = int(SIM_RATE * SECONDS)
-TRUTH = {"accelerometer": np.tile([0.0, 0.0, G], (N, 1)), "gyroscope": np.zeros((N, 3))}
 
 
 def walk(rng, n, step, keep=1.0):

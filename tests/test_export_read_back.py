@@ -15,6 +15,14 @@ from trihedron.files.formats import any_calibration, export_files, formats, is_c
 READ = [name for name, one in formats().items() if one.read is not None]
 BOARDS = ("ardupilot", "px4")
 GYRO_LOST = ("imu_calib",)
+CAMCHAIN = {
+    "cam0": {
+        "T_cam_imu": np.eye(4).tolist(),
+        "camera_model": "pinhole",
+        "intrinsics": [458.6, 457.3, 367.2, 248.4],
+        "timeshift_cam_imu": 0.0021,
+    }
+}
 
 
 def written(known, target, folder):
@@ -89,16 +97,6 @@ def test_results_of_kalibr_as_its_writer_dumps_them_with_a_second_imu_and_no_bia
         values = back.extensions["effects"][0]["model"]["values"]
         np.testing.assert_allclose(np.reshape(values, (3, 3)), G, atol=1e-14)
         assert back.extensions["without_bias"] == ("accelerometer", "gyroscope")
-
-
-CAMCHAIN = {
-    "cam0": {
-        "T_cam_imu": np.eye(4).tolist(),
-        "camera_model": "pinhole",
-        "intrinsics": [458.6, 457.3, 367.2, 248.4],
-        "timeshift_cam_imu": 0.0021,
-    }
-}
 
 
 def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(tmp_path):

@@ -26,6 +26,8 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 EUROC = Path(__file__).parents[2] / "shared" / "data" / "euroc"
 N, K, SLOW, TAU = 2e-4, 3e-5, 2e-3, 6.0
+STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, 0.0, TAU])
+HZ = 100.0
 
 
 def still(m=60):
@@ -37,9 +39,6 @@ def still(m=60):
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
         (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m),
     )  # fmt: skip
-
-
-STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, 0.0, TAU])
 
 
 def drawn(seed, m=60):
@@ -312,9 +311,6 @@ def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
     for k, e in enumerate(np.eye(len(other))):
         both = [height([drawn(3)], off, other + sign * 1e-3 * e) for sign in (1.0, -1.0)]
         assert slope[k] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
-
-
-HZ = 100.0
 
 
 def test_a_path_without_noise_leaves_nothing_of_the_velocity():

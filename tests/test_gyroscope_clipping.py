@@ -12,6 +12,9 @@ from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 from trihedron.session.rounding import rounding_of_moves, rounding_variance
 
 RATE_HZ = 100.0
+DEG = np.pi / 180.0
+POSE_S = 3.0
+SLOW = ((True, 1.0), (False, 4.0), (True, 4.0), (False, 1.0))
 
 
 def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
@@ -122,11 +125,6 @@ def test_moves_that_begin_and_end_inside_a_step_are_off_by_what_their_poses_are(
     assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.3
     # A level at the edge of a step toggles: its readings are taken apart there, one in hundreds by too much.
     assert np.mean(np.abs(scores) > 4.0) < 0.01
-
-
-DEG = np.pi / 180.0
-POSE_S = 3.0
-SLOW = ((True, 1.0), (False, 4.0), (True, 4.0), (False, 1.0))
 
 
 def steady_turns(rng, step_deg_s, rate_deg_s, noise_deg_s=0.05, is_table=True):

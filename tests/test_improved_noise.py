@@ -34,6 +34,9 @@ RATE = 100.0
 
 
 pytestmark = pytest.mark.usefixtures("few_simulations")
+N = 1e-3
+# At half the rate the two terms are as large as each other: 4 RATE Q² = N².
+EQUAL = N / (2.0 * RATE**0.5)
 
 
 @pytest.mark.parametrize(
@@ -109,11 +112,6 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
     little = bias_in_moves(clean, beside(other))
     assert little is None or max(little) < 0.4 * 2e-3
-
-
-N = 1e-3
-# At half the rate the two terms are as large as each other: 4 RATE Q² = N².
-EQUAL = N / (2.0 * RATE**0.5)
 
 
 def sampled(Q, seed):

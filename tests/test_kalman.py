@@ -20,6 +20,9 @@ from twins_kalman import (
 
 SIGMA = 0.11 * 0.032002 / GRAVITY
 """The article's ADC noise of 0.11 m/s² in volts."""
+START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
+ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
+WALKING = AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
 
 
 def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
@@ -134,9 +137,6 @@ def test_dither_removes_the_rounding_error_from_a_mean():
     assert hidden[2] == pytest.approx(np.mean(error**2), rel=0.01)
 
 
-START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
-
-
 @functools.cache
 def noise_factor(noise):
     """(324, 324) root of the covariance of the article's poses: 5 s each with 5 s between."""
@@ -149,9 +149,6 @@ def article_readings(seed, noise):
     draws = noise_factor(noise) @ np.random.default_rng(seed).standard_normal((324, 3))
     table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
     return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, POSE
-
-
-ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
 
 
 def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars():
@@ -168,9 +165,6 @@ def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars
     assert low < np.sum(nees) < high
     # Largest of 240 standard normals: beyond 4.8 once in 2600 such tests.
     assert np.max(np.abs(z)) < 4.8
-
-
-WALKING = AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
 
 
 @pytest.mark.parametrize(

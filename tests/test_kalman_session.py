@@ -31,6 +31,12 @@ from trihedron.simulate import (
 )
 from twins_kalman import B_TRUE, DIVIDING_HEAD_ANGLES_DEG, GRAVITY, S_TRUE, normalised_error_squared
 
+S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
+B_NORM = np.array([-19.57, -22.47, -20.3])
+LOWER = [0, 3, 4, 6, 7, 8, 9, 10, 11]
+"""Places of the nine free parameters among S row by row and b."""
+NOISE = AxisNoise(white=1.0, walk=0.01)
+
 
 @pytest.fixture(scope="module")
 def head():
@@ -129,13 +135,6 @@ def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
         read_pose_table(path, gravity_m_s2=GRAVITY)
-
-
-S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
-B_NORM = np.array([-19.57, -22.47, -20.3])
-LOWER = [0, 3, 4, 6, 7, 8, 9, 10, 11]
-"""Places of the nine free parameters among S row by row and b."""
-NOISE = AxisNoise(white=1.0, walk=0.01)
 
 
 def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):

@@ -10,6 +10,15 @@ from trihedron import _core, probability
 from trihedron.diagnose.context import smoothed_slope
 from trihedron.ranges import edges_of, ranges_of
 
+RNG = np.random.default_rng(20261)
+TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
+VALUES = np.cumsum(RNG.normal(size=(90, 3)), axis=0)
+MOVES = np.array([[5, 40], [40, 43], [50, 90]])
+DOF = [0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000]
+TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
+# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
+RTOL = 1e-9
+
 
 def test_means_over_ranges_pass_over_what_is_no_number():
     rng = np.random.default_rng(3)
@@ -139,12 +148,6 @@ def test_runs_are_those_of_a_walk_along_the_mask(n, share):
     assert edges_of(mask).shape == (len(walked(mask)), 2)
 
 
-RNG = np.random.default_rng(20261)
-TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
-VALUES = np.cumsum(RNG.normal(size=(90, 3)), axis=0)
-MOVES = np.array([[5, 40], [40, 43], [50, 90]])
-
-
 def test_play_is_the_running_clip_of_its_definition():
     follower, expected = VALUES[0].copy(), []
     for row in VALUES:
@@ -177,12 +180,6 @@ def test_moves_beyond_the_values_are_refused():
         _core.move_shifted(TIME[1:], VALUES, MOVES, 0.01)
     with pytest.raises(ValueError, match="positive"):
         _core.play(VALUES, 0.0)
-
-
-DOF = [0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000]
-TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
-# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
-RTOL = 1e-9
 
 
 @pytest.mark.parametrize("dof", DOF)

@@ -57,6 +57,12 @@ RETIRED = {
     r"\bwalking bias(es)?\b|\bbias(es)?( that)? walks?\b": "bias random walk",
     r"(?-i:\b(gyro|accelerometer|about|along|axis|axes) [xyz]\b(?![\w'′_^])|(?<!w, )\bx, y,? (and )?z\b)": "X, Y, Z",
 }
+CHANNELS = re.compile(r"((tow|time|gyro|accelerometer|accel|acc)( [xyz])?( \[[^\]]+\])?,?)+")
+Said = Iterator[tuple[str, str]]
+"""Texts, each with where it stands."""
+RETIRED_IN_NAMES = re.compile(
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|scatter|converters?|hidden|wander|rest)(?![a-z])"
+)
 
 
 def retired(text: str, words: dict[str, str] = RETIRED) -> list[str]:
@@ -72,11 +78,6 @@ def test_the_words_are_found_where_they_are():
     assert retired("The gyro's zero is -0.3 °/s; gravity at rest missed by 3 mm/s² in hold 3.")
     assert retired("Still poses tell a converter's steps; stamps of axis 1; the law of its twin.")
     assert not retired("The log holds zeros where nothing was read; the timestamp of X; a digital twin; rows of zeros.")
-
-
-CHANNELS = re.compile(r"((tow|time|gyro|accelerometer|accel|acc)( [xyz])?( \[[^\]]+\])?,?)+")
-Said = Iterator[tuple[str, str]]
-"""Texts, each with where it stands."""
 
 
 def helps() -> Said:
@@ -161,11 +162,6 @@ def test_nothing_that_a_user_reads_uses_a_retired_word(source):
     # All at once is ten times as quick; one after the other says where.
     if retired("\n\n".join(text for _, text in said)):
         assert [(where, found) for where, text in said for found in retired(text)] == []
-
-
-RETIRED_IN_NAMES = re.compile(
-    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|scatter|converters?|hidden|wander|rest)(?![a-z])"
-)
 
 
 def keys_of(node: object) -> Iterator[str]:

@@ -23,6 +23,8 @@ from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document, FindingList, Section
 
+MY_LOG = "'my log.csv' --rate 50"
+
 
 @pytest.fixture(autouse=True)
 def run():
@@ -36,9 +38,6 @@ def run():
 
 def filled(step):
     return with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
-
-
-MY_LOG = "'my log.csv' --rate 50"
 
 
 @pytest.mark.parametrize(

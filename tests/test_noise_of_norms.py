@@ -13,6 +13,7 @@ from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 from trihedron.quantiles import median, medians, quantile, quantiles
 
 N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
+RATE = 100.0
 
 
 def session(seed, walk, scatter=0.0, poses=POSES):
@@ -99,9 +100,6 @@ def test_a_missing_value_has_no_place_and_no_quantile_lies_outside():
     for outside in (-0.1, 1.1, float("nan")):
         with pytest.raises(ValueError, match="between 0 and 1"):
             quantile(rows[:, 0], outside)
-
-
-RATE = 100.0
 
 
 def poses_of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, impacts=0, line=0.0, rate=RATE):

@@ -21,6 +21,8 @@ from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.model import MOVES
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
+SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
+
 
 @pytest.fixture(scope="module")
 def healthy():
@@ -199,9 +201,6 @@ def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     squares = np.array(scores) ** 2
     # 60 correlated scores of unit variance: their mean square lies in 1 ± 0.3 (15 parameters a session, four sessions).
     assert 0.5 < squares.mean() < 1.6
-
-
-SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
 
 
 def diagnosed(gravity: float, first: float = 0.0, last: float = 1.0, **arguments: object):

@@ -25,6 +25,8 @@ pytestmark = [
 KINDS = ("calibrate", "verify", "segment", "check", "allan", "kalman", "diagnose", "simulate", "plan")
 # Pages share one sheet of styles: these hold all parts that it gives a colour to, and a verdict with its figure.
 WITH_A_FIGURE = ("calibrate", "allan", "diagnose")
+# What these are laid out of stands in the others as well.
+ALIKE = {"segment", "check", "kalman"}
 
 
 @pytest.fixture(scope="module")
@@ -96,10 +98,6 @@ def barriers_of(page, axe):
 
 def width_of(page):
     return page.evaluate("document.documentElement.scrollWidth")
-
-
-# What these are laid out of stands in the others as well.
-ALIKE = {"segment", "check", "kalman"}
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow if k in ALIKE else ()) for k in KINDS])

@@ -11,6 +11,9 @@ from trihedron.records import FindingCode, Recording
 
 G = 9.80665
 RATE = 100.0
+STEP = np.ones(3)
+NOISE = np.full(3, 3.0)
+COARSE = G / 50.0
 
 
 def posed(n_poses, *, noise, step, limit=np.inf, seed=1, pose_s=4.0, move_s=1.0):
@@ -70,10 +73,6 @@ def test_a_range_that_only_moves_reach_loses_no_pose():
     assert len(segments.poses) == 24
 
 
-STEP = np.ones(3)
-NOISE = np.full(3, 3.0)
-
-
 def swung(seed, n=6000, height=12000.0):
     """Codes (n, 3) of a body that swings about three axes, each by frequencies of its own."""
     rng = np.random.default_rng(seed)
@@ -128,9 +127,6 @@ def test_a_sensor_that_is_read_as_fast_as_it_measures_holds_nothing():
         assert new_readings(np.clip(swung(seed), -5000, 5000), NOISE, STEP) is None
         # Eight bits: neighbouring rows are often the same, and three axes together at every turning point.
         assert new_readings(np.round(swung(seed) / 100.0), np.zeros(3), STEP) is None
-
-
-COARSE = G / 50.0
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.28, 0.7])

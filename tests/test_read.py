@@ -17,6 +17,21 @@ from trihedron.units import AccelerationUnit, RateUnit
 # By name: the package also exports a function called `read`.
 text_module = importlib.import_module("trihedron.read.text.blocks")
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
+# Header, separator, decimal mark, what stands before and behind a row, what ends it.
+LAYOUTS = {
+    "csv": (HEADER, ",", ".", "", "", "\n"),
+    "crlf": (HEADER, ",", ".", "", "", "\r\n"),
+    "cr": (HEADER, ",", ".", "", "", "\r"),
+    "byte-order-mark": ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
+    "tsv": (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
+    "decimal-comma": (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
+    "tab-decimal-comma": (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
+    "blanks": ("", "   ", ".", "  ", "  ", "\n"),
+    "comment-header": ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
+    "trailing-comma": (HEADER, ",", ".", "", ",", "\n"),
+    "preamble": ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
+    "quoted": ('"t","ax","ay","az","gx","gy","gz"\n', '","', ".", '"', '"', "\n"),
+}
 
 
 def readings(n: int = 200, seed: int = 1, rate_hz: float = 100.0) -> np.ndarray:
@@ -49,23 +64,6 @@ def assert_same(recording: Recording, table: np.ndarray) -> None:
     np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
     # Times are made relative to the first timestamp: one rounding of numbers up to 100 s.
     np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
-
-
-# Header, separator, decimal mark, what stands before and behind a row, what ends it.
-LAYOUTS = {
-    "csv": (HEADER, ",", ".", "", "", "\n"),
-    "crlf": (HEADER, ",", ".", "", "", "\r\n"),
-    "cr": (HEADER, ",", ".", "", "", "\r"),
-    "byte-order-mark": ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
-    "tsv": (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
-    "decimal-comma": (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
-    "tab-decimal-comma": (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
-    "blanks": ("", "   ", ".", "  ", "  ", "\n"),
-    "comment-header": ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
-    "trailing-comma": (HEADER, ",", ".", "", ",", "\n"),
-    "preamble": ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
-    "quoted": ('"t","ax","ay","az","gx","gy","gz"\n', '","', ".", '"', '"', "\n"),
-}
 
 
 @pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)

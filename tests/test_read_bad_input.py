@@ -19,6 +19,13 @@ from trihedron.records import Recording
 
 ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
 TEXT = HEADER + "\n".join(ROWS) + "\n"
+FEW = settings(
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+FUZZ = settings(FEW, max_examples=120)
+WORDS = "1 0 -2.5 1e5 nan inf -inf abc 1,5 0x1F 1e999 1e300 - # % é t ax gx acc_x time None 9999999999999999999999"
+TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]", "2024-01-01 00:00:00"])
+FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
 
 
 def with_row(index: int, row: str) -> str:
@@ -146,12 +153,6 @@ def test_words_of_a_library_are_printed_but_for_those_of_a_panic(capfd, said, le
     assert capfd.readouterr().err == left
 
 
-FEW = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-FUZZ = settings(FEW, max_examples=120)
-
-
 def read_bytes(tmp_path, content: bytes, **options) -> Recording | None:
     """The recording, or None when it was rejected in one sentence. Anything else is a failure of the test."""
     path = tmp_path / "fuzz.csv"
@@ -168,10 +169,6 @@ def read_bytes(tmp_path, content: bytes, **options) -> Recording | None:
     return None
 
 
-WORDS = "1 0 -2.5 1e5 nan inf -inf abc 1,5 0x1F 1e999 1e300 - # % é t ax gx acc_x time None 9999999999999999999999"
-TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]", "2024-01-01 00:00:00"])
-
-
 @FUZZ
 @given(
     st.lists(st.lists(TOKENS, min_size=4, max_size=4), min_size=1, max_size=12),
@@ -181,9 +178,6 @@ TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]",
 def test_any_table_of_log_words_under_a_header_is_a_recording_or_a_sentence(tmp_path, rows, separator, packed):
     text = "\n".join([separator.join(["t", "ax", "ay", "az"]), *map(separator.join, rows)])
     read_bytes(tmp_path, gzip.compress(text.encode()) if packed else text.encode())
-
-
-FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
 
 
 @FEW

@@ -12,6 +12,12 @@ from trihedron.read import ReadError, read_recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 TABLE = readings(300)
+XYZ = "float x;float y;float z;float temperature;"
+REAL = {
+    "sparkfun_razor.bag": ("rosbags", {}, 2144, 69.0),
+    "sample_log_small.ulg": ("pyulog", {}, 1298, 204.6),
+    "ardupilot_log171.bin": ("pymavlink", {"instance": 2}, 11916, 49.6),
+}
 
 
 def assert_same(recording, table=TABLE, atol=0.0) -> None:
@@ -108,9 +114,6 @@ def ulog(topics: dict[tuple[str, int], tuple[str, list[bytes]]]) -> bytes:
         out += message(b"A", struct.pack("<BH", instance, k) + name.encode())
         out += b"".join(message(b"D", struct.pack("<H", k) + body) for body in bodies)
     return out
-
-
-XYZ = "float x;float y;float z;float temperature;"
 
 
 def rows_of(us, columns):
@@ -296,13 +299,6 @@ def test_a_damaged_file_of_an_ecosystem_is_one_sentence(tmp_path, magic):
     with pytest.raises(ReadError) as caught:
         read_recording(path)
     assert "\n" not in str(caught.value)
-
-
-REAL = {
-    "sparkfun_razor.bag": ("rosbags", {}, 2144, 69.0),
-    "sample_log_small.ulg": ("pyulog", {}, 1298, 204.6),
-    "ardupilot_log171.bin": ("pymavlink", {"instance": 2}, 11916, 49.6),
-}
 
 
 @pytest.mark.parametrize("name", REAL)

@@ -10,6 +10,20 @@ from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 HEADER = "t,ax,ay,az,gx,gy,gz"
+STATED = [
+    ("", " [g0]", "", G, 1.0, "g", "rad/s"),
+    ("", " [mg]", " (mdps)", 1e-3 * G, np.pi / 180e3, "mg", "mdeg/s"),
+    ("", " [Gal]", " (rpm)", 1e-2, np.pi / 30, "cm/s^2", "rpm"),
+    ("", " [cm/s^2]", " (°/h)", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
+    ("", " [m/s2]", " (LSB)", 1.0, 1.0, "m/s^2", "counts"),
+    ("# acceleration in cm/s^2, angular rate in deg/h\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
+    ("# accelerometer unit: cm/s2, gyroscope unit: deg/h\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
+    ("# Accel [cm/s²]\n# Gyro [°/h]\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
+    ("# accelerometer: Gal; gyro: dph\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
+    # Of the readings these state no unit.
+    ("# the accelerometer was mounted in the lab\n", "", "", 1.0, 1.0, "m/s^2", "rad/s"),
+    ("# accelerometer range: 4 g, gyro range: 500 dps\n", "", "", 1.0, 1.0, "m/s^2", "rad/s"),
+]
 
 
 def written(path, *columns, header=HEADER, remark=""):
@@ -79,22 +93,6 @@ def test_turns_about_the_vertical_do_not_make_a_gyro_look_slow(tmp_path):
     recording = read_recording(written(tmp_path / "log.csv", *table([f"{x:.3f}" for x in t], force, rate)))
     assert recording.gyroscope_unit is RateUnit.RAD_S
     assert not serious(recording)
-
-
-STATED = [
-    ("", " [g0]", "", G, 1.0, "g", "rad/s"),
-    ("", " [mg]", " (mdps)", 1e-3 * G, np.pi / 180e3, "mg", "mdeg/s"),
-    ("", " [Gal]", " (rpm)", 1e-2, np.pi / 30, "cm/s^2", "rpm"),
-    ("", " [cm/s^2]", " (°/h)", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
-    ("", " [m/s2]", " (LSB)", 1.0, 1.0, "m/s^2", "counts"),
-    ("# acceleration in cm/s^2, angular rate in deg/h\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
-    ("# accelerometer unit: cm/s2, gyroscope unit: deg/h\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
-    ("# Accel [cm/s²]\n# Gyro [°/h]\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
-    ("# accelerometer: Gal; gyro: dph\n", "", "", 1e-2, np.pi / 648000, "cm/s^2", "deg/h"),
-    # Of the readings these state no unit.
-    ("# the accelerometer was mounted in the lab\n", "", "", 1.0, 1.0, "m/s^2", "rad/s"),
-    ("# accelerometer range: 4 g, gyro range: 500 dps\n", "", "", 1.0, 1.0, "m/s^2", "rad/s"),
-]
 
 
 def header_of(accelerometer, gyro):

@@ -16,6 +16,7 @@ NAMES = ["t", "ax", "ay", "az", "gx", "gy", "gz"]
 
 TABLE = readings()
 NAMED = dict(zip(NAMES, TABLE.T, strict=True))
+QUIET = {FindingCode.COLUMNS_RECOGNISED, FindingCode.UNIT_DETECTED, FindingCode.TIME_UNIT_DETECTED}
 
 
 def by_axis(first):
@@ -159,9 +160,6 @@ def test_the_logs_own_time_and_other_columns_stay_where_they_were(tmp_path):
     # Seconds since 1970 are known to a quarter of a microsecond in 64 bits.
     assert again.start_epoch_s == pytest.approx(first.start_epoch_s, rel=0, abs=1e-6)
     np.testing.assert_array_equal(again.auxiliary["exposure"], np.arange(len(table)))
-
-
-QUIET = {FindingCode.COLUMNS_RECOGNISED, FindingCode.UNIT_DETECTED, FindingCode.TIME_UNIT_DETECTED}
 
 
 def test_mimu4444_one_of_eight_devices(real_data):

@@ -14,6 +14,10 @@ from trihedron.records import FindingCode, Severity
 from trihedron.units import RateUnit
 
 RATE_HZ = 100.0
+OTHERS = (
+    "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
+    "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
+)
 
 
 def session(n_poses=6, turn_s=1.0):
@@ -133,12 +137,6 @@ NAMES = [(name, meaning) for meaning, names in MEANINGS.items() for name in name
 def test_a_column_is_recognised_with_its_role_axis_and_unit(name, meaning):
     parsed = parse_name(name)
     assert (parsed.role, parsed.axis, parsed.unit or parsed.time_unit) == meaning
-
-
-OTHERS = (
-    "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
-    "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
-)
 
 
 @pytest.mark.parametrize("name", ["", *OTHERS.split(" | ")])

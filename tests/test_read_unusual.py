@@ -16,6 +16,9 @@ from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit
 
 ROWS = 3000
+T, FORCE, RATE = motion(50.0, 7)
+NAMES = "ax,ay,az,gx,gy,gz"
+OF_THE_RATE = ("# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz")
 
 
 def accounts(recording) -> bool:
@@ -159,10 +162,6 @@ def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_pa
     np.testing.assert_array_equal(recording.accelerometer, ordered[:, 1:4])
 
 
-T, FORCE, RATE = motion(50.0, 7)
-NAMES = "ax,ay,az,gx,gy,gz"
-
-
 def stated(path, clock, names, remark="", force=FORCE, rate=RATE):
     return texts.written(path, *texts.table(clock, force, rate), header=names, remark=remark)
 
@@ -195,9 +194,6 @@ def test_the_size_of_a_tick_is_taken_from_where_it_is_stated(tmp_path, remark, n
     assert not doubts(recording)
     # Of other times nothing is said.
     assert not any(clock_said(*said) for said in (("start time", "5 s"), ("exposure time", "ms"), ("time", "25 us")))
-
-
-OF_THE_RATE = ("# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz")
 
 
 @pytest.mark.parametrize("remark", [*OF_THE_RATE, "# fs = 4 g", "# baud rate: 115200", "# i2c frequency: 400000"])

@@ -16,6 +16,9 @@ from trihedron.records import FindingCode
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 from trihedron.simulate import hand_session, scenario_by_name
 
+EARTH_RAD_S = 7.292115e-5
+NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
+
 
 @pytest.fixture(scope="module")
 def posed():
@@ -47,10 +50,6 @@ def test_gyro_clock_and_lever_arm_come_out_within_their_error_bars(posed, found)
     assert np.all(np.abs(found.lever_arm.value - posed.arm) < 4.5 * found.lever_arm.std)
     assert np.all(found.lever_arm.std < 5e-3)
     assert np.degrees(np.arccos(found.vertical.value[2])) < 1.0
-
-
-EARTH_RAD_S = 7.292115e-5
-NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
 
 
 def fine_unit(seed, earth=None):

@@ -21,6 +21,8 @@ import trihedron
 from small_session import made_once
 from trihedron.records import SensorCalibration
 
+SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
+
 
 @pytest.fixture(scope="module")
 def folder():
@@ -284,9 +286,6 @@ def test_nobody_can_write_into_a_result_or_what_pickle_and_deepcopy_make_of_it_w
             assert type(copied) is type(one)
             seen[name] += len(arrays)
     assert sum(seen.values()) > 300
-
-
-SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
 
 
 @pytest.mark.parametrize("name", [*SHOWN, "read_calibration"])

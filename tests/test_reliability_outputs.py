@@ -15,6 +15,15 @@ from small_session import G, copied, leftovers, quietly, run, started
 from trihedron.cli import COMMANDS, build_app, main
 from trihedron.files.output import MARK, OutputError, Temporary, check_free, write_whole
 
+UNTRUSTED = {
+    "allan": ["allan", "log.csv", "--calibration", "untrusted.json"],
+    "apply": ["apply", "untrusted.json", "log.csv", "-o", "x.csv"],
+    "verify": ["verify", "untrusted.json", "log.csv"],
+    "diagnose": ["diagnose", "log.csv", "--calibration", "untrusted.json"],
+    "simulate": ["simulate", "--like", "log.csv", "--calibration", "untrusted.json", "-o", "x.csv"],
+    "export": ["export", "untrusted.json", "--to", "c"],
+}
+
 
 @pytest.fixture
 def session(tmp_path):
@@ -228,16 +237,6 @@ def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
 
 
 # Statuses
-
-
-UNTRUSTED = {
-    "allan": ["allan", "log.csv", "--calibration", "untrusted.json"],
-    "apply": ["apply", "untrusted.json", "log.csv", "-o", "x.csv"],
-    "verify": ["verify", "untrusted.json", "log.csv"],
-    "diagnose": ["diagnose", "log.csv", "--calibration", "untrusted.json"],
-    "simulate": ["simulate", "--like", "log.csv", "--calibration", "untrusted.json", "-o", "x.csv"],
-    "export": ["export", "untrusted.json", "--to", "c"],
-}
 
 
 def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one():

@@ -25,6 +25,11 @@ ENVIRONMENTS = (
     {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
     {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
 )
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+ONE_SECOND = 1.0
+LOADED = 4.0
+"""A machine with ten busy processes on two cores gives a process a fifth of one."""
 
 
 def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path):
@@ -120,13 +125,6 @@ def test_names_of_files_break_no_line_of_a_repr_and_those_that_are_no_text_are_s
     assert "\\udcff\\udcfe.csv" in said
     with open(out, encoding="utf-8") as stream:
         assert json.load(stream)
-
-
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-
-ONE_SECOND = 1.0
-LOADED = 4.0
-"""A machine with ten busy processes on two cores gives a process a fifth of one."""
 
 
 @pytest.fixture(scope="module")

@@ -34,6 +34,10 @@ from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from written_session import G, simulated, usual
 
+GRAVITY = float(G)
+HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
+
 
 def chart():
     """A mark of every kind, with a gap in a line."""
@@ -103,9 +107,6 @@ def test_the_command_lays_out_what_another_one_saved(tmp_path, capsys):
     assert "trihedron plan" in page.read_text(encoding="utf-8"), "how it was made is how it was made first"
     assert main(["report", str(page)]) == 1
     assert "not a saved result" in capsys.readouterr().err
-
-
-GRAVITY = float(G)
 
 
 def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
@@ -207,10 +208,6 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
     y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
-
-
-HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
-ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
 
 
 def long_document():

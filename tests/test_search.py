@@ -19,6 +19,11 @@ from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import contiguous, core_state
 from trihedron.session.noise import ANYTHING
 
+CASES = {
+    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
+    "timing-jitter": {"jitter_s": 1e-3},
+}
+
 
 @cache
 def fitted(effect_id="", seed=3, n_poses=14, **size):
@@ -135,12 +140,6 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     thermal = effects["gyro-thermal-bias"]
     assert thermal.confounded_with == ("gyro-bias-drift",)
     assert "temperature" in thermal.separating_experiment
-
-
-CASES = {
-    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
-    "timing-jitter": {"jitter_s": 1e-3},
-}
 
 
 @pytest.mark.parametrize("effect_id", CASES)

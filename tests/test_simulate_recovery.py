@@ -12,6 +12,12 @@ from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.simulate import Clock, NoiseTerms, make_noise, scenario_by_name, simulate
 from true_segments import segments_from_truth
 
+DT = 0.02
+N_SAMPLES = 4096
+CLUSTERS = (1, 4, 16, 64, 256)
+# Realisations: seeds times three axes.
+N_SEEDS = 20
+
 
 def relative(S, truth):
     return np.abs(np.linalg.solve(truth, S) - np.eye(3)).max()
@@ -59,13 +65,6 @@ def test_labels_cover_the_recording_and_holds_stand_still():
         assert not truth.angular_rate_rad_s[rows].any()
         assert np.ptp(truth.specific_force_m_s2[rows], axis=0).max() == 0.0
         assert np.linalg.norm(truth.specific_force_m_s2[pose.start]) == pytest.approx(truth.gravity_m_s2, rel=1e-14)
-
-
-DT = 0.02
-N_SAMPLES = 4096
-CLUSTERS = (1, 4, 16, 64, 256)
-# Realisations: seeds times three axes.
-N_SEEDS = 20
 
 
 def flicker_expected(m):

@@ -27,6 +27,8 @@ from trihedron.simulate.device.serving import Device
 mpl.use("Agg")
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
+PAGE = DOCS / "worked-example.md"
+SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
 def shown_to_run(path):
@@ -150,9 +152,6 @@ def test_capture_in_python_runs_as_shown(tmp_path, monkeypatch, capsys):
     assert trihedron.read("log.csv").n_samples == 300
 
 
-PAGE = DOCS / "worked-example.md"
-
-
 def shown(language):
     return [block for block in blocks(PAGE) if block.language == language]
 
@@ -178,9 +177,6 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert "gyro bias X −7.86" in said[2]
     assert promised in said[3]
     assert Path("extended.json").is_file()
-
-
-SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
 @pytest.fixture(scope="module")
