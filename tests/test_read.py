@@ -234,15 +234,6 @@ def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
         read_recording(path, time_unit="fortnight")
 
 
-def test_a_counter_that_starts_again_from_zero_is_continued(tmp_path):
-    table = readings()
-    ticks = table.copy()
-    ticks[:, 0] = (2**32 - 500_000 + np.arange(200) * 10_000) % 2**32
-    recording = read_recording(write(tmp_path / "log.csv", ticks, HEADER.replace("t,", "micros,")))
-    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=1e-9)
-    assert FindingCode.TIME_WRAPPED in codes(recording)
-
-
 def test_one_sensor_alone_is_a_recording(tmp_path):
     table = readings()
     recording = read_recording(write(tmp_path / "Gyroscope.csv", table[:, [0, 4, 5, 6]], "t,X,Y,Z\n"))

@@ -290,17 +290,6 @@ def test_an_absent_library_is_named_with_its_package(tmp_path, monkeypatch, magi
         read_recording(path)
 
 
-@pytest.mark.parametrize(
-    "magic", [b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n", b"SQLite format 3\x00", b"ULog\x01\x12\x35\x01"]
-)
-def test_a_damaged_file_of_an_ecosystem_is_one_sentence(tmp_path, magic):
-    path = tmp_path / "log.bin"
-    path.write_bytes(magic + bytes(range(256)) * 3)
-    with pytest.raises(ReadError) as caught:
-        read_recording(path)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("name", REAL)
 def test_real_files_are_read_whole(real_data, name):
     library, options, rows, rate = REAL[name]

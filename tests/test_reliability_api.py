@@ -25,13 +25,8 @@ SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman"
 
 
 @pytest.fixture(scope="module")
-def folder():
-    return made_once()
-
-
-@pytest.fixture(scope="module")
-def recording(folder):
-    return trihedron.read(folder / "log.csv")
+def recording():
+    return trihedron.read(made_once() / "log.csv")
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +35,9 @@ def result(recording):
 
 
 @pytest.fixture(scope="module")
-def right(folder, recording, result, tmp_path_factory):
+def right(recording, result, tmp_path_factory):
     """Arguments that each verb needs, all of them right."""
-    place = tmp_path_factory.mktemp("api")
+    folder, place = made_once(), tmp_path_factory.mktemp("api")
     x = np.random.default_rng(0).normal(size=(2000, 3))
     both = {"calibration": result, "recording": recording}
     return {
@@ -220,7 +215,8 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
 
 
 @pytest.fixture(scope="module")
-def results(folder, recording, result):
+def results(recording, result):
+    folder = made_once()
     rest = folder / "static.csv"
     x = np.random.default_rng(0).normal(size=(2000, 2))
     return {

@@ -13,7 +13,7 @@ import typer
 
 from small_session import G, copied, leftovers, quietly, run, started
 from trihedron.cli import COMMANDS, build_app, main
-from trihedron.files.output import MARK, OutputError, Temporary, check_free, write_whole
+from trihedron.files.output import MARK, OutputError, Temporary, write_whole
 
 UNTRUSTED = {
     "allan": ["allan", "log.csv", "--calibration", "untrusted.json"],
@@ -172,22 +172,14 @@ def test_standard_output_on_a_full_disk_is_status_1(session, words):
     assert "standard output" in err
 
 
-# Two writers at the same moment
-
-
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_a_file_that_appears_while_another_is_written_is_replaced_only_with_leave(tmp_path, overwrite):
-    target = tmp_path / "one.json"
-    with Temporary(target) as slow:
-        slow.write(b"slow")
-        target.write_text("quick")
-        with contextlib.nullcontext() if overwrite else pytest.raises(FileExistsError):
-            slow.put_in_place(None, overwrite=overwrite)
+def test_a_file_that_appears_while_another_is_written_is_replaced_only_with_leave(tmp_path, overwrite, monkeypatch):
+    target, write = tmp_path / "one.json", Temporary.write
+    monkeypatch.setattr(Temporary, "write", lambda slow, data: (write(slow, data), target.write_text("quick")))
+    with contextlib.nullcontext() if overwrite else pytest.raises(OutputError, match="meanwhile and was left alone"):
+        write_whole(target, "slow", overwrite=overwrite)
     assert target.read_text() == ("slow" if overwrite else "quick")
     assert leftovers(tmp_path) == []
-
-
-# Killed runs
 
 
 def test_what_a_killed_run_left_is_cleared_by_the_next_and_a_live_one_is_not_harmed(tmp_path):
@@ -236,9 +228,6 @@ def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
     assert leftovers(session) == []
 
 
-# Statuses
-
-
 def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one():
     commands = typer.main.get_command(build_app()).commands
     takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)} | {
@@ -256,12 +245,3 @@ def test_an_untrusted_calibration_ends_in_status_2_with_its_reason(session, caps
     assert "not to be trusted" in err
     # The gravest reason: a verification with the calibration's own recording says nothing of it.
     assert ("made from this recording" if words[0] == "verify" else "Scale 3 is not") in err
-
-
-def test_outputs_are_checked_before_the_inputs_are_read(tmp_path):
-    log = tmp_path / "log.csv"
-    log.write_text("")
-    with pytest.raises(OutputError, match="is the input"):
-        check_free([log], overwrite=True, inputs=[log])
-    with pytest.raises(OutputError, match="exists"):
-        check_free([log], overwrite=False)

@@ -58,19 +58,6 @@ def test_closed_streams_lose_no_result_and_reach_no_file(tmp_path, closed, statu
     assert leftovers(folder) == []
 
 
-@pytest.mark.parametrize("options", [[], ["--force"]])
-def test_of_writers_of_one_output_each_says_whether_it_wrote(tmp_path, options):
-    folder = copied(tmp_path)
-    line = ["convert", "log.csv", "-o", "one.csv", *options]
-    writers = [started(*line, cwd=folder) for _ in range(2)]
-    said = [writer.communicate(timeout=120)[1].decode() for writer in writers]
-    written = [writer.returncode == 0 for writer in writers]
-    assert sum(written) == (2 if options else 1)
-    assert all("left alone" in text for text, wrote in zip(said, written, strict=True) if not wrote)
-    assert read_recording(folder / "one.csv").n_samples == read_recording(folder / "log.csv").n_samples
-    assert leftovers(folder) == []
-
-
 def test_a_log_that_grows_while_it_is_read_is_what_it_was_at_some_moment(tmp_path):
     folder = copied(tmp_path)
     log = folder / "log.csv"
@@ -93,17 +80,6 @@ def test_a_log_that_grows_while_it_is_read_is_what_it_was_at_some_moment(tmp_pat
 def test_a_key_given_twice_is_refused_and_not_the_last_taken(text):
     with pytest.raises(DocumentError, match="gives 'a' twice"):
         parse_json(text)
-
-
-@pytest.mark.parametrize(
-    "text", ["a = " + "[" * 5000 + "]" * 5000, ".".join("a" * 5000) + " = 1", "a = " + "{b=" * 3000 + "1" + "}" * 3000]
-)
-def test_toml_nested_beyond_reason_is_refused(tmp_path, text):
-    from trihedron.simulate.scenario_file import read_scenario
-
-    (tmp_path / "s.toml").write_text(text + "\n")
-    with pytest.raises(ValueError, match="nested too deeply"):
-        read_scenario(tmp_path / "s.toml")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
