@@ -10,6 +10,7 @@ from trihedron import _core, calibrate
 from trihedron.estimate.accelerometer import bending
 from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
 from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.verification import norm_error
 from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -108,8 +109,6 @@ def test_a_touched_pose_is_found():
 
 @pytest.mark.parametrize("kept", [slice(0, 12), slice(4, 18)])
 def test_the_first_advised_pose_beats_every_other_candidate(kept):
-    from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
-
     up = cube_poses()[kept]
     relative = np.full(len(up), 1e-4)
     design = PoseDesign.of(up, relative)
@@ -190,8 +189,6 @@ def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():
 
 
 def test_poses_are_advised_first_where_parameters_are_undetermined():
-    from trihedron.estimate.accelerometer.poses import PoseDesign
-
     # Seven poses of a session that stopped early: neither face along Y, and a second +X almost where the first was.
     up = np.array(
         [

@@ -13,8 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import trihedron
+from small_session import usual
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
-from written_session import usual
 
 # A device, several recordings or minutes: the tutorials run these.
 SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}

@@ -3,11 +3,14 @@
 import json
 import math
 from dataclasses import fields, replace
+from functools import reduce
 from importlib.resources import files
+from operator import getitem
 
 import numpy as np
 import pytest
 
+from small_session import usual
 from trihedron import calibrate
 from trihedron.api.applying import apply
 from trihedron.files.calibration import (
@@ -33,7 +36,6 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut, Wher
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.plain import as_plain, from_plain
 from trihedron.records.reference import Estimate, FitToReference
-from written_session import usual
 
 OF_DIAGNOSIS = {
     "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": EffectParameter, "effect": AcceptedEffect,
@@ -47,11 +49,6 @@ EVERY = [("diagnosis", *item) for item in OF_DIAGNOSIS.items()]
 EVERY += [("calibration", *item) for item in OF_CALIBRATION.items()]
 
 
-@pytest.fixture(scope="module")
-def session():
-    return usual()[:2]
-
-
 def same(a, b):
     if isinstance(a, np.ndarray):
         return np.array_equal(a, b, equal_nan=True)
@@ -60,8 +57,8 @@ def same(a, b):
     return a == b
 
 
-def test_a_round_trip_gives_back_every_number_exactly(session, tmp_path):
-    calibration = session[1].calibration
+def test_a_round_trip_gives_back_every_number_exactly(tmp_path):
+    calibration = usual()[1].calibration
     write_calibration(calibration, tmp_path / "c.json")
     back = read_calibration(tmp_path / "c.json")
     assert np.array_equal(back.covariance, calibration.covariance)
@@ -74,16 +71,16 @@ def test_a_round_trip_gives_back_every_number_exactly(session, tmp_path):
             assert all(same(before[key], after[key]) for key in before), part
     rest = ("frame", "gravity_m_s2", "gravity_source", "recording_source", "recording_sha256", "findings")
     assert all(getattr(back, key) == getattr(calibration, key) for key in rest)
-    alone = calibrate(replace(session[0], gyroscope=None), gravity_m_s2=9.80665).calibration
+    alone = calibrate(replace(usual()[0], gyroscope=None), gravity_m_s2=9.80665).calibration
     write_calibration(alone, tmp_path / "alone.json")
     assert read_calibration(tmp_path / "alone.json").gyroscope is None
     assert np.array_equal(read_calibration(tmp_path / "alone.json").covariance, alone.covariance)
 
 
-def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units(session):
+def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units():
     import jsonschema
 
-    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+    document = json.loads(json.dumps(calibration_document(usual()[1].calibration)))
     jsonschema.Draft202012Validator.check_schema(schema_of("calibration"))
     jsonschema.validate(document, schema_of("calibration"), cls=jsonschema.Draft202012Validator)
     assert document["format_version"] == 1
@@ -95,26 +92,15 @@ def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units
     assert len(document["recording"]["sha256"]) == 64
 
 
-def test_the_equation_written_in_the_file_reproduces_what_apply_does(session):
+def test_the_equation_written_in_the_file_reproduces_what_apply_does():
     """A user who follows the file's words, and nothing else, must get what the tool gets."""
-    recording, result = session
+    recording, result, _ = usual()
     document = json.loads(json.dumps(calibration_document(result.calibration)))
     corrected = apply(result, recording)
     for name in ("accelerometer", "gyroscope"):
         S, b = (np.array(document[name][key]) for key in ("S", "b"))
         expected = [S @ row + b for row in getattr(recording, name)[:50]]
         np.testing.assert_allclose(getattr(corrected, name)[:50], expected, rtol=0, atol=1e-12)
-
-
-def damaged(document, path, value):
-    at = document
-    for key in path[:-1]:
-        at = at[key]
-    if value is None:
-        del at[path[-1]]
-    else:
-        at[path[-1]] = value
-    return document
 
 
 @pytest.mark.parametrize(
@@ -132,10 +118,14 @@ def damaged(document, path, value):
         (("frame",), "sideways", "frame"),
     ],
 )
-def test_a_changed_file_is_refused_with_the_place_named(session, tmp_path, path, value, said):
-    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+def test_a_changed_file_is_refused_with_the_place_named(tmp_path, path, value, said):
+    document = json.loads(json.dumps(calibration_document(usual()[1].calibration)))
+    at = reduce(getitem, path[:-1], document)
+    at[path[-1]] = value
+    if value is None:
+        del at[path[-1]]
     file = tmp_path / "c.json"
-    file.write_text(json.dumps(damaged(document, path, value)))
+    file.write_text(json.dumps(document))
     with pytest.raises(CalibrationFileError, match=r"c\.json") as caught:
         read_calibration(file)
     assert said in str(caught.value)

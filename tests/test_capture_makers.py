@@ -93,10 +93,6 @@ def test_counts_of_an_sbg_are_as_large_as_its_status_says(status, per_rad_s):
     assert frame.ticks == 5000
 
 
-def repeated(*messages: bytes) -> bytes:
-    return b"".join(messages * 40)
-
-
 def of_words(body: bytes, n: int) -> bytes:
     return b"".join(body + np.random.default_rng(k).bytes(n) for k in range(40))
 
@@ -104,12 +100,12 @@ def of_words(body: bytes, n: int) -> bytes:
 FOREIGN = {
     "video": (b"\0\0\0\x14ftypmp41" + bytes(3000), "a video.*gopro-telemetry"),
     "gpmf": (b"DEVC\0\x01\x12\x34" + bytes(3000), "a GoPro GPMF.*gopro-telemetry"),
-    "angles": (repeated(b"$VNYPR,+010.071,+000.278,-002.026*60\r\n"), r"VectorNav text without.*\$VNIMU"),
+    "angles": ((40 * b"$VNYPR,+010.071,+000.278,-002.026*60\r\n"), r"VectorNav text without.*\$VNIMU"),
     "vectornav binary": (of_words(b"\xfa\x01\x21\x01", 60), "VectorNav binary output.*VNIMU"),
     "sbg": (of_words(b"\xff\x5a\x06\x00\x1c\x00", 33), "SBG sbgECom without IMU data.*switch"),
-    "witmotion": (repeated(b"\x55\x53" + bytes(8) + b"\xa8"), "WitMotion packets without.*switch"),
+    "witmotion": (40 * (b"\x55\x53" + bytes(8) + b"\xa8"), "WitMotion packets without.*switch"),
     "bluetooth": (of_words(b"\x55\x61", 18), "WitMotion's Bluetooth.*serial"),
-    "nmea": (repeated(b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"), "NMEA.*no IMU"),
+    "nmea": ((40 * b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"), "NMEA.*no IMU"),
     "mtdata": (of_words(b"\xfa\xff\x32\x1c", 29), "Xsens MTData of the old kind.*MTData2"),
 }
 

@@ -126,7 +126,7 @@ def log(
         readings[sensor] = lsb * np.round(x / lsb) if lsb else x
     time = np.arange(n) / RATE_HZ + (jitter_s * rng.standard_normal(n) if jitter_s else 0.0)
     clock = {"time_s": time} if timed else {"time_s": None, "rate_hz": RATE_HZ}
-    made = Recording.from_arrays(**clock, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    made = Recording.from_arrays(**clock, **readings)
     return sampled(made, POSES, numbers())
 
 

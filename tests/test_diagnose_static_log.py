@@ -25,12 +25,6 @@ def still(n, rate_hz, seed, force=(0.3, -0.2, 9.79)):
     return t, accelerometer, gyroscope
 
 
-def recording(t, accelerometer, gyroscope, **more):
-    return trihedron.Recording.from_arrays(
-        t, accelerometer, gyroscope, accelerometer_unit="m/s^2", gyroscope_unit="rad/s", **more
-    )
-
-
 def chamber(seed, hysteresis=0.0):
     """Up from -10 to 60 °C and back, at 1 Hz in 80 min: the gyro's bias follows, lagging if there is hysteresis."""
     n, rate_hz = 4800, 1.0
@@ -39,11 +33,11 @@ def chamber(seed, hysteresis=0.0):
     heat = 25.0 - 35.0 * np.cos(2.0 * np.pi * u)
     own = np.array([0.01, -0.03, 0.004]) * DEG
     gyroscope += (heat - 25.0)[:, None] * own + hysteresis * np.sign(np.gradient(heat))[:, None] * np.array([1, 0, 0])
-    return recording(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
+    return Recording.from_arrays(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
 
 
 def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named():
-    d = trihedron.diagnose(recording(*still(15000, 100.0, 41)), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(*still(15000, 100.0, 41)), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
     assert d.effects == ()
     assert {t.domain for t in d.domains} >= {"static-gyro", "static-accel", "within-static"}
@@ -84,7 +78,7 @@ def test_branches_that_differ_while_heating_and_cooling_are_stated_in_degrees_pe
 def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
     t, accelerometer, gyroscope = still(30000, 25.0, 46)
     gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert [e.id for e in d.effects] == ["gyro-bias-drift"]
     spans = {p.name: p.value for p in d.effects[0].parameters}
     assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
@@ -93,14 +87,14 @@ def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
 def test_a_hum_in_a_static_log_is_named():
     t, accelerometer, gyroscope = still(15000, 100.0, 47)
     gyroscope[:, 0] += 0.04 * DEG * np.sin(2.0 * np.pi * 17.3 * t)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert [e.id for e in d.effects] == ["periodic-interference"]
     assert d.effects[0].parameters[0].value == pytest.approx(17.3, abs=1e-3)
 
 
 @pytest.mark.parametrize(("lasts_s", "is_for_noise"), [(6, False), (30, True)])
 def test_only_a_log_long_enough_for_noise_is_sent_to_allan(lasts_s, is_for_noise):
-    log = recording(*still(100 * lasts_s, 100.0, 42))
+    log = Recording.from_arrays(*still(100 * lasts_s, 100.0, 42))
     advice = [" ".join(one.action for one in trihedron.check(log).findings)]
     advice.append(diagnosis_report(trihedron.diagnose(log, gravity_m_s2=9.8)).next_step)
     assert ["allan" in one for one in advice] == [is_for_noise] * 2
@@ -113,7 +107,7 @@ def test_a_log_in_motion_names_nothing():
     accelerometer[:, 0] += 9.8 * np.sin(angle)
     accelerometer[:, 2] += 9.8 * (np.cos(angle) - 1.0)
     gyroscope[:, 1] += np.gradient(angle, t)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
     assert d.effects == ()
 

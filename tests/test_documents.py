@@ -19,6 +19,8 @@ import trihedron
 from documented import DOCS
 
 ROOT = DOCS.parent
+PACKAGE = ROOT / "python" / "trihedron"
+ROOTS = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", DOCS]
 PAGES = sorted(DOCS.rglob("*.md"))
 # Made from the code when the site is built (docs/hooks/reference.py), or from a notebook beside it.
 MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
@@ -43,7 +45,7 @@ def test_every_page_is_in_the_navigation_once():
 
 
 @pytest.mark.parametrize("page", [*PAGES, *ROOT.glob("*.md")], ids=lambda page: page.stem)
-def test_links_of_the_sources_hold_fences_say_their_language_and_commands_name_programs_that_are_there(page):
+def test_links_of_the_sources_hold_fences_say_their_language_and_files_that_they_name_are_there(page):
     text = page.read_text(encoding="utf-8")
     prose = re.sub(r"^```.*?^```|`[^`\n]+`", "", text, flags=re.MULTILINE | re.DOTALL)
     paths = {link.partition("#")[0] for link in LINK.findall(prose) if not re.match(r"\w+:", link)} - {""}
@@ -51,15 +53,16 @@ def test_links_of_the_sources_hold_fences_say_their_language_and_commands_name_p
     made = {DOCS / name for name in MADE}
     assert [path for path, place in places.items() if not place.exists() and place not in made] == []
     # What a figure was made with can be run again.
-    programs = re.findall(r"python (benches/\w+(?:\.py)?)", text)
-    assert [name for name in programs if not (ROOT / name).exists()] == []
+    named = set(re.findall(r"(?<=python )benches/\w+(?:\.py)?|\b(?:benches|tests)/[\w/]+\.py\b", text))
+    # Paths with a file's ending, looked for where a reader would look.
+    named |= set(re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|pyi|rs|md|schema\.json))`", text))
+    assert [name for name in named if not any((root / name).exists() for root in ROOTS)] == []
     said = FENCE.findall(text) if page in PAGES else []
     assert not [words for words in said if not re.fullmatch(r"\w*", words)]
     assert len(said) % 2 == 0
 
 
 def test_the_readme_is_short_and_its_pictures_are_in_the_repository():
-
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 140
     pictures = re.findall(r"!\[[^]]*\]\((\S+)\)", text)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import trihedron
 from test_export import export_calibration
@@ -33,11 +34,7 @@ TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN
 
 def turn(roll, pitch, yaw):
     """Sensor to board: yaw, pitch, roll, in the manner of both autopilots."""
-    r, p, y = np.radians([roll, pitch, yaw])
-    Rx = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
-    Ry = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
-    Rz = np.array([[np.cos(y), -np.sin(y), 0], [np.sin(y), np.cos(y), 0], [0, 0, 1]])
-    return Rz @ Ry @ Rx
+    return Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True).as_matrix()
 
 
 def ardupilot(p, raw_accel, raw_gyro, T, imu, R):

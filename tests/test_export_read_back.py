@@ -15,14 +15,6 @@ from trihedron.files.formats import any_calibration, export_files, formats, is_c
 READ = [name for name, one in formats().items() if one.read is not None]
 BOARDS = ("ardupilot", "px4")
 GYRO_LOST = ("imu_calib",)
-CAMCHAIN = {
-    "cam0": {
-        "T_cam_imu": np.eye(4).tolist(),
-        "camera_model": "pinhole",
-        "intrinsics": [458.6, 457.3, 367.2, 248.4],
-        "timeshift_cam_imu": 0.0021,
-    }
-}
 
 
 def written(known, target, folder):
@@ -101,7 +93,8 @@ def test_results_of_kalibr_as_its_writer_dumps_them_with_a_second_imu_and_no_bia
 
 def test_a_file_of_where_the_imu_sits_is_refused_with_what_it_lacks(tmp_path):
     """Kalibr's camera chain holds pose and delay of the IMU, nothing of its readings."""
-    (tmp_path / "camchain-imucam.yaml").write_text(yaml.dump(CAMCHAIN))
+    chain = {"T_cam_imu": np.eye(4).tolist(), "camera_model": "pinhole", "timeshift_cam_imu": 0.0021}
+    (tmp_path / "camchain-imucam.yaml").write_text(yaml.dump({"cam0": chain}))
     with pytest.raises(ValueError, match=r"(?s)Kalibr.*no scale, misalignment or bias"):
         any_calibration(tmp_path / "camchain-imucam.yaml")
     assert is_calibration(tmp_path / "camchain-imucam.yaml")

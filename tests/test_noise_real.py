@@ -11,14 +11,11 @@ from trihedron.api.identifying import allan, noise_of_curve
 from trihedron.records import Recording
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
+from true_segments import codes
 
 N, RATE = 360_000, 100.0
 WHITE = 1e-4
 """N of readings that scatter by 1e-3 at 100 Hz."""
-
-
-def codes(axis):
-    return {finding.code for finding in axis.findings}
 
 
 @pytest.fixture(scope="module")

@@ -88,10 +88,6 @@ def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without
     np.testing.assert_allclose(np.linalg.norm(force, axis=1) - gravity, quality.residual, atol=1e-12)
 
 
-def session_of(seed, n_poses=18):
-    return simulated(seed=seed, n_poses=n_poses, grade="adis")
-
-
 def fitted_to(recording, gravity):
     segments = segment_recording(recording)
     calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
@@ -117,7 +113,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
 
 
 def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
-    recording, truth = session_of(4)
+    recording, truth = simulated(seed=4, n_poses=18, grade="adis")
     plain, _ = fitted_to(recording, truth.gravity_m_s2)
     timestamps = recording.time_s.copy()
     moves = segment_recording(recording).moves
@@ -131,7 +127,7 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
 
 
 def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_and_prediction():
-    recording, truth = session_of(3, 12)
+    recording, truth = simulated(seed=3, n_poses=12, grade="adis")
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     J, r = fitted.core.jacobian(), fitted.system.residual
     size = np.linalg.norm(J, axis=0)
@@ -182,7 +178,7 @@ def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_pos
 def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     scores = []
     for seed in range(4):
-        recording, truth = session_of(seed + 20, 24)
+        recording, truth = simulated(seed=seed + 20, grade="adis")
         segments = segment_recording(recording)
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))

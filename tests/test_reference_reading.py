@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import trihedron
 from reference_rig import G, turn
@@ -15,22 +16,7 @@ from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 T = np.arange(0, 4, 0.02)
 A, B, C = 0.3 * np.sin(T), 0.2 * np.sin(1.7 * T), 0.4 * np.sin(0.9 * T)
 TRUE = turn(2, A) @ turn(1, B) @ turn(0, C)  # yaw, pitch, roll
-
-
-def half(axis, angle):
-    q = np.zeros((len(angle), 4))
-    q[:, 0], q[:, 1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
-    return q
-
-
-def product(p, q):
-    w = p[:, 0] * q[:, 0] - np.sum(p[:, 1:] * q[:, 1:], axis=1)
-    v = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
-    return np.column_stack([w, v])
-
-
-# (n, 4) w x y z by half angles, apart from any library.
-Q = product(product(half(2, A), half(1, B)), half(0, C))
+Q = np.roll(Rotation.from_matrix(TRUE).as_quat(), 1, axis=1)  # w x y z
 
 
 def written(tmp_path, columns, header=""):

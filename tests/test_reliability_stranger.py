@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from small_session import G, copied, leftovers, made_once, run, started
+from small_session import G, copied, leftovers, made_once, run, started, usual
 from trihedron import _core
 from trihedron.documents import DocumentError, parse_json
 from trihedron.read import read_recording
-from written_session import usual
 
 # C without UTF-8; an unknown locale, no home and a dumb terminal.
 ENVIRONMENTS = (
@@ -118,19 +117,13 @@ def long_log(tmp_path_factory):
     return path
 
 
-def wait_until_it_listens(process):
-    """Until the command has its handlers: the interpreter itself starts for some 50 ms."""
-    while True:
-        with open(f"/proc/{process.pid}/status") as status:
-            caught = next(int(line.split()[1], 16) for line in status if line.startswith("SigCgt"))
-        if caught >> (signal.SIGTERM - 1) & 1 or process.poll() is not None:
-            return
-        time.sleep(0.005)
-
-
 def interrupted(process, number, after_s):
-    """Status, stderr and how long the process lived on."""
-    wait_until_it_listens(process)
+    """Status, stderr and how long the process lived on, from when it has its handlers: it starts for some 50 ms."""
+    caught = 0
+    while not caught >> (signal.SIGTERM - 1) & 1 and process.poll() is None:
+        with open(f"/proc/{process.pid}/status") as now:
+            caught = next(int(line.split()[1], 16) for line in now if line.startswith("SigCgt"))
+        time.sleep(0.005)
     time.sleep(after_s)
     if process.poll() is not None:
         process.communicate()

@@ -6,11 +6,14 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 import pytest
 
 import trihedron
+from small_session import G, simulated, usual
 from trihedron.cli import COMMANDS, main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
@@ -32,7 +35,6 @@ from trihedron.report.saved import report_of, with_report
 from trihedron.report.text import Style, to_text
 from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-from written_session import G, simulated, usual
 
 GRAVITY = float(G)
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
@@ -83,9 +85,7 @@ def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
 )
 def test_what_is_of_another_kind_than_it_should_be_is_refused(path, value):
     saved = json.loads(json_text(with_report({}, document())))
-    place = saved["report"]["document"]
-    for key in path[:-1]:
-        place = place[key]
+    place = reduce(getitem, path[:-1], saved["report"]["document"])
     assert path[-1] in place if isinstance(place, dict) else True
     place[path[-1]] = value
     with pytest.raises(InputError, match="malformed"):

@@ -18,6 +18,7 @@ from trihedron.diagnose.session.starting_point import start_state
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import contiguous, core_state
 from trihedron.session.noise import ANYTHING
+from trihedron.simulate import diagnosed_sizes
 
 CASES = {
     "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
@@ -105,6 +106,8 @@ def test_a_long_delay_is_a_delay_of_that_length():
     assert first.id == "accel-gyro-time-offset"
     # 40 ms were called 26 ms and a lag of -14 ms; half a millisecond is a twentieth of a sample.
     assert first.parameters[0].value == pytest.approx(0.04, abs=5e-4)
+    # A simulation of what was found has it with its sign.
+    assert diagnosed_sizes([first.to_dict()])[0] == [(first.id, {"offset_s": pytest.approx(0.04, abs=5e-4)})]
     assert not any(p.name.endswith("_lag") and p.value < 0.0 for e in d.effects for p in e.parameters)
     for effect in d.effects:  # nothing whose size is unknown
         assert any(abs(p.value) > p.std for p in effect.parameters), effect.id

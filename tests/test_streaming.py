@@ -74,9 +74,6 @@ def test_corrected_readings_are_those_of_the_whole_and_a_stopped_run_goes_on(who
     calibration = trihedron.calibrate(whole, gravity_m_s2=G)
     out = tmp_path / "si.npy"
 
-    class Stopped(Exception):
-        pass
-
     def stop(fraction, _text):
         if fraction > 0.5:
             raise Stopped

@@ -7,6 +7,8 @@ use trihedron::poisson::{
 use trihedron::rotation::{exp, exp_and_left_jacobian, skew};
 use trihedron::simd::Instructions;
 
+use super::made_session::Uniform;
+
 const MODELS: [RateModel; 3] = [RateModel::Constant, RateModel::Linear, RateModel::Coning];
 const QUIET: RateNoise = RateNoise {
     density: Vector3::new(0.0, 0.0, 0.0),
@@ -14,18 +16,12 @@ const QUIET: RateNoise = RateNoise {
     nominal_step_s: f64::INFINITY,
 };
 
-/// Deterministic numbers in (−1, 1).
-fn noise(k: usize) -> f64 {
-    let x = (k as f64 * 12.9898 + 4.1).sin() * 43758.5453;
-    2.0 * (x - x.floor()) - 1.0
-}
-
 fn timestamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
-    let h = span / (n - 1) as f64;
+    let (h, mut random) = (span / (n - 1) as f64, Uniform(3));
     (0..n)
         .map(|k| {
             let inner = k > 0 && k < n - 1;
-            h * (k as f64 + if inner { jitter * noise(k) } else { 0.0 })
+            h * (k as f64 + if inner { jitter * random.next() } else { 0.0 })
         })
         .collect()
 }
