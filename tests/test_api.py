@@ -30,11 +30,6 @@ def result():
     return usual()[1]
 
 
-def test_import_loads_neither_numpy_nor_anything_else_heavy():
-    code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
-
-
 def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
     x = np.random.default_rng(1).normal(size=4096)
     one, two = trihedron.allan_deviation(x, 100.0), trihedron.allan_deviation(np.c_[x, x], 100.0)

@@ -81,9 +81,8 @@ def led():
         readings = readings_of(recording)
         for first, last in steps(recording.time_s[done:]):
             state["now"] = float(recording.time_s[done + last - 1])
-            views.append(
-                guide.advance(recording.time_s[done + first : done + last], readings[done + first : done + last])
-            )
+            rows = slice(done + first, done + last)
+            views.append(guide.advance(recording.time_s[rows], readings[rows]))
         done = recording.n_samples
         # A second more than requested: stillness is known half a second late.
         target = guide.view().target_up

@@ -49,12 +49,8 @@ def test_a_stream_of_a_known_maker_is_recognised_and_keeps_every_reading(board, 
 def test_what_a_clock_says_is_lost_stands_in_the_log(board, tmp_path):
     recording = still()
     encode = encoder_for(board)
-    frames = [
-        encode(k, float(t), a, w)
-        for k, (t, a, w) in enumerate(
-            zip(recording.time_s, recording.accelerometer / 100, recording.gyroscope, strict=True)
-        )
-    ]
+    force, rate = recording.accelerometer / 100, recording.gyroscope
+    frames = [encode(k, float(t), force[k], rate[k]) for k, t in enumerate(recording.time_s)]
     # One sample is gone whole, of another the last bytes.
     (tmp_path / "stream").write_bytes(b"".join(frames[:50] + frames[51:120] + [frames[120][:-20]] + frames[121:]))
     assert main(["capture", str(tmp_path / "stream"), "-o", str(tmp_path / "log.csv")]) == 0

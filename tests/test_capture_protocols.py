@@ -23,10 +23,9 @@ COUNTED = [
     ("sbg", "sbg"),
 ]
 UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines"), ("vectornav",) * 2]
-FAST = ("declared", "xio")
-RATES = [(*one, 100.0) for one in COUNTED] + [
-    pytest.param(*one, 1000.0, marks=() if one[0] in FAST else pytest.mark.slow) for one in COUNTED
-]
+SLOW = {board: pytest.mark.slow for board, _ in COUNTED if board not in ("declared", "xio")}
+RATES = [(*one, 100.0) for one in COUNTED]
+RATES += [pytest.param(*one, 1000.0, marks=SLOW.get(one[0], ())) for one in COUNTED]
 
 
 @pytest.fixture

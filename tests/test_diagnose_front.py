@@ -58,27 +58,18 @@ def folder(tmp_path_factory):
     return where
 
 
-@pytest.fixture(scope="module")
-def said(folder):
-    """The command on the bent log, once for all."""
-    target, page = folder / "bent.json", folder / "bent.html"
-    status = main(["diagnose", str(folder / "bent.csv"), *GRAVITY, "--json", str(target), "--report", str(page)])
-    return status, json.loads(target.read_text()), page.read_text()
-
-
-def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contract(said):
-    _, document, _ = said
+def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contract(folder):
+    main(["diagnose", str(folder / "bent.csv"), *GRAVITY, "--json", str(folder / "bent.json")])
+    document = json.loads((folder / "bent.json").read_text())
     assert violation(document, "diagnosis") == ""
     contract = {"verdict", "domains", "effects", "remaining", "candidates", "calibration", "noise", "schema_version"}
     assert contract <= set(document)
     assert contract <= set(schema_of("diagnosis")["required"])
     assert set(document) <= set(schema_of("diagnosis")["properties"])
     assert set(document["figures"]) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
-    bent = {
-        **document["figures"],
-        "gravity_error_in_static_poses": {**document["figures"]["gravity_error_in_static_poses"], "unit": "mg"},
-    }
-    said = violation({**document, "figures": bent}, "diagnosis")
+    other = document["figures"]["gravity_error_in_static_poses"] | {"unit": "mg"}
+    bent = document["figures"] | {"gravity_error_in_static_poses": other}
+    said = violation(document | {"figures": bent}, "diagnosis")
     assert said.startswith("figures.gravity_error_in_static_poses.unit")
     effect = document["effects"][0]
     assert {"id", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "confounded_with"} <= set(effect)
@@ -135,11 +126,9 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     identity = (np.eye(3), np.zeros(3))
     done = compensate(recording, [effect], {"temperature_degc": 25.0}, identity, identity)
     assert not done.left_out
-    sensor, true = (
-        ("gyroscope", truth.angular_rate_rad_s) if "gyro" in effect_id else ("accelerometer", truth.specific_force_m_s2)
-    )
-    before = np.max(np.abs(getattr(recording, sensor) - true))
-    after = np.max(np.abs(getattr(done, sensor) - true))
+    is_gyros = "gyro" in effect_id
+    true = truth.angular_rate_rad_s if is_gyros else truth.specific_force_m_s2
+    before, after = (np.max(np.abs((r.gyroscope if is_gyros else r.accelerometer) - true)) for r in (recording, done))
     # Two passes of the fixed point and temperature logged in steps of 0.01 K leave per mille of the effect.
     assert after < 0.02 * before
 

@@ -127,9 +127,7 @@ def poses(seed, n_poses, amplitude, colour=0.0):
             cycles = rng.integers(8, int(0.4 * lengths[k])) + 0.5
             phase = 2.0 * np.pi * cycles * np.arange(lengths[k]) / lengths[k] + rng.uniform(0.0, 2.0 * np.pi)
             x[here] += amplitude * np.sin(phase)[:, None] * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.5, 3)
-    recording = Recording(
-        time_s=np.arange(len(x)) / RATE_HZ, accelerometer=x, gyroscope=None, rate_hz=RATE_HZ,
-    )  # fmt: skip
+    recording = Recording(np.arange(len(x)) / RATE_HZ, x, None, RATE_HZ)
     mean = np.array([x[a:b].mean(axis=0) for a, b in pairwise(edges)])
     error = SIGMA / np.sqrt(lengths)[:, None] * np.ones(3)
     segments = Segments(
@@ -163,8 +161,13 @@ def test_poses_without_a_line_keep_their_means(colour):
     assert not swing.any()
 
 
-def session(seed, shaken_share, gain, rate_line):
-    """A hand session; in a share of its poses 1 m/s² of shaking with ``gain`` times its square, a line in rates.
+@pytest.mark.parametrize(
+    ("seed", "shaken_share", "gain", "rate_line", "named"),
+    # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
+    [(1, 0.35, 0.005, 0.0, "vibration-rectification"), (4, 0.0, 0.0, 3e-3, "periodic-interference")],
+)
+def test_an_offset_of_shaken_poses_is_rectification_and_a_line_interference(seed, shaken_share, gain, rate_line, named):
+    """In a share of the poses 1 m/s² of shaking with ``gain`` times its square, a line in rates.
 
     The truth's own poses are shaken from end to end, at a frequency that is no whole number of cycles of any.
     """
@@ -179,15 +182,5 @@ def session(seed, shaken_share, gain, rate_line):
         force[here] += (shake + gain * shake**2) @ np.linalg.inv(np.asarray(truth.accelerometer_S)).T
     rate += rate_line * np.outer(np.sin(2.0 * np.pi * f * t), np.linalg.solve(truth.gyroscope_S, np.ones(3)))
     log = replace(recording, accelerometer=force, gyroscope=rate)
-    return trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-
-
-@pytest.mark.parametrize(
-    ("seed", "shaken_share", "gain", "rate_line", "named"),
-    # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
-    [(1, 0.35, 0.005, 0.0, "vibration-rectification"), (4, 0.0, 0.0, 3e-3, "periodic-interference")],
-)
-def test_a_few_mm_s2_that_go_with_the_shaking_are_rectification_and_a_line_in_every_pose_is_interference(
-    seed, shaken_share, gain, rate_line, named
-):
-    assert [effect.id for effect in session(seed, shaken_share, gain, rate_line).effects] == [named]
+    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert [effect.id for effect in found.effects] == [named]

@@ -23,9 +23,8 @@ PACKAGE = ROOT / "python" / "trihedron"
 ROOTS = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", DOCS]
 PAGES = sorted(DOCS.rglob("*.md"))
 # Made from the code when the site is built (docs/hooks/reference.py), or from a notebook beside it.
-MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
-    "tutorials/notebook.md"
-}
+MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")}
+MADE |= {"tutorials/notebook.md"}
 # What a fence may say behind its backticks: a language, and nothing else.
 FENCE = re.compile(r"^ *```(.*)$", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -96,26 +95,20 @@ def test_what_a_release_says_of_itself_agrees():
     assert len(changes.splitlines()) <= 40
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
+@pytest.mark.slow
+def test_nothing_of_the_site_is_loaded_from_elsewhere(tmp_path):
     """The site as it is published."""
     needed = ("mkdocs", "material", "mkdocstrings", "mkdocs_gen_files", "latex2mathml")
     missing = [name for name in needed if not find_spec(name)]
     if missing:
         pytest.skip(f"the site cannot be built without {', '.join(missing)} (extra docs)")
-    made = tmp_path_factory.mktemp("site")
     quiet = {"NO_MKDOCS_2_WARNING": "1", "DISABLE_MKDOCS_2_WARNING": "true"}
     quiet |= {"PYTHONPATH": str(Path(trihedron.__file__).parents[1])}
     # Without -q, which silences the warnings before --strict counts them.
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(made)]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(tmp_path)]
     built = subprocess.run(
         command, cwd=ROOT, env={**os.environ, **quiet}, capture_output=True, text=True, timeout=600, check=False
     )
     assert built.returncode == 0, built.stdout + built.stderr
-    return made
-
-
-@pytest.mark.slow
-def test_nothing_of_the_site_is_loaded_from_elsewhere(site):
     elsewhere = re.compile(r"""(?:src|href)="(?:https?:)?//[^"]+\.(?:js|css|woff2?)\"""")
-    assert not [page for page in site.rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]
+    assert not [page for page in tmp_path.rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]

@@ -44,9 +44,8 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
     found = diagnosed(effect_id, n_poses=18, **size)
     effect = next(effect for effect in found.effects if effect.id == effect_id)
     curves = effect.curves
-    assert [(c.sensor, c.axis, c.driver, c.is_relative) for c in curves] == [
-        ("accelerometer", j, driver, is_relative) for j in range(3)
-    ]
+    seen = [(c.sensor, c.axis, c.driver, c.is_relative) for c in curves]
+    assert seen == [("accelerometer", j, driver, is_relative) for j in range(3)]
     for j, curve in enumerate(curves):
         left = curve.data - np.interp(curve.data_x, curve.x, curve.value)
         # Half of what it adds: the weakest of these is a few times the noise of a pose.
@@ -89,7 +88,6 @@ def test_errors_of_latitude_and_north_are_those_they_say(sigma):
 
 def test_a_vector_that_is_not_the_earths_is_not_called_so():
     effect, sigma = EarthRate(), np.diag(np.square([3e-6, 3e-6, 3e-6]))
-
     at_home, here = Variant(NO_DISTORTION, ("x", "y", "z"), ("rad/s",) * 3), np.radians(35.0)
     assert effect.is_plausible(at_home, turning(here, 1.0), sigma)
     assert effect.is_plausible(at_home, turning(-here, 1.0), sigma)

@@ -18,7 +18,6 @@ from trihedron.records import Calibration, Finding, FindingCode, SensorCalibrati
 from trihedron.sensor_model import in_frame
 
 READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
-
 # Residue of writing numbers with all digits and evaluating in another order.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
 NOISE = ExportOptions(
@@ -70,9 +69,8 @@ def test_python_snippet_runs_and_agrees(handed, frame):
     scope = {}
     exec(export_calibration(known, "python"), scope)
     for name, sensor in (("ACCELEROMETER", known.accelerometer), ("GYROSCOPE", known.gyroscope)):
-        np.testing.assert_allclose(
-            scope["correct"](READINGS, scope[f"S_{name}"], scope[f"B_{name}"]), corrected(sensor)
-        )
+        made = scope["correct"](READINGS, scope[f"S_{name}"], scope[f"B_{name}"])
+        np.testing.assert_allclose(made, corrected(sensor))
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
@@ -183,9 +181,7 @@ def test_openvins_corrects_the_readings():
     imu = yaml.safe_load(text.replace("%YAML:1.0", ""))["imu0"]
     assert set(SIX) <= set(imu)
     Tw, R, Ta, Tg = (np.array(imu[key]) for key in ("Tw", "R_IMUtoGYRO", "Ta", "Tg"))
-    b_a, b_w = (
-        np.array(numbers(re.search(rf"#   {name} \[(.*)\]", text)[1])) for name in ("accelerometer", "gyroscope")
-    )
+    b_a, b_w = (numbers(re.search(rf"#   {name} \[(.*)\]", text)[1]) for name in ("accelerometer", "gyroscope"))
     force = corrected(known.accelerometer)
     np.testing.assert_allclose((READINGS - b_a) @ np.linalg.inv(Ta).T, force, **ROUNDING)
     readings = READINGS + force @ (np.linalg.inv(known.gyroscope.S) @ G).T
@@ -265,9 +261,8 @@ def test_basalt_subtracts_the_zero_after_the_matrix_and_has_noise_and_rate():
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - a[:3], corrected(known.accelerometer), **ROUNDING)
     M = w[3:].reshape(3, 3).T
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - w[:3], corrected(known.gyroscope), **ROUNDING)
-    assert (document["imu_update_rate"], document["accel_noise_std"], document["gyro_bias_std"]) == (
-        200.0, [2e-3] * 3, [2e-6] * 3,
-    )  # fmt: skip
+    stated = [document[key] for key in ("imu_update_rate", "accel_noise_std", "gyro_bias_std")]
+    assert stated == [200.0, [2e-3] * 3, [2e-6] * 3]
 
 
 @pytest.mark.parametrize("target", ["basalt", "kalibr", "openvins", "px4", "ardupilot"])

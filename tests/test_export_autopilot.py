@@ -19,8 +19,6 @@ AXES = "XYZ"
 TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
         "INS_GYR1_CALTEMP": 40.0, "INS_TCAL1_ACC1_X": 900.0, "INS_TCAL1_ACC2_Y": -30.0, "INS_TCAL1_ACC3_Z": 0.7,
         "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
-
-
 ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
 ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
 ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
@@ -72,9 +70,8 @@ def px4(p, raw_accel, raw_gyro, T, accel, gyro, R):
             group = next(i for i in range(4) if p.get(f"TC_{letter}{i}_ID") == p[f"CAL_{word}{k}_ID"])
             low, high = p[f"TC_{letter}{group}_TMIN"], p[f"TC_{letter}{group}_TMAX"]
             t = (np.clip(T, low, high) - p[f"TC_{letter}{group}_TREF"])[:, None]
-            v = v - sum(
-                t**n * np.array([p.get(f"TC_{letter}{group}_X{n}_{axis}", 0.0) for axis in range(3)]) for n in range(4)
-            )
+            for n in range(4):
+                v = v - t**n * [p.get(f"TC_{letter}{group}_X{n}_{axis}", 0.0) for axis in range(3)]
         v = v - [p[f"CAL_{word}{k}_{a}OFF"] for a in AXES]
         v = v * [p.get(f"CAL_{word}{k}_{a}SCALE", 1.0) for a in AXES]
         out.append(v @ R.T)
@@ -151,9 +148,8 @@ def log_of(autopilot, parameters, stage="body"):
     t = np.arange(n) / 100.0
     recording = trihedron.read({"t": t, "acc": rng.normal(0, 5, (n, 3)), "gyr": rng.normal(0, 1, (n, 3))},
                                accelerometer_unit="m/s^2", gyroscope_unit="rad/s")  # fmt: skip
-    return replace(
-        recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=Onboard(autopilot, 0, 0, stage, parameters)
-    )
+    onboard = Onboard(autopilot, 0, 0, stage, parameters)
+    return replace(recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=onboard)
 
 
 def with_temperature(known, reference=28.0):
@@ -278,9 +274,8 @@ def test_settings_of_inav_on_raw_counts_are_what_apply_gives(exact):
         zero, gain = zero + 0.3, gain + 1e-4
     S_a, S_g = np.diag(gain) * counts[0], np.eye(3) * counts[1]
     known = given((S_a, -S_a @ zero), (S_g, -S_g @ [9.0, -11.0, -4.0]), 9.80665, "counts")
-    text = export_calibration(
-        known, "inav", ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
-    )
+    sizes = ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
+    text = export_calibration(known, "inav", sizes)
     raw = np.random.default_rng(2).integers(-3000, 3000, (50, 3)).astype(float)
     # As INAV's acceleration.c and gyro.c correct, but for their rounding of the result.
     p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}

@@ -14,6 +14,8 @@ import yaml
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
 from trihedron.api.filter_noising import noticed
+from trihedron.api.referring import motion_of
+from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, fit, height, most_likely
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
@@ -155,9 +157,7 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
         ({"N": Bounded(N, 0.9 * N, 1.1 * N), "static": None}, "filter-noise-below-quietest", False),
     ],
 )
-def test_an_n_that_is_uncertain_a_limit_the_references_or_below_the_quietest_second_is_a_warning(
-    found, change, words, is_said
-):
+def test_an_n_that_is_uncertain_a_limit_the_references_or_below_the_quietest_is_said(found, change, words, is_said):
     # The least of some 60 estimates with a relative error of 5 % each.
     assert found.sensors[0].quietest == pytest.approx(N, rel=0.2)
     noticed_now = noticed([replace(found.sensors[0], **change)])
@@ -182,9 +182,7 @@ def test_a_warning_about_n_stands_in_the_file_as_on_the_screen(found):
 def test_what_a_log_lacks_is_said_at_once():
     t = np.arange(6000) / 100.0
     swing = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.1 * t])
-    moving = Recording.from_arrays(
-        t, swing + np.array([0.0, 0.0, G]), swing, gyroscope_unit="counts", accelerometer_unit="m/s^2"
-    )
+    moving = Recording.from_arrays(t, swing + np.array([0.0, 0.0, G]), swing, gyroscope_unit="counts")
     still = replace(resting(3), accelerometer_unit=AccelerationUnit.COUNTS, gyroscope_unit=RateUnit.COUNTS)
     with pytest.raises(ValueError, match=r"not static in it for 20 s.*reference.*the static log is in counts"):
         trihedron.filter_noise(moving, static=trihedron.allan(still))
@@ -220,9 +218,8 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
 def resting(seed=1, seconds=120, n=N):
     rng = np.random.default_rng(seed)
     m = 100 * seconds
-    return Recording.from_arrays(
-        np.arange(m) / 100.0, [0.0, 0.0, G] + 0.01 * rng.normal(size=(m, 3)), 10 * n * rng.normal(size=(m, 3))
-    )
+    force, rate = [0.0, 0.0, G] + 0.01 * rng.normal(size=(m, 3)), 10 * n * rng.normal(size=(m, 3))
+    return Recording.from_arrays(np.arange(m) / 100.0, force, rate)
 
 
 def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
@@ -270,17 +267,11 @@ def turned_between_intervals(scale):
 @pytest.mark.skipif(not EUROC.exists(), reason="the recorded flights are not beside this checkout")
 def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     static = StaticNoise(Bounded(1.7e-4, 1.55e-4, 1.87e-4), Bounded(1.94e-5, 1.94e-5, 1.94e-5))
-    from trihedron.api.referring import motion_of
-    from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
-
     log = trihedron.read(EUROC / "V1_02_medium.log.csv.gz")
     minute = log.time_s < 60.0
-    log = replace(
-        log, time_s=log.time_s[minute], accelerometer=log.accelerometer[minute], gyroscope=log.gyroscope[minute]
-    )
-    gyro, accelerometer = beside_reference(
-        log, motion_of(EUROC / "V1_02_medium.truth.csv.gz"), Request((10.0,), 50.0, 9.807, static)
-    )
+    log = replace(log, **{name: getattr(log, name)[minute] for name in ("time_s", "accelerometer", "gyroscope")})
+    truth, asked = motion_of(EUROC / "V1_02_medium.truth.csv.gz"), beside.Request((10.0,), 50.0, 9.807, static)
+    gyro, accelerometer = beside.beside_reference(log, truth, asked)
     (one,) = gyro.consistency
     assert one.nees < 7.0
     assert one.static_nees > 30.0

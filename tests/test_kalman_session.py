@@ -69,10 +69,9 @@ def test_pose_numbers_pick_poses_and_a_mismatch_is_said(head, table):
         pose_readings(recording, segments, PoseTable(table.specific_force[:1], pose=np.array([499])))
     with pytest.raises(ValueError, match="each once"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:2], pose=np.array([3, 3])))
+    late = PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
     with pytest.raises(ValueError, match="0 readings"):
-        pose_readings(
-            recording, segments, PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
-        )
+        pose_readings(recording, segments, late)
 
 
 def test_a_coarse_converter_is_charged_with_its_step(head):
@@ -148,10 +147,8 @@ def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):
     return (f - b) @ np.linalg.inv(S).T + noise_now, start, pose, covariance
 
 
-def calibrate(readings, start_s, pose_s, **options):
-    return calibrate_without_references(
-        readings, NOISE, start_s=start_s, pose_s=pose_s, gravity_m_s2=GRAVITY, **options
-    )
+def calibrate(readings, start_s, pose_s):
+    return calibrate_without_references(readings, NOISE, start_s=start_s, pose_s=pose_s, gravity_m_s2=GRAVITY)
 
 
 def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
@@ -197,9 +194,7 @@ def files(tmp_path_factory):
     recording = simulate(scenario, seed=1)[0]
     rows = np.column_stack([recording.time_s, recording.accelerometer])
     np.savetxt(folder / "log.csv", rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
-    np.savetxt(
-        folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, delimiter=",", header="pitch,roll", comments="", fmt="%g"
-    )
+    np.savetxt(folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, "%g", ",", header="pitch,roll", comments="")
     (folder / "noise.json").write_text('{"white": 0.01, "walk": [0.001, 0.001, 0.001]}')
     return folder
 

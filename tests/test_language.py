@@ -21,7 +21,6 @@ from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python/trihedron"
-
 RETIRED = {
     # Only where zero means a bias: as a number it stays.
     r"\bzero[- ]readings?": "bias",

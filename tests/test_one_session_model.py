@@ -71,9 +71,8 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
 def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):
     recording, gravity, result, _ = healthy
     checked = verify(result.calibration, recording, gravity_m_s2=gravity)
-    assert np.sqrt(np.mean(checked.verification.norm_error**2)) == pytest.approx(
-        result.accelerometer.quality.rms, rel=1e-9
-    )
+    rms = np.sqrt(np.mean(checked.verification.norm_error**2))
+    assert rms == pytest.approx(result.accelerometer.quality.rms, rel=1e-9)
     # Directions of the poses come from the same means; the noise of a pose was measured with another accelerometer.
     np.testing.assert_allclose(checked.verification.angle_deg, result.gyroscope.quality.angle_deg, rtol=1e-6)
 
@@ -96,10 +95,8 @@ def fitted_to(recording, gravity):
 
 
 def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data):
-    folder = real_data / "getovermassif"
-    recording = read_recording(
-        accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt"
-    )
+    paths = {f"{sensor}_path": real_data / f"getovermassif/session4_{stem}.txt" for sensor, stem in SENSORS}
+    recording = read_recording(**paths)
     fitted, _ = fitted_to(recording, 9.803)
     # imu_tk found 1.000 on the log's own unit; shrunk by its biases' scatter it was 0.816, moves 4.70 deg.
     assert fitted.state.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
@@ -156,9 +153,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
 
 
 @pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 2.6)])
-def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_poses_alone(
-    real_data, name, expected_mm_s2
-):
+def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_poses_alone(real_data, name, expected_mm_s2):
     # Moves of this log miss by degrees (lost samples, timestamps of arrival). Over the accelerometer they left 19
     # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone, with biases that are lines in time, leave 2.79
     # and 2.09: the second accelerometer drifts by 40 mm/s².

@@ -83,9 +83,8 @@ def test_topics_of_a_bag_are_listed_with_counts_and_chosen(tmp_path):
     other = TABLE.copy()
     other[:, 1:4] += 1.0
     path = write_bag(tmp_path / "log.bag", {"/front/imu": TABLE, "/rear/imu": other[:200]}, kind="ros1")
-    with pytest.raises(
-        ReadError, match=r"/front/imu \(300 messages\), /rear/imu \(200 messages\); .*--topic /front/imu"
-    ):
+    listed = r"/front/imu \(300 messages\), /rear/imu \(200 messages\); .*--topic /front/imu"
+    with pytest.raises(ReadError, match=listed):
         read_recording(path)
     assert_same(read_recording(path, topic="/front/imu"))
     assert read_recording(path, topic="rear/imu").n_samples == 200

@@ -78,9 +78,8 @@ def test_six_columns_without_names_are_put_in_order_by_gravity(tmp_path, gyro_fi
     recording = read_recording(write(tmp_path / "log.txt", np.column_stack(pair), "", separator=" "), rate_hz=RATE_HZ)
     np.testing.assert_array_equal(recording.accelerometer, force)
     np.testing.assert_array_equal(recording.gyroscope, rate)
-    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is (
-        Severity.WARNING if gyro_first else Severity.NOTE
-    )
+    severity = Severity.WARNING if gyro_first else Severity.NOTE
+    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is severity
 
 
 def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):

@@ -60,9 +60,7 @@ def test_a_typeset_minus_is_a_minus(tmp_path, separator, decimal, encoding, monk
     if encoding == "utf-8":  # a log in UTF-16 is read in one block
         monkeypatch.setattr(text_module, "BLOCK_BYTES", 1 << 16)
     table = readings(ROWS)
-    path = write(
-        tmp_path / "log.csv", table, header=HEADER.replace(",", separator), separator=separator, decimal=decimal
-    )
+    path = write(tmp_path / "log.csv", table, HEADER.replace(",", separator), separator, decimal)
     path.write_bytes(path.read_text().replace("-", "\u2212").encode(encoding))
     recording = read_recording(path)
     assert_same(recording, table)
@@ -138,16 +136,11 @@ def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp
     np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
 
 
-def overtaken(n, seed=0):
-    """(n, 7) rows at 1 kHz of which some stand up to five places late, and the same in order."""
-    rng = np.random.default_rng(seed)
-    ordered = np.column_stack([np.arange(n) / 1000.0, rng.normal(9.8, 0.02, (n, 3)), rng.normal(0.0, 0.002, (n, 3))])
-    late = np.arange(n) + np.where(rng.random(n) < 1e-2, 5.5, 0.0)
-    return ordered[np.argsort(late, kind="stable")], ordered
-
-
 def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_path):
-    given, ordered = overtaken(5000)
+    # Rows at 1 kHz of which some stand up to five places late.
+    n, rng = 5000, np.random.default_rng(0)
+    ordered = np.column_stack([np.arange(n) / 1000.0, rng.normal(9.8, 0.02, (n, 3)), rng.normal(0.0, 0.002, (n, 3))])
+    given = ordered[np.argsort(np.arange(n) + np.where(rng.random(n) < 1e-2, 5.5, 0.0), kind="stable")]
     path = tmp_path / "log.csv"
     np.savetxt(path, given, delimiter=",", header="time [s],ax,ay,az,gx,gy,gz", comments="", fmt="%.6f")
     recording = trihedron.read(path)
@@ -184,11 +177,8 @@ def doubts(recording):
     ],
 )
 def test_the_size_of_a_tick_is_taken_from_where_it_is_stated(tmp_path, remark, name, per_s):
-    recording = read_recording(
-        stated(
-            tmp_path / "log.csv", np.rint(T * per_s).astype(int) if per_s > 1 else T * per_s, f"{name},{NAMES}", remark
-        )
-    )
+    clock = np.rint(T * per_s).astype(int) if per_s > 1 else T * per_s
+    recording = read_recording(stated(tmp_path / "log.csv", clock, f"{name},{NAMES}", remark))
     # Ticks of 62.5 us round the time to 3e-3 of a step.
     assert recording.rate_hz == pytest.approx(50.0, rel=1e-3)
     assert not doubts(recording)
@@ -245,11 +235,9 @@ def test_a_column_t_that_falls_is_no_clock(tmp_path):
 
 
 def test_a_column_that_changes_where_the_clock_goes_back_identifies_devices(tmp_path):
-    one = [f"left,{t:.4f}" for t in T]
+    clock = [f"{wrist},{t:.4f}" for wrist in ("left", "right") for t in T]
     force, rate = np.concatenate([FORCE, 1.01 * FORCE]), np.concatenate([RATE, RATE])
-    log = stated(
-        tmp_path / "log.csv", [*one, *(r.replace("left", "right") for r in one)], f"wrist,t,{NAMES}", "", force, rate
-    )
+    log = stated(tmp_path / "log.csv", clock, f"wrist,t,{NAMES}", "", force, rate)
     with pytest.raises(ReadError, match="'wrist' identifies 2 devices: left"):
         read_recording(log)
     assert len(read_recording(log, instance="right").time_s) == len(T)

@@ -11,7 +11,7 @@ from reference_rig import G, turn
 from reference_truths import truth
 from trihedron.estimate.reference.fit import fit_reference, laid_beside
 from trihedron.read.reference.motion import read_reference
-from trihedron.records.reference import NAMED_FROM, ReferenceMotion
+from trihedron.records.reference import ReferenceMotion
 
 T = np.arange(0, 4, 0.02)
 A, B, C = 0.3 * np.sin(T), 0.2 * np.sin(1.7 * T), 0.4 * np.sin(0.9 * T)
@@ -46,17 +46,14 @@ def test_one_attitude_in_every_way_of_writing_it(tmp_path, columns, header, said
     assert np.allclose(motion.time_s, T, atol=2e-4)
 
 
-def test_rates_carry_their_unit_and_slow_rows_are_commands(tmp_path):
+def test_rates_and_positions_carry_their_unit_and_slow_rows_are_commands(tmp_path):
+    p = np.column_stack([A, B, C])
+    motion = read_reference(written(tmp_path, (T, Q, 1e3 * p), "t,qw,qx,qy,qz,px [mm],py [mm],pz [mm]"))
+    assert np.allclose(motion.position, p, atol=1e-8)
     rate = np.array([[0, 0, 0], [30, 0, 0], [0, -60, 0], [0, 0, 0.0]])
     motion = read_reference(written(tmp_path, (np.arange(4) * 10.0, rate), "t [s],wx [deg/s],wy [deg/s],wz [deg/s]"))
     assert motion.is_stepwise
     assert np.allclose(motion.rate, np.radians(rate))
-
-
-def test_a_pose_has_its_position_in_metres(tmp_path):
-    p = np.column_stack([A, B, C])
-    motion = read_reference(written(tmp_path, (T, Q, 1e3 * p), "t,qw,qx,qy,qz,px [mm],py [mm],pz [mm]"))
-    assert np.allclose(motion.position, p, atol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -83,18 +80,6 @@ def z_of_bias(found, trial):
     """(3,) standard scores of the gyro's bias."""
     b = -np.linalg.solve(trial.unit.M, trial.unit.c)
     return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
-
-
-# Beside a tracker at rest: tests/test_reference.py.
-@pytest.mark.slow
-def test_a_drone_under_a_tracker_of_attitudes_has_the_g_sensitivity_that_it_has():
-    # It leans into its acceleration: its accelerometer's parameters are not stated, and what its gyro feels still is.
-    trial = truth(4, "drone", seconds=40, has_g_sensitivity=True, size_deg=0.1)
-    found = fit_reference(trial.log, trial.motion, G)
-    one = found.effects["gyro-g-sensitivity"]
-    assert one.score > NAMED_FROM
-    assert np.abs((one.value - trial.unit.g_sensitivity.ravel()) / one.std).max() < 4.5
-    assert np.abs(z_of_bias(found, trial)).max() < 4.5
 
 
 def test_what_a_reference_is_too_poor_to_show_is_said_with_the_size_from_which_it_would():

@@ -81,7 +81,6 @@ NO_ARRAY = (None, "x", object(), [["a"]], [[1, 2], [3]], np.ones((50, 3)) * 1j, 
 NO_ARRAY += (np.array([object()]), np.array(["2020-01-01"], "M8[s]"), np.array(1.0), {1, 2}, [10**400])
 NO_CALL = (3, "x", object(), [1], int, np.zeros(3))
 NO_TABLE = (object(), 3, np.zeros(3), b"x", "a\0b", [1])
-
 BY_KIND = {
     "float": (*NO_NUMBER, *NO_QUANTITY),
     "int": (*NO_NUMBER, 1.5, float("nan"), 10**400, Fraction(1, 3)),
@@ -124,19 +123,6 @@ OF_A_LIBRARY = re.compile(
 )
 
 
-def verbs():
-    return [name for name in trihedron.__all__ if inspect.isfunction(getattr(trihedron, name))]
-
-
-def wrong_for(name, annotation):
-    kinds = annotation.removesuffix(" | None")
-    listed = next((kind for kind in (kinds, *FIRST) if kind in BY_KIND and kind in kinds), None)
-    values = BY_KIND[listed or kinds]
-    if annotation.endswith("| None"):
-        values = [value for value in values if value is not None]
-    return [*values, *([-3] if name in ALSO_NEGATIVE else []), *([0] if name in ALSO_ZERO else [])]
-
-
 def rejected(what, ask):
     """That a call ends in one sentence of ours, raised by us."""
     try:
@@ -155,7 +141,8 @@ def rejected(what, ask):
     pytest.fail(f"{what} was taken")
 
 
-WALK = [(verb, name) for verb in verbs() for name in inspect.signature(getattr(trihedron, verb)).parameters]
+VERBS = [name for name in trihedron.__all__ if inspect.isfunction(getattr(trihedron, name))]
+WALK = [(verb, name) for verb in VERBS for name in inspect.signature(getattr(trihedron, verb)).parameters]
 
 
 @pytest.mark.parametrize(("verb", "name"), WALK)
@@ -167,14 +154,18 @@ def test_every_wrong_argument_of_every_verb_is_one_sentence_of_ours(right, verb,
         rejected(f"{verb}(nonsense=1)", lambda: ask("log.csv", "x.csv", nonsense=1))
         rejected(f"{verb}(rate_hz='x')", lambda: ask("log.csv", "x.csv", rate_hz="x"))
         return
-    for value in wrong_for(name, str(parameter.annotation)):
+    annotation = str(parameter.annotation)
+    kinds = annotation.removesuffix(" | None")
+    listed = next((kind for kind in (kinds, *FIRST) if kind in BY_KIND and kind in kinds), kinds)
+    wrong = [value for value in BY_KIND[listed] if value is not None or kinds == annotation]
+    for value in [*wrong, *([-3] if name in ALSO_NEGATIVE else []), *([0] if name in ALSO_ZERO else [])]:
         arguments = {**right[verb], name: value}
         rejected(f"{verb}({name}={value!r:.60})", lambda ask=ask, arguments=arguments: ask(**arguments))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_or_a_missing_argument_is_a_sentence():
-    for verb in verbs():
+    for verb in VERBS:
         rejected(verb, lambda verb=verb: getattr(trihedron, verb)(nonsense=1))
 
 

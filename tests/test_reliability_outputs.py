@@ -68,22 +68,18 @@ def test_no_output_lies_on_an_input_even_with_force(session, capsys, monkeypatch
         for name in inputs:
             before = (session / name).read_bytes()
             ending = {"--report": ".html", "--plot": ".png", "--truth": ".json"}.get(words[-1])
-            for place in {name, f"./{name}", str(session / name), *_other_names(session, name, ending)}:
+            # The same file under a symbolic and a hard link as well; the ending is one that the option takes.
+            suffix = ending or os.path.splitext(name)[1]
+            soft, hard = session / f"soft-{name}{suffix}", session / f"hard-{name}{suffix}"
+            if not soft.exists():
+                soft.symlink_to(session / name)
+                os.link(session / name, hard)
+            for place in {name, f"./{name}", str(session / name), soft.name, hard.name}:
                 status = main([*words, place, "--force"])
                 err = capsys.readouterr().err
                 assert status == 1, (words, place, err)
                 assert (session / name).read_bytes() == before
             assert leftovers(session) == []
-
-
-def _other_names(folder, name, ending):
-    """The same file under a symbolic and a hard link; the ending is one that the option takes."""
-    suffix = ending or os.path.splitext(name)[1]
-    soft, hard = folder / f"soft-{name}{suffix}", folder / f"hard-{name}{suffix}"
-    if not soft.exists():
-        soft.symlink_to(folder / name)
-        os.link(folder / name, hard)
-    return soft.name, hard.name
 
 
 def test_a_device_is_written_to_and_stays_a_device(session, capsys):
@@ -230,11 +226,9 @@ def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
 
 def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one():
     commands = typer.main.get_command(build_app()).commands
-    takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)} | {
-        "verify"
-    }
+    takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)}
     # Where it is an output (capture, guide) nothing is read.
-    assert takes - {"capture", "guide", "calibrate", "kalman"} == set(UNTRUSTED)
+    assert takes - {"capture", "guide", "calibrate", "kalman"} == set(UNTRUSTED) - {"verify"}
 
 
 @pytest.mark.parametrize("words", UNTRUSTED.values(), ids=list(UNTRUSTED))

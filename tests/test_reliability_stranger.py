@@ -25,7 +25,6 @@ ENVIRONMENTS = (
     {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
 )
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-
 ONE_SECOND = 1.0
 LOADED = 4.0
 """A machine with ten busy processes on two cores gives a process a fifth of one."""

@@ -139,9 +139,8 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     assert abs(float(line[1].replace("−", "-")) - 1000.0 * expected[0]) < float(line[2])
     other = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0), seed=4)
     several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=GRAVITY)
-    common = next(
-        one for one in several.model.repeated if (one.parameter.id, one.parameter.name) == ("accel-bias", "x")
-    )
+    biases = (one for one in several.model.repeated if one.parameter.id == "accel-bias")
+    common = next(one for one in biases if one.parameter.name == "x")
     # Two sessions of one simulated unit: their common bias is that of the first within both uncertainties.
     assert abs(common.value - expected[0]) < 5.0 * common.std
     again = trihedron.diagnose(recording, calibration=result)
@@ -194,14 +193,10 @@ def test_small_numbers_have_one_notation_in_tables_and_sentences():
     one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
     (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
     assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
-
-
-@pytest.mark.parametrize(
-    ("exponent", "unit", "printed"),
-    [(-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s"), (-3, "", "10⁻³")],
-)
-def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, printed):
-    assert unit_with_power(exponent, unit) == printed
+    # A power of ten is a prefix where the unit takes one.
+    for exponent, unit, printed in ((-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s")):
+        assert unit_with_power(exponent, unit) == printed
+    assert unit_with_power(-3, "") == "10⁻³"
 
 
 def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_a_gap():
@@ -210,16 +205,13 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
 
 
-def long_document():
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
     table = Table(HEAD, (ROW, ROW), "What every domain says, " + "at length, " * 12)
     facts = Facts((("a label that is far longer than half of a narrow terminal has columns", "text " * 40),))
     section = Section("Where", (table, facts, Paragraph("word " * 80)))
-    return Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
-
-
-@pytest.mark.parametrize("width", [60, 80, 200])
-def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
-    text = to_text(long_document(), width=width)
+    long = Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
+    text = to_text(long, width=width)
     assert max(len(line) for line in text.splitlines()) <= width
     # Heads, and names of rows, may stand on several lines.
     said = text.split()
@@ -232,22 +224,18 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
 def test_names_from_a_log_steer_no_terminal_and_stay_one_line_of_a_page():
     hostile = Document("t", "log\x1b[2J.csv", "v", True, (Section("S", (Paragraph("a\x9bb"),)),))
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", to_text(hostile, style=Style(80)))
-    page = to_html(
-        Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, (Section("Poses of a\nb", ()),))
-    )
+    sections = (Section("Poses of a\nb", ()),)
+    page = to_html(Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, sections))
     assert r"/logs/a\nNOT TO BE TRUSTED\t.csv" in page
     assert "a\nNOT TO BE" not in page
     assert not re.search("a\nb|[\x00-\x09\x0b-\x1f\x7f-\x9f]", page)
 
 
-def piped(*words, **environment):
-    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
-    program = [sys.executable, "-m", "trihedron", *words]
-    return subprocess.run(program, env=known | environment, capture_output=True, check=True).stdout
-
-
 def test_a_pipe_gets_no_colour_columns_are_obeyed_and_without_utf_8_it_is_ascii():
-    out = piped("plan", COLUMNS="64", PYTHONIOENCODING="cp1252").decode("ascii")
+    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
+    known |= {"COLUMNS": "64", "PYTHONIOENCODING": "cp1252"}
+    done = subprocess.run([sys.executable, "-m", "trihedron", "plan"], env=known, capture_output=True, check=True)
+    out = done.stdout.decode("ascii")
     assert "deg/s/sqrt(Hz)" in out
     assert "?" not in out
     assert "\x1b" not in out

@@ -14,24 +14,10 @@ import pytest
 from trihedron import _core
 
 STUB = ast.parse((Path(_core.__file__).parent / "_core.pyi").read_text())
-
-
-def callables() -> dict[str, ast.arguments]:
-    """Every function, constructor and method of the compiled core with its declared parameters."""
-    found: dict[str, ast.arguments] = {}
-    for node in STUB.body:
-        if isinstance(node, ast.FunctionDef):
-            found[node.name] = node.args
-        elif isinstance(node, ast.ClassDef):
-            for item in node.body:
-                if isinstance(item, ast.FunctionDef) and not item.decorator_list:
-                    found[f"{node.name}.{item.name}"] = item.args
-    return found
-
-
-CALLABLES = callables()
-
-
+# Functions and constructors of the compiled core with their declared parameters.
+CALLABLES = {node.name: node.args for node in STUB.body if isinstance(node, ast.FunctionDef)}
+CLASSES = [node for node in STUB.body if isinstance(node, ast.ClassDef)]
+CALLABLES |= {kind.name: one.args for kind in CLASSES for one in kind.body if getattr(one, "name", "") == "__new__"}
 KINDS = ("empty", "not finite", "flat", "deep", "no number")
 ARRAYS = (
     np.zeros((0, 3)), np.full((4, 3), np.nan), np.arange(5.0), np.ones((2, 2, 2, 2)), np.array(["x", None], object),
@@ -51,14 +37,14 @@ def odd(annotation: str, kind: int) -> object:
 
 
 @pytest.mark.parametrize("first", range(len(KINDS)), ids=KINDS)
-@pytest.mark.parametrize("name", [n for n in CALLABLES if "." not in n or n.endswith("__new__")])
+@pytest.mark.parametrize("name", CALLABLES)
 def test_odd_arguments_are_answered_or_refused_in_words(name, first):
     declared = [a for a in (*CALLABLES[name].args, *CALLABLES[name].kwonlyargs) if a.annotation]
     # Another kind for every argument in turn.
     given = {a.arg: odd(ast.unparse(a.annotation), (first + k) % len(KINDS)) for k, a in enumerate(declared)}
     said = "answered"
     try:
-        getattr(_core, name.removesuffix(".__new__"))(**given)
+        getattr(_core, name)(**given)
     except (ValueError, TypeError, OverflowError) as rejection:
         said = str(rejection)
     assert said

@@ -173,9 +173,8 @@ def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
             y = 1e-4 * rng.normal(size=21)
             branch = 1 if k % 2 else -1
             y[picked] += 1e-5 * T + size * branch
-            sessions.append(
-                made(y, np.eye(21) * 1e-8, temperature_degc=T, temperature_range_degc=(T, T), branch=branch)
-            )
+            at_T = {"temperature_degc": T, "temperature_range_degc": (T, T), "branch": branch}
+            sessions.append(made(y, np.eye(21) * 1e-8, **at_T))
         found[size] = {term.id: term.hysteresis for term in thermal_model(sessions).terms}
     assert all(value is None for value in found[0.0].values())
     # Twelve sessions of 1e-4: 3e-5; four standard errors.

@@ -1,9 +1,7 @@
 //! Poisson integration: every instruction set against single steps. Order, derivatives, input: `tests/test_attitude.py`.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
-use trihedron::poisson::{
-    MoveRange, PreparedMove, RateModel, RateNoise, Turn, prepare, step_weights,
-};
+use trihedron::poisson::{MoveRange, RateModel, RateNoise, Turn, prepare, step_weights};
 use trihedron::rotation::{exp, exp_and_left_jacobian, skew};
 use trihedron::simd::Instructions;
 
@@ -35,10 +33,6 @@ fn range(time: &[f64]) -> MoveRange {
     }
 }
 
-fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMove {
-    prepare(time, raw, &range(time), model).expect("a valid move")
-}
-
 /// A rate whose direction wanders, so that the commutator matters.
 fn wandering(t: f64) -> Vector3<f64> {
     Vector3::new(
@@ -46,10 +40,6 @@ fn wandering(t: f64) -> Vector3<f64> {
         1.5 * (1.3 * t + 0.4).cos(),
         0.7 * (2.9 * t).sin(),
     )
-}
-
-fn sampled(time: &[f64], magnitude: f64) -> Vec<Vector3<f64>> {
-    time.iter().map(|&t| wandering(t) * magnitude).collect()
 }
 
 fn scale() -> Matrix3<f64> {
@@ -127,9 +117,9 @@ fn every_instruction_set_gives_the_sums_of_single_steps() {
     for n in [2, 4, 9, 60, 331] {
         for magnitude in [0.0, 1e-7, 1.0, 60.0] {
             let time = timestamps(n, 0.01 * n as f64, 0.3);
-            let raw = sampled(&time, magnitude);
+            let raw: Vec<_> = time.iter().map(|&t| wandering(t) * magnitude).collect();
             for model in MODELS {
-                let p = prepared(&time, &raw, model);
+                let p = prepare(&time, &raw, &range(&time), model).expect("a valid move");
                 for noise in &noises {
                     let truth = slowly(&time, &raw, model, &scale(), b, noise);
                     for &set in Instructions::offered() {
