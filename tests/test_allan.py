@@ -12,7 +12,7 @@ from trihedron.estimate.noise.streamed import stream_noise
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
 
 
-def weighted(x, m, d):
+def by_definition(x, m, d):
     """Sums of ``d`` times neighbouring means over the readings present, squared; weight Σd² / (m Σ(d²/n))."""
     total = weight = 0.0
     for k in range(len(x) - len(d) * m + 1):
@@ -98,9 +98,9 @@ def test_missing_readings_are_weighted_as_defined():
     column = x[:, np.newaxis]
     for m in (1, 5, 40, 120):
         weighted = _core.allan_variance(column, [m], _core.AllanKind.Overlapping)[0]
-        assert weighted[0, 0] == pytest.approx(weighted(x, m, np.array([-1.0, 1.0])), rel=1e-11)
+        assert weighted[0, 0] == pytest.approx(by_definition(x, m, np.array([-1.0, 1.0])), rel=1e-11)
         hadamard = _core.allan_variance(column, [m], _core.AllanKind.Hadamard)[0]
-        assert hadamard[0, 0] == pytest.approx(weighted(x, m, np.array([1.0, -2.0, 1.0])), rel=1e-11)
+        assert hadamard[0, 0] == pytest.approx(by_definition(x, m, np.array([1.0, -2.0, 1.0])), rel=1e-11)
 
 
 @pytest.mark.parametrize("kind", ["overlapping", "non-overlapping", "hadamard"])

@@ -102,14 +102,10 @@ def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_
     assert np.degrees(near.latitude_std) < 15.0
 
 
-ROOT = Path(__file__).parents[1]
-DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
+DIAGNOSE = Path(__file__).parents[1] / "python" / "trihedron" / "diagnose"
 STATIC = {"static", "static-counts"}
-
-
-def ours():
-    """Effects of the package: other tests may have added their own."""
-    return [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
+# Effects of the package: other tests may have added their own.
+OURS = [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
 
 
 def cases_of(effect):
@@ -124,14 +120,14 @@ def cases_of(effect):
 
 
 def test_every_effect_has_its_words_and_every_word_its_effect():
-    assert set(CATALOGUE) == {effect.id for effect in ours()}
+    assert set(CATALOGUE) == {effect.id for effect in OURS}
     assert all(entry.mechanism and entry.experiment for entry in CATALOGUE.values())
     assert set(re.findall(r"^## (\S+)$", effects_page(), re.MULTILINE)) == set(CATALOGUE)
 
 
 def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
     asked = 0
-    for effect in ours():
+    for effect in OURS:
         said, seen = dict(CATALOGUE[effect.id].said), set()
         for case, given in cases_of(effect):
             # A case that the run chooses: each that nothing else requests takes these values.

@@ -31,7 +31,6 @@ SIX = (
     "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
     "update_rate", "rostopic",
 )  # fmt: skip
-RAW = ExportOptions(current_parameters="none")
 
 
 def export_calibration(known, target, options=None):
@@ -211,7 +210,7 @@ def test_ros_covariances_are_those_of_one_message():
 @pytest.mark.parametrize("target", ["px4", "ardupilot"])
 def test_what_an_autopilot_cannot_hold_is_written_into_the_file_with_its_size(target):
     known = calibration("si")
-    text = export_calibration(known, target, RAW)
+    text = export_calibration(known, target, ExportOptions(current_parameters="none"))
     # Half of 0.006, the angle between X and Z, at 9.81 m/s²: the other half is a turn of the triad as a whole.
     assert re.search(r"% of the accelerometer's is lost, 2\d(\.\d)? mm/s\^2 at 1 g", text)
     assert "gyro scale" in text

@@ -12,6 +12,7 @@ import pytest
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.fleet import find_jobs, running, summarise
+from trihedron.fleet.summary import _spread_of_axes
 from trihedron.fleet.work import work
 from trihedron.records.sessions import PARAMETERS
 from trihedron.report.fleet import fleet_report
@@ -137,6 +138,14 @@ def test_one_of_six_devices_far_off_is_seen_and_sound_fleets_have_none(tmp_path)
     assert sound.outliers or sound.farthest.serial in fleet_report(sound).verdict
     few = summarise([row(f"u{k}", str(k), one) for k, one in enumerate(numbers[:3])], tmp_path).summary
     assert (few.farthest, "No device stands out" in fleet_report(few).verdict) == (None, False)
+
+
+def test_the_spread_that_is_expected_of_an_axis_is_that_of_its_triad():
+    rng = np.random.default_rng(3)
+    sizes = np.exp(rng.normal(size=(100, 7))).repeat(3, axis=1)
+    ratio = [_spread_of_axes(rng.normal(size=(6, 21)) * sd)[0] / sd**2 for sd in sizes]
+    # Two other axes of six devices know a variance to a half: 2100 of them, related by threes, their mean to 2 %.
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.12)
 
 
 def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):

@@ -46,11 +46,10 @@ def improved(clipped, tmp_path_factory):
     folder = tmp_path_factory.mktemp("range")
     given, better = folder / "ideal.toml", folder / "better.toml"
     given.write_text(IDEAL)
-    patch = pytest.MonkeyPatch()
-    patch.setattr(driving, "N_SEEDS", 2)
-    found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
-    better.write_text(improve(given, found).text)
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driving, "N_SEEDS", 2)
+        found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
+        better.write_text(improve(given, found).text)
     return found, better
 
 

@@ -147,13 +147,9 @@ def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):
     return (f - b) @ np.linalg.inv(S).T + noise_now, start, pose, covariance
 
 
-def calibrate(readings, start_s, pose_s):
-    return calibrate_without_references(readings, NOISE, start_s=start_s, pose_s=pose_s, gravity_m_s2=GRAVITY)
-
-
 def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
     readings, start, pose, covariance = session(1)
-    result = calibrate(readings, start, pose)
+    result = calibrate_without_references(readings, NOISE, start_s=start, pose_s=pose, gravity_m_s2=GRAVITY)
     S, b = result.accelerometer.S, result.accelerometer.b
     f = readings @ S.T + b
     along = (f / np.linalg.norm(f, axis=1)[:, None]) @ S
@@ -178,7 +174,8 @@ def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
 def test_errors_are_as_large_as_stated():
     nees = []
     for seed in range(100, 200):
-        result = calibrate(*session(seed)[:3])
+        readings, start, pose, _ = session(seed)
+        result = calibrate_without_references(readings, NOISE, start_s=start, pose_s=pose, gravity_m_s2=GRAVITY)
         error = np.concatenate([(result.accelerometer.S - S_NORM).ravel(), result.accelerometer.b - B_NORM])[LOWER]
         nees.append(normalised_error_squared(error, result.accelerometer.covariance[np.ix_(LOWER, LOWER)]))
     # 100 draws of chi-square with 9 degrees of freedom, two-sided 99.9 % limits of the sum.

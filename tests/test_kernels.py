@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from trihedron import _core, probability
 from trihedron.diagnose.context import smoothed_slope
+from trihedron.ranges import ranges_of
 
 RNG = np.random.default_rng(20261)
 TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
@@ -127,6 +128,11 @@ def test_a_slope_that_turns_within_a_few_widths_keeps_its_size():
     asked = 0.2 * np.pi * np.cos(2.0 * np.pi * time / 40.0)
     # One Gaussian of 2.5 s takes 7 % off; both, (2π 2.5/40)⁴/2.
     assert np.abs(found - asked)[2000:-2000].max() < 0.015 * np.abs(asked).max()
+
+
+def test_runs_of_a_mask_are_found_up_to_both_its_ends():
+    for mask, runs in (("", []), ("1", [(0, 1)]), ("00", []), ("1101", [(0, 2), (3, 4)]), ("0110", [(1, 3)])):
+        assert ranges_of(np.array([c == "1" for c in mask], dtype=bool)) == runs
 
 
 def test_play_is_the_running_clip_of_its_definition():

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import trihedron
-from test_gyroscope_turns import turned_on_faces
 from trihedron.api.planning import POSE_SETS
 from trihedron.cli import main
+from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
+from trihedron.records import Recording
 
 N = math.radians(0.005)
 
@@ -28,11 +29,23 @@ def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
 
 
 def test_the_plan_is_what_the_calibration_says_of_itself():
-    recording, turns, zeros = turned_on_faces(np.random.default_rng(3), 0.0, (1, 2, 3), (90.0, -90.0) * 5)
+    rng, rate = np.random.default_rng(3), 200.0
+    pieces, turns, zeros, clock = [], [], [], 0
+    for axis in range(3):
+        for angle in (math.pi / 2, -math.pi / 2):
+            n, still = int(2.0 * rate), int(20.0 * rate)
+            zeros.append((clock, clock + still))
+            turns.append(Turn(clock + still, clock + still + n, axis + 1, angle))
+            block = np.zeros((still + n, 3))
+            t = (np.arange(n) + 0.5) / n
+            block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2
+            pieces.append(block)
+            clock += still + n
+    gyro = np.vstack(pieces) + rng.normal(size=(clock, 3)) * N * math.sqrt(rate)
+    recording = Recording(np.arange(clock) / rate, None, gyro, rate)
     found, _ = calibrate_turns(recording, turns, zeros)
-    # Turns of 302 readings at 100 Hz, 31 poses of four seconds, noise of 2e-3 a reading.
-    design = design_turns([90.0, -90.0] * 5, 3.02, 124.0, 2e-4)
-    # The calibration measures N itself, from 248 blocks of half a second: to 3 %.
+    design = design_turns([90.0, -90.0], 2.0, 120.0, N)
+    # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
     np.testing.assert_allclose(np.diag(found.sigma_S), design.scale, rtol=0.12)
     np.testing.assert_allclose(found.sigma_b, design.bias, rtol=0.12)
 

@@ -20,10 +20,6 @@ OTHERS = (
 )
 
 
-def session(n_poses=6, turn_s=1.0):
-    return motion(RATE_HZ, 3, n_poses, turn_s)
-
-
 def saved(path, time_s, force, rate, header=HEADER):
     return write(path, np.round(np.column_stack([time_s, force, rate]), 9), header)
 
@@ -33,14 +29,14 @@ def saved(path, time_s, force, rate, header=HEADER):
 )
 @pytest.mark.parametrize("turn_s", [0.7, 6.0])
 def test_the_gyro_unit_is_told_by_turning_gravity(tmp_path, scale, unit, turn_s):
-    time_s, force, rate = session(turn_s=turn_s)
+    time_s, force, rate = motion(RATE_HZ, 3, 6, turn_s)
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate * scale))
     assert recording.gyroscope_unit is unit
     assert FindingCode.UNIT_ASSUMED not in codes(recording)
 
 
 def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_gravity_is_serious(tmp_path):
-    time_s, force, rate = session()
+    time_s, force, rate = motion(RATE_HZ, 3, 6, 1.0)
     turned = np.column_stack([-rate[:, 2], rate[:, 0], -rate[:, 1]])
     assert read_recording(saved(tmp_path / "log.csv", time_s, force, turned)).gyroscope_unit is RateUnit.RAD_S
     path = saved(tmp_path / "log.csv", time_s, force, rate, "t,ax,ay,az,gx_dps,gy_dps,gz_dps\n")
@@ -52,7 +48,7 @@ def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_grav
 
 @pytest.mark.parametrize("names", ["t,gx,gy,gz,ax,ay,az", "t [s],gx [rad/s],gy [rad/s],gz [rad/s],ax [m/s^2],ay,az"])
 def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(tmp_path, names):
-    time_s, force, rate = session()
+    time_s, force, rate = motion(RATE_HZ, 3, 6, 1.0)
     path = saved(tmp_path / "log.csv", time_s, force, rate, f"{names}\n")
     (found,) = [f for f in read_recording(path).findings if f.code is FindingCode.SENSORS_EXCHANGED]
     assert found.severity is Severity.SERIOUS
@@ -62,7 +58,7 @@ def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(t
 
 
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
-    time_s, force, rate = (part[:200] for part in session(n_poses=1))
+    time_s, force, rate = (part[:200] for part in motion(RATE_HZ, 3, 1, 1.0))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))
     assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
@@ -73,7 +69,7 @@ def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_ser
 @pytest.mark.parametrize("gyro_first", [False, True])
 @pytest.mark.parametrize("n_poses", [1, 6])
 def test_six_columns_without_names_are_put_in_order_by_gravity(tmp_path, gyro_first, n_poses):
-    _, force, rate = session(n_poses=n_poses)
+    _, force, rate = motion(RATE_HZ, 3, n_poses, 1.0)
     pair = [rate, force] if gyro_first else [force, rate]
     recording = read_recording(write(tmp_path / "log.txt", np.column_stack(pair), "", separator=" "), rate_hz=RATE_HZ)
     np.testing.assert_array_equal(recording.accelerometer, force)

@@ -36,7 +36,6 @@ from trihedron.report.text import Style, to_text
 from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
-GRAVITY = float(G)
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
 ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
 
@@ -111,7 +110,7 @@ def test_the_command_lays_out_what_another_one_saved(tmp_path, capsys):
 
 def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
     recording, result, _ = usual()
-    checked = trihedron.verify(result, recording, gravity_m_s2=GRAVITY)
+    checked = trihedron.verify(result, recording, gravity_m_s2=float(G))
     document = verification_report(checked.verification, checked.segments)
     moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
     assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
@@ -138,7 +137,7 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     # The figure is printed to two digits of its uncertainty, in mm/s².
     assert abs(float(line[1].replace("−", "-")) - 1000.0 * expected[0]) < float(line[2])
     other = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0), seed=4)
-    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=GRAVITY)
+    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=float(G))
     biases = (one for one in several.model.repeated if one.parameter.id == "accel-bias")
     common = next(one for one in biases if one.parameter.name == "x")
     # Two sessions of one simulated unit: their common bias is that of the first within both uncertainties.

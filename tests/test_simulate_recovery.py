@@ -19,10 +19,6 @@ CLUSTERS = (1, 4, 16, 64, 256)
 N_SEEDS = 20
 
 
-def relative(S, truth):
-    return np.abs(np.linalg.solve(truth, S) - np.eye(3)).max()
-
-
 @pytest.mark.parametrize(
     ("rate_hz", "gyro_tolerance"),
     # Poses have no sampling error; the integral over a sampled move has one, of about fourth order in the step. Moves
@@ -37,10 +33,10 @@ def test_calibration_of_the_linear_noiseless_instrument_recovers_the_truth(rate_
     equal = np.full_like(segments.accelerometer_mean, 1e-3)
     segments = replace(segments, accelerometer_sigma_mean=equal, gyroscope_sigma_mean=equal)
     accel, _ = calibrate_norm(segments.accelerometer_mean, equal, truth.gravity_m_s2)
-    assert relative(accel.S, truth.accelerometer_S) < 1e-9
+    assert np.abs(np.linalg.solve(truth.accelerometer_S, accel.S) - np.eye(3)).max() < 1e-9
     assert np.abs(accel.b - truth.accelerometer_b).max() < 1e-9
     gyro, _ = calibrate_moves(recording, segments, accel, truth.gravity_m_s2)
-    assert relative(gyro.S, truth.gyroscope_S) < gyro_tolerance
+    assert np.abs(np.linalg.solve(truth.gyroscope_S, gyro.S) - np.eye(3)).max() < gyro_tolerance
     assert np.abs(gyro.b - truth.gyroscope_b).max() < gyro_tolerance
 
 

@@ -27,7 +27,6 @@ from trihedron.simulate.device.serving import Device
 mpl.use("Agg")
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 PAGE = DOCS / "worked-example.md"
-SHORTER = "n_poses = 12\\npose_s = 4\\n"
 
 
 def commands(body):
@@ -179,7 +178,7 @@ def names(tmp_path_factory, without_corners):  # noqa: ARG001
     script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
     session = 'kind = "hand"\\n'
     assert script.count(session) == 2
-    script = script.replace(session, session + SHORTER)
+    script = script.replace(session, session + "n_poses = 12\\npose_s = 4\\n")
     left = {}
     with (
         contextlib.chdir(tmp_path_factory.mktemp("tutorial")),
