@@ -7,10 +7,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
-from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import chdtrc, fdtrc
+from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
 from trihedron.records.calibration import PARAMETER_NAMES, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import Words, words
