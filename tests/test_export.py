@@ -27,10 +27,8 @@ NOISE = ExportOptions(
     topic="/imu",
     current_parameters="none",
 )
-SIX = (
-    "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
-    "update_rate", "rostopic",
-)  # fmt: skip
+IN_LSB = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
+FOUR = [f"{sensor}_{kind}" for sensor in ("accelerometer", "gyroscope") for kind in ("noise_density", "random_walk")]
 
 
 def export_calibration(known, target, options=None):
@@ -148,7 +146,7 @@ def test_kalibr_distorts_truth_into_the_readings(mirrored):
         known = replace(known, gyroscope=replace(known.gyroscope, S=known.gyroscope.S @ turn))
     known, G = with_g_sensitivity(known)
     document = yaml.safe_load(export_calibration(known, "kalibr", NOISE))
-    assert set(SIX) <= set(document)
+    assert {*FOUR, "update_rate", "rostopic"} <= set(document)
     M_a, b_a = np.array(document["accelerometers"]["M"]), np.array(document["accelerometers"]["b"])
     gyro = {key: np.array(value) for key, value in document["gyroscopes"].items()}
     np.testing.assert_array_equal(M_a, np.tril(M_a))
@@ -178,7 +176,7 @@ def test_openvins_corrects_the_readings():
     # OpenCV takes a comment behind a value for a sequence.
     assert not [line for line in text.splitlines() if "#" in line and not line.strip().startswith("#")]
     imu = yaml.safe_load(text.replace("%YAML:1.0", ""))["imu0"]
-    assert set(SIX) <= set(imu)
+    assert {*FOUR, "update_rate", "rostopic"} <= set(imu)
     Tw, R, Ta, Tg = (np.array(imu[key]) for key in ("Tw", "R_IMUtoGYRO", "Ta", "Tg"))
     b_a, b_w = (numbers(re.search(rf"#   {name} \[(.*)\]", text)[1]) for name in ("accelerometer", "gyroscope"))
     force = corrected(known.accelerometer)
@@ -188,9 +186,7 @@ def test_openvins_corrects_the_readings():
     np.testing.assert_allclose(rate, corrected(known.gyroscope), **ROUNDING)
 
 
-@pytest.mark.parametrize(
-    ("target", "keys"), [("kalibr", SIX[:4]), ("vins-fusion", ("acc_n", "acc_w", "gyr_n", "gyr_w"))]
-)
+@pytest.mark.parametrize(("target", "keys"), [("kalibr", FOUR), ("vins-fusion", ("acc_n", "acc_w", "gyr_n", "gyr_w"))])
 def test_noise_goes_into_the_file_and_an_absent_walk_as_a_limit_that_is_labelled(target, keys):
     text = export_calibration(calibration("si"), target, NOISE)
     document = yaml.safe_load(text.replace("%YAML:1.0", ""))
@@ -209,8 +205,7 @@ def test_ros_covariances_are_those_of_one_message():
 
 @pytest.mark.parametrize("target", ["px4", "ardupilot"])
 def test_what_an_autopilot_cannot_hold_is_written_into_the_file_with_its_size(target):
-    known = calibration("si")
-    text = export_calibration(known, target, ExportOptions(current_parameters="none"))
+    text = export_calibration(calibration("si"), target, ExportOptions(current_parameters="none"))
     # Half of 0.006, the angle between X and Z, at 9.81 m/s²: the other half is a turn of the triad as a whole.
     assert re.search(r"% of the accelerometer's is lost, 2\d(\.\d)? mm/s\^2 at 1 g", text)
     assert "gyro scale" in text
@@ -226,8 +221,7 @@ def test_of_an_instrument_that_is_right_within_its_uncertainty_no_target_loses_a
         for s in (known.accelerometer, known.gyroscope)
     ]
     known = replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
-    options = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
-    text = " ".join(export_files(known, target, options).values())
+    text = " ".join(export_files(known, target, IN_LSB).values())
     said = [line for line in text.splitlines() if re.search(r"\d.* (is|are) lost|lost: |are lost, ", line)]
     assert not [line for line in said if "walk" not in line]
 
@@ -297,10 +291,9 @@ def test_pyins_distorts_truth_into_the_readings():
 @pytest.mark.parametrize("target", targets())
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
-    options = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
-    assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, options)
+    assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, IN_LSB)
     serious = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "it did not settle.")
-    assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, options)
+    assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, IN_LSB)
 
 
 def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path, capsys):

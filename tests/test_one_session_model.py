@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from diagnosed_session import nearest_pose, simulated
+from small_session import G
+from small_session import simulated as of_motion
 from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
@@ -19,17 +21,16 @@ from trihedron.report.machine import calibration_record
 from trihedron.segment import segment_recording
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.model import MOVES
-from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.simulate import hand_session
 
 SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
+GRAVITY = {"gravity_m_s2": float(G)}
 
 
 @pytest.fixture(scope="module")
 def healthy():
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(18, layout=118))
-    recording, truth = simulate(scenario, 118)
-    result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
-    return recording, truth.gravity_m_s2, result, diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+    recording = of_motion(hand_session(18, layout=118), 118)
+    return recording, float(G), calibrate(recording, **GRAVITY), diagnose(recording, **GRAVITY)
 
 
 def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy):
@@ -280,13 +281,11 @@ def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(xsens)
 
 
 def _drawn(n_poses: int, seed: int):
-    motion = hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0)
-    recording, truth = simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)
-    return recording, {"gravity_m_s2": truth.gravity_m_s2}
+    return of_motion(hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0), seed)
 
 
 def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_leave_them() -> None:
-    found = [calibrate(log, **gravity).accelerometer.quality for log, gravity in (_drawn(12, k) for k in range(16))]
+    found = [calibrate(_drawn(12, k), **GRAVITY).accelerometer.quality for k in range(16)]
     chi2, dof = (sum(getattr(one, name) for one in found) for name in ("chi2", "dof"))
     # The poses alone would leave 3 each; χ² of all scatters by sqrt(2 dof), dof is a whole number of each.
     assert dof > 16 * 5
@@ -299,5 +298,4 @@ def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_le
     ("n_poses", "verdict"), [(6, "not-testable"), (10, "consistent")], ids=["undetermined", "one-row-left-by-the-norms"]
 )
 def test_few_poses_are_consistent_only_where_they_determine_the_model(n_poses: int, verdict: str) -> None:
-    log, gravity = _drawn(n_poses, 7001)
-    assert diagnose(log, **gravity).verdict == verdict
+    assert diagnose(_drawn(n_poses, 7001), **GRAVITY).verdict == verdict

@@ -76,12 +76,6 @@ def test_what_cannot_be_read_is_said_in_one_sentence(tmp_path, columns, header, 
     assert "motion.csv" in str(caught.value)
 
 
-def z_of_bias(found, trial):
-    """(3,) standard scores of the gyro's bias."""
-    b = -np.linalg.solve(trial.unit.M, trial.unit.c)
-    return (found.gyroscope.b - b) / np.sqrt(np.diag(found.gyroscope.covariance)[9:])
-
-
 def test_what_a_reference_is_too_poor_to_show_is_said_with_the_size_from_which_it_would():
     fine, poor = (
         fit_reference(trial.log, trial.motion, G).effects["gyro-g-sensitivity"]
@@ -110,7 +104,8 @@ def test_a_stretch_in_which_the_truth_is_wrong_is_said_and_the_rest_is_used():
     assert any(start < 21.5 and end > 18.5 for start, end in found.error.apart_s)
     # The attitude begins anew after it: its error there is that of the reference, not the step of 6 degrees.
     assert np.degrees(np.nanmax(np.abs(found.apart.angle))) < 1.0
-    assert np.abs(z_of_bias(found, trial)).max() < 4.5
+    apart = found.gyroscope.b + np.linalg.solve(trial.unit.M, trial.unit.c)
+    assert np.abs(apart / np.sqrt(np.diag(found.gyroscope.covariance)[9:])).max() < 4.5
 
 
 def test_stretches_of_even_flight_are_no_poses(real_data):

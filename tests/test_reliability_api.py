@@ -209,7 +209,6 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
 def results(recording, result):
     folder = made_once()
     rest = folder / "static.csv"
-    x = np.random.default_rng(0).normal(size=(2000, 2))
     return {
         "read": recording,
         "simulate": trihedron.simulate("six-faces", 4),
@@ -222,7 +221,7 @@ def results(recording, result):
         "extend": trihedron.extend(result),
         "kalman": trihedron.kalman(recording, gravity_m_s2=9.80665),
         "allan": trihedron.allan(rest),
-        "allan_deviation": trihedron.allan_deviation(x, 100.0),
+        "allan_deviation": trihedron.allan_deviation(np.random.default_rng(0).normal(size=(2000, 2)), 100.0),
         "plan": trihedron.plan(),
         "apply": trihedron.apply(result, recording),
         "twin": trihedron.twin(recording, result),
