@@ -14,6 +14,8 @@ from trihedron.records.reference import ReferenceMotion
 
 G = 9.81
 FINE_HZ = 1000
+COUNTS = {"accelerometer_unit": "counts", "gyroscope_unit": "counts"}
+LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
 
 
 def turn(axis, angle):
@@ -89,12 +91,8 @@ def read_gyro(rng, u, rate, force, step):
         out = out + (f @ u.g_sensitivity.T) @ u.M.T
     out = out + u.gyro_noise * np.degrees(1) * 0.5 * rng.normal(size=out.shape)
     # A bias that drifts a little: a walk of 0.03 °/s in a minute, about its mean over the session.
-    walk = (
-        np.linalg.norm(u.M, axis=1)
-        * np.radians(0.03)
-        * np.cumsum(rng.normal(size=out.shape), axis=0)
-        / np.sqrt(60 * FINE_HZ / step)
-    )
+    size = np.linalg.norm(u.M, axis=1) * np.radians(0.03) / np.sqrt(60 * FINE_HZ / step)
+    walk = size * np.cumsum(rng.normal(size=out.shape), axis=0)
     if u.is_fine:
         return out + 0.01 * (walk - walk.mean(axis=0))
     return np.round((out + walk - walk.mean(axis=0)) * 8) / 8
@@ -156,9 +154,7 @@ def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, earth=None, rest_s
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     seen = jittered(C[k], rng, np.radians(sigma_deg))
     position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
-    log = Recording.from_arrays(
-        times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
-    )
+    log = Recording.from_arrays(times(len(gyro), 10), accelerometer, gyro, **COUNTS)
     motion = ReferenceMotion(timestamps - timestamps[0], attitude=seen, position=position, source="tracker.csv")
     return Trial(log, motion, u, lead - timestamps[0], ppm, arm)
 
@@ -186,13 +182,9 @@ def measured_table(seed, seconds=90, wobble_deg=0.15):
     k = np.arange(0, len(t), 20)
     timestamps = t[k] * (1 + 1e-6 * ppm) + lead
     log = Recording.from_arrays(times(len(gyro), 10), None, gyro, gyroscope_unit="counts")
-    motion = ReferenceMotion(
-        timestamps - timestamps[0], rate=rate[k] + 1e-4 * rng.normal(size=(len(k), 3)), source="table.csv"
-    )
+    told = rate[k] + 1e-4 * rng.normal(size=(len(k), 3))
+    motion = ReferenceMotion(timestamps - timestamps[0], rate=told, source="table.csv")
     return Trial(log, motion, u, lead - timestamps[0], ppm, np.zeros(3))
-
-
-LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
 
 
 def commanded_table(seed, pose_s=6.0, wobble_deg=0.05, lag_s=0.15):
@@ -214,10 +206,7 @@ def commanded_table(seed, pose_s=6.0, wobble_deg=0.05, lag_s=0.15):
         true[:, axis] += size * np.sin(angle + rng.uniform(0, 6))
     f = np.tile([0.0, 0, G], (len(t), 1))
     gyro, accelerometer = read_gyro(rng, u, true, f, 10), read_accelerometer(rng, u, f, 10)
-    log = Recording.from_arrays(
-        times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
-    )
+    log = Recording.from_arrays(times(len(gyro), 10), accelerometer, gyro, **COUNTS)
     timestamps = pose_s * np.arange(len(commands) + 1)
-    return Trial(
-        log, ReferenceMotion(timestamps, rate=told, is_stepwise=True, source="commands.csv"), u, 0.0, 0.0, np.zeros(3)
-    )
+    motion = ReferenceMotion(timestamps, rate=told, is_stepwise=True, source="commands.csv")
+    return Trial(log, motion, u, 0.0, 0.0, np.zeros(3))

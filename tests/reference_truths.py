@@ -103,15 +103,7 @@ def readings(rng, u, C, path, step, unsteady):
 
 
 def truth(
-    seed,
-    kind,
-    seconds=120,
-    has_g_sensitivity=False,
-    has_path=False,
-    size_deg=None,
-    lasting_s=None,
-    step=STEP,
-    unsteady=0,
+    seed, kind, seconds=120, has_g_sensitivity=False, has_path=False, size_deg=0, lasting_s=0, step=STEP, unsteady=0
 ):
     """One trial: ``kind`` of motion, its truth off by 0.1 to 2° over 4 to 40 s in world or body, clocks apart."""
     rng = np.random.default_rng(seed)

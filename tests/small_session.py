@@ -1,19 +1,24 @@
-"""One short session with everything that commands read: made once, copied wherever a test wants to harm it."""
+"""One short session with everything that commands read, made once and copied wherever a test wants to harm it; how
+sessions are written, what is made of a usual one, and the one sentence with which a command rejects."""
 
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
+from functools import cache
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
+import trihedron
 from this_run import once, place
 from trihedron.cli import main
+from trihedron.records import Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 G = "9.80665"
@@ -41,21 +46,44 @@ matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 """
 
 
+def rows_of(recording: Recording) -> np.ndarray:
+    return np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
+
+
+def log_text(rows: np.ndarray) -> str:
+    """(n, 7) rows as people write them to a file."""
+    return "time_s,ax,ay,az,gx,gy,gz\n" + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows) + "\n"
+
+
+def simulated(motion, seed=3) -> Recording:
+    return simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0]
+
+
+@cache
+def usual():
+    """A short session, its calibration and its diagnosis, for what is said of them: made once in a run."""
+    return pickle.loads((once("usual", _usual) / "results").read_bytes())
+
+
+def _usual(folder: Path) -> None:
+    log = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0))
+    gravity = {"gravity_m_s2": float(G)}
+    results = log, trihedron.calibrate(log, **gravity), trihedron.diagnose(log, **gravity)
+    (folder / "results").write_bytes(pickle.dumps(results))
+
+
 def made_once() -> Path:
     """Folder with log.csv, log.npy, static.csv, c.json, untrusted.json, noise.json and s.toml."""
     return once("session", _made)
 
 
 def _made(folder: Path) -> None:
-    motion = hand_session(n_poses=12, pose_s=2.0, move_s=1.0, first_pose_s=4.0)
-    recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
-    rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
-    names = "time_s,ax,ay,az,gx,gy,gz\n"
-    (folder / "log.csv").write_text(names + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows) + "\n")
+    rows = rows_of(simulated(hand_session(n_poses=12, pose_s=2.0, move_s=1.0, first_pose_s=4.0)))
+    (folder / "log.csv").write_text(log_text(rows))
     np.save(folder / "log.npy", rows)
     rng = np.random.default_rng(5)
     rest = np.column_stack([np.arange(3000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (3000, 6))])
-    (folder / "static.csv").write_text(names + "\n".join(",".join(f"{v:.8g}" for v in row) for row in rest) + "\n")
+    (folder / "static.csv").write_text(log_text(rest))
     (folder / "s.toml").write_text(SCENARIO)
     log, known = str(folder / "log.csv"), folder / "c.json"
     quietly("calibrate", log, "--gravity", G, "-o", str(known))
@@ -110,3 +138,18 @@ def run(*arguments: object, **options) -> tuple[int, str, str]:
 
 def leftovers(folder: Path) -> list[str]:
     return [p.name for p in folder.rglob(".*trihedron*")]
+
+
+def rejected(capsys, *arguments: object) -> str:
+    """The one sentence with which a command rejects."""
+    capsys.readouterr()
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert status == 1, (status, err)
+    assert out == ""
+    lines = err.strip().splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("trihedron: ")
+    assert "Traceback" not in err
+    assert len(lines[0]) < 400
+    return lines[0]

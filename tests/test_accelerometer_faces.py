@@ -12,6 +12,7 @@ G = 9.81
 S_A = np.array([[0.997, -0.015, -0.007], [0.009, 1.002, 0.002], [0.014, 0.002, 1.023]])
 B_A = np.array([0.54, -0.62, 0.40])
 SIX = np.array([1, -1, 2, -2, 3, -3])
+SIGMA = 0.0003
 
 
 def face_readings(faces, sigma: float, seed: int, tilt_deg: float = 0.0) -> np.ndarray:
@@ -101,35 +102,28 @@ def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_calle
     assert FindingCode.SCALE_NOT_NOMINAL in codes(findings)
 
 
-SIGMA = 0.0003
-
-
-def on_a_table(rng, tilt, headings):
-    """Readings of six faces put on one leaning table at any heading, turned there by ``headings`` [rad]; the truth."""
-    S_a = (np.eye(3) + 0.01 * rng.normal(size=(3, 3))) * 100.0
-    b_a = rng.normal(size=3) * 30.0
-    values, up = [], []
-    for face in SIX:
-        axis, sign = abs(int(face)) - 1, np.sign(face)
-        first = rng.uniform(0.0, 2.0 * np.pi)
-        for heading in headings:
-            f = np.zeros(3)
-            f[axis] = sign * G * np.cos(tilt)
-            lean = G * np.sin(tilt) * np.array([np.cos(first + heading), np.sin(first + heading)])
-            f[[(axis + 1) % 3, (axis + 2) % 3]] = lean
-            values.append(S_a @ f + b_a + 100.0 * SIGMA * rng.normal(size=3))
-            up.append(int(face))
-    return np.array(values), up, np.linalg.inv(S_a), -np.linalg.inv(S_a) @ b_a
-
-
 @pytest.mark.parametrize("headings", [(0.0,), (0.0, np.pi / 2.0, 0.0), (0.0, np.pi, 0.0)])
 def test_a_leaning_table_stays_within_the_error_bars_whatever_the_headings(headings):
     rng = np.random.default_rng(5)
     n, tilt = 60, np.radians(1.5)
     scores = []
     for _ in range(n):
-        values, up, S, b = on_a_table(rng, tilt, headings)
-        found, _ = calibrate_faces(values, np.full(3, 100.0 * SIGMA), G, up=up)
+        # Six faces put on one leaning table at any heading, turned there by ``headings``.
+        S_a = (np.eye(3) + 0.01 * rng.normal(size=(3, 3))) * 100.0
+        b_a = rng.normal(size=3) * 30.0
+        values, up = [], []
+        for face in SIX:
+            axis, sign = abs(int(face)) - 1, np.sign(face)
+            first = rng.uniform(0.0, 2.0 * np.pi)
+            for heading in headings:
+                f = np.zeros(3)
+                f[axis] = sign * G * np.cos(tilt)
+                lean = G * np.sin(tilt) * np.array([np.cos(first + heading), np.sin(first + heading)])
+                f[[(axis + 1) % 3, (axis + 2) % 3]] = lean
+                values.append(S_a @ f + b_a + 100.0 * SIGMA * rng.normal(size=3))
+                up.append(int(face))
+        S, b = np.linalg.inv(S_a), -np.linalg.inv(S_a) @ b_a
+        found, _ = calibrate_faces(np.array(values), np.full(3, 100.0 * SIGMA), G, up=up)
         scores.append(np.concatenate([((found.S - S) / found.sigma_S).ravel(), (found.b - b) / found.sigma_b]))
     scores = np.abs(np.array(scores))
     # Some six of nine, and two of three, are independent: three binomial deviations below 95 %. Before: 90 and 88 % of

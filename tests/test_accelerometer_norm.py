@@ -10,6 +10,7 @@ from trihedron import _core, calibrate
 from trihedron.estimate.accelerometer import bending
 from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
 from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.verification import norm_error
 from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -20,6 +21,9 @@ G = 9.81744
 S_TRUE = np.array([[2.41e-3, 0.0, 0.0], [-8.6e-6, 2.43e-3, 0.0], [-2.2e-5, -5.2e-5, 2.41e-3]])
 B_TRUE = np.array([-79.9, -80.5, -75.6])
 SIGMA = np.array([0.35, 0.30, 0.42])  # counts: about 0.8 mm/s²
+GRAVITY = 9.81
+SCATTER, BENDS = 8e-3, 2e-2
+"""m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
 
 
 def cube_poses() -> np.ndarray:
@@ -105,8 +109,6 @@ def test_a_touched_pose_is_found():
 
 @pytest.mark.parametrize("kept", [slice(0, 12), slice(4, 18)])
 def test_the_first_advised_pose_beats_every_other_candidate(kept):
-    from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
-
     up = cube_poses()[kept]
     relative = np.full(len(up), 1e-4)
     design = PoseDesign.of(up, relative)
@@ -187,27 +189,13 @@ def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():
 
 
 def test_poses_are_advised_first_where_parameters_are_undetermined():
-    from trihedron.estimate.accelerometer.poses import PoseDesign
-
     # Seven poses of a session that stopped early: neither face along Y, and a second +X almost where the first was.
-    up = np.array(
-        [
-            [0, 0, 1],
-            [1, 0, 0.01],
-            [-0.96, -0.27, -0.07],
-            [-1, 0, 0],
-            [0.71, 0.42, 0.56],
-            [0.71, -0.71, 0],
-            [0, 0.7, -0.7],
-        ]
-    )
+    first = [[0, 0, 1], [1, 0, 0.01], [-0.96, -0.27, -0.07], [-1, 0, 0]]
+    up = np.array([*first, [0.71, 0.42, 0.56], [0.71, -0.71, 0], [0, 0.7, -0.7]])
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     design = PoseDesign.of(up, np.full(7, 1e-4))
     assert design.rank == 7
     assert "+X up" not in [str(one) for one in design.advice(1e-4, 2)]
-
-
-GRAVITY = 9.81
 
 
 def design_of(up):
@@ -270,32 +258,22 @@ def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_
             assert said[0].numbers["shift_sigma"] > 5.0  # no chance of the stated errors
 
 
-SCATTER, BENDS = 8e-3, 2e-2
-"""m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
-
-
-def errors(rng, n, name):
-    """z (9,) of the nine relative parameters without bends as parameters and with them."""
-    up, sigma = drawn(rng, n)
-    scattered = sigma * rng.normal(size=n)
-    if name is None:
-        scattered = scattered + SCATTER * rng.normal(size=n)
-    else:
-        scattered = scattered + SHAPES[name](up) @ rng.normal(size=3) * BENDS
-    residual, found = linear_fit(up, scattered, sigma)
-    white = design_of(up) / sigma[:, None]
-    chi2 = float(np.sum((residual / sigma) ** 2)) / (n - 9)
-    alone = chi2 * np.diag(np.linalg.inv(white.T @ white))
-    added = covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), GRAVITY)
-    return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(added))
-
-
 @pytest.mark.parametrize(
     ("n", "name"), [(13, None), pytest.param(18, "quadratic", marks=pytest.mark.slow), (36, None), (36, "cubic")]
 )
 def test_bars_hold_for_scatter_and_for_bending(name, n):
-    rng, n_trials = np.random.default_rng([31, n]), 60
-    before, after = (np.array(x) for x in zip(*(errors(rng, n, name) for _ in range(n_trials)), strict=True))
+    rng, n_trials, before, after = np.random.default_rng([31, n]), 60, [], []
+    for _ in range(n_trials):
+        up, sigma = drawn(rng, n)
+        bent = np.zeros((n, 3)) if name is None else SHAPES[name](up)
+        scattered = sigma * rng.normal(size=n) + (SCATTER * rng.normal(size=n) if name is None else 0.0)
+        residual, found = linear_fit(up, scattered + BENDS * (bent @ rng.normal(size=3)), sigma)
+        white = design_of(up) / sigma[:, None]
+        alone = np.sum((residual / sigma) ** 2) / (n - 9) * np.diag(np.linalg.inv(white.T @ white))
+        added = covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), GRAVITY)
+        # Errors of the nine relative parameters without bends as parameters and with them.
+        before.append(found / np.sqrt(alone))
+        after.append(found / np.sqrt(alone + np.diag(added)))
     # Nine parameters of one session go together: a session counts once, by the share of its nine.
     covered = float(np.mean(np.abs(after) < 1.96))
     assert covered > binom.ppf(1e-3, n_trials, 0.95) / n_trials

@@ -13,23 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import trihedron
+from small_session import usual
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
-from written_session import usual
 
-
-@pytest.fixture(scope="module")
-def recording():
-    return usual()[0]
-
-
-@pytest.fixture(scope="module")
-def result():
-    return usual()[1]
-
-
-def test_import_loads_neither_numpy_nor_anything_else_heavy():
-    code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+# A device, several recordings or minutes: the tutorials run these.
+SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
 def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
@@ -44,7 +32,8 @@ def with_sensor(result, **changes):
     return replace(result.calibration, accelerometer=replace(result.calibration.accelerometer, **changes))
 
 
-def test_apply_and_export_refuse_what_cannot_be_a_calibration(result, recording):
+def test_apply_and_export_refuse_what_cannot_be_a_calibration():
+    recording, result, _ = usual()
     S = result.calibration.accelerometer.S
     singular = with_sensor(result, S=np.stack([S[0], S[1], S[0] + S[1]]))
     negative = result.calibration.accelerometer.covariance.copy()
@@ -72,7 +61,8 @@ def test_a_gyro_that_maps_degrees_as_radians_is_refused():
         trihedron.export(known, "c")
 
 
-def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted(result, recording):
+def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted():
+    recording, result, _ = usual()
     grave = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "The fit did not converge.")
     doubted = replace(result.calibration, findings=(grave,))
     done = trihedron.apply(doubted, recording)
@@ -82,7 +72,8 @@ def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted(result,
     assert not [f for f in trihedron.apply(result, recording).findings if f.code is FindingCode.CALIBRATION_DOUBTED]
 
 
-def test_a_bias_that_drifted_in_its_own_recording_is_allowed_that_change_in_another_and_said(result, recording):
+def test_a_bias_that_drifted_in_its_own_recording_is_allowed_that_change_in_another_and_said():
+    recording, result, _ = usual()
     change = 0.06
     counts = np.linalg.solve(result.accelerometer.S, [change, -change, 0.5 * change])
     shifted = replace(recording, accelerometer=recording.accelerometer + counts, sha256="")
@@ -99,7 +90,8 @@ def test_a_bias_that_drifted_in_its_own_recording_is_allowed_that_change_in_anot
     assert FindingCode.BIAS_DRIFT in [one.code for one in verified.findings]
 
 
-def test_results_cross_processes_and_reports_need_no_matplotlib_as_plot_says_that_it_does(tmp_path, recording, result):
+def test_results_cross_processes_and_reports_need_no_matplotlib_as_plot_says_that_it_does(tmp_path):
+    recording, result, _ = usual()
     (tmp_path / "both").write_bytes(pickle.dumps((result, recording)))
     code = (
         "import sys, pickle; sys.modules['matplotlib'] = None\n"
@@ -117,7 +109,8 @@ def test_results_cross_processes_and_reports_need_no_matplotlib_as_plot_says_tha
     assert np.array_equal(there, trihedron.apply(result, recording).accelerometer)
 
 
-def test_a_figure_is_drawn_where_it_is_asked_for(result):
+def test_a_figure_is_drawn_where_it_is_asked_for():
+    result = usual()[1]
     figure = Figure()
     above, below = figure.subplots(2)
     assert result.plot("residuals", ax=above) is figure
@@ -125,10 +118,6 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
     assert not below.has_data()
     with pytest.raises(ValueError, match="needs 2 axes, one a panel; ax has 3"):
         result.plot("residuals", ax=[above, below, above])
-
-
-# A device, several recordings or minutes: the tutorials run these.
-SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
 def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(tmp_path, monkeypatch):

@@ -25,6 +25,20 @@ MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session"
     "errors.py",
 }
 LONGEST_FILE, LONGEST_FUNCTION = 350, 79
+# One model whose files still take each other's types.
+ONE_PIECE = {"session_model"}
+# Names that others call by: typer, http.server, notebooks, the catalogue that gathers effects by their base class.
+CALLED_BY_NAME = re.compile(r"^(__\w+__|do_GET|do_POST|log_message|handle_error|_repr_\w+_)$")
+# Ours, with a letter before the point where a page numbers its own; a number of three parts is another book's.
+NUMBER = r"(?:\d+|[A-Z])\.\d+[a-z]?(?!\.?\d)"
+CITED = re.compile(rf"\b(?:eqs?|equations?)\.? ?\(?({NUMBER}(?:(?:-|, | to | and ){NUMBER})*)", re.IGNORECASE)
+# At the head of an indented line, at its end, or before a paragraph that is the statement in words.
+STATED = [
+    re.compile(rf"^    \(({NUMBER})\) ", re.MULTILINE),
+    re.compile(rf"^    .*\s\(({NUMBER})\)$", re.MULTILINE),
+    re.compile(rf"\\tag\{{({NUMBER})\}}"),
+    re.compile(rf"^\(({NUMBER})\) [A-Z]", re.MULTILINE),
+]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -53,16 +67,12 @@ def imported_modules(path: Path) -> set[str]:
     return names
 
 
-def stage_of(module: str) -> str | None:
-    parts = module.split(".")
-    return parts[1] if len(parts) > 1 and parts[0] == "trihedron" and parts[1] in STAGES else None
-
-
-def test_a_stage_imports_no_other_stage():
+def test_a_stage_imports_no_other_stage_and_nobody_who_composes_it():
     for path in PACKAGE.rglob("*.py"):
         own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
         if own not in COMPOSERS:
-            foreign = {stage_of(module) for module in imported_modules(path)} - {None, own}
+            parts = {m.split(".")[1] for m in imported_modules(path) if m.startswith("trihedron.")}
+            foreign = parts & ({*STAGES, *COMPOSERS} - {own})
             assert not foreign, f"{path.name} belongs to {own} and imports {sorted(foreign)}"
 
 
@@ -101,10 +111,6 @@ def test_no_module_imports_itself_by_way_of_others():
                 found |= {one if one in names else node.module for one in whole}
         arrows[name] = found - {name}
     assert circles(arrows) == []
-
-
-# One model whose files still take each other's types.
-ONE_PIECE = {"session_model"}
 
 
 def code_of(path: Path) -> str:
@@ -152,18 +158,6 @@ def test_the_top_level_is_the_agreed_one():
     assert found <= allowed, found - allowed
 
 
-def test_nothing_below_the_verbs_knows_who_composes_it():
-    lookups = set()
-    for path in PACKAGE.rglob("*.py"):
-        name = path.relative_to(PACKAGE)
-        if name.parts[0].removesuffix(".py") in COMPOSERS:
-            continue
-        above = {m for m in imported_modules(path) if m.split(".")[:2] in (["trihedron", c] for c in COMPOSERS)}
-        if above:
-            lookups.add(str(name))
-    assert lookups == set()
-
-
 def test_only_the_rooms_that_make_numbers_use_the_core():
     users = {
         path.relative_to(PACKAGE)
@@ -180,22 +174,14 @@ def test_no_file_outgrows_its_reader():
     assert not {str(p.relative_to(ROOT)) for p in sources if len(p.read_text().splitlines()) > LONGEST_FILE}
 
 
-def functions():
+def test_no_function_outgrows_its_reader():
     for path in PACKAGE.rglob("*.py"):
         for node in nodes(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 first = node.body[0]
-                said = ast.get_docstring(node) is not None and first.end_lineno - first.lineno + 1
                 # What it says of itself is no part of what has to be held in one head.
-                yield f"{path.relative_to(PACKAGE)}:{node.name}", node.end_lineno - node.lineno + 1 - said
-
-
-def test_no_function_outgrows_its_reader():
-    assert not {name for name, n in functions() if n > LONGEST_FUNCTION}
-
-
-# Names that others call by: typer, http.server, notebooks, the catalogue that gathers effects by their base class.
-CALLED_BY_NAME = re.compile(r"^(__\w+__|do_GET|do_POST|log_message|handle_error|_repr_\w+_)$")
+                said = ast.get_docstring(node) is not None and first.end_lineno - first.lineno + 1
+                assert node.end_lineno - node.lineno + 1 - said <= LONGEST_FUNCTION, f"{path.name}:{node.name}"
 
 
 def test_everything_that_is_named_is_used():
@@ -218,43 +204,15 @@ def test_everything_that_is_named_is_used():
     assert unused == set()
 
 
-# Ours, with a letter before the point where a page numbers its own; a number of three parts is another book's.
-NUMBER = r"(?:\d+|[A-Z])\.\d+[a-z]?(?!\.?\d)"
-CITED = re.compile(rf"\b(?:eqs?|equations?)\.? ?\(?({NUMBER}(?:(?:-|, | to | and ){NUMBER})*)", re.IGNORECASE)
-# At the head of an indented line, at its end, or before a paragraph that is the statement in words.
-STATED = [
-    re.compile(rf"^    \(({NUMBER})\) ", re.MULTILINE),
-    re.compile(rf"^    .*\s\(({NUMBER})\)$", re.MULTILINE),
-    re.compile(rf"\\tag\{{({NUMBER})\}}"),
-    re.compile(rf"^\(({NUMBER})\) [A-Z]", re.MULTILINE),
-]
-
-
-def stated():
-    """How often each equation is stated in the documents."""
-    documents = [p.read_text() for p in (ROOT / "docs").glob("*.md")]
-    return Counter(number for text in documents for one in STATED for number in one.findall(text))
-
-
 def test_equations_that_the_code_cites_are_in_the_documents():
-    known = set(stated())
+    documents = [p.read_text() for p in (ROOT / "docs").glob("*.md")]
+    known = {number for text in documents for one in STATED for number in one.findall(text)}
     cited = 0
     for path in [*PACKAGE.rglob("*.py"), *(ROOT / "rust").rglob("*.rs")]:
         numbers = {number for some in CITED.findall(path.read_text()) for number in re.findall(NUMBER, some)}
         cited += len(numbers)
         assert numbers <= known, f"{path.relative_to(ROOT)} cites {sorted(numbers - known)}"
     assert cited > 40
-
-
-def test_the_documents_name_files_that_exist():
-    """Of the package's own: paths with a file's ending, looked for where a reader would look."""
-    roots = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", ROOT / "docs"]
-    for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
-        text = page.read_text(encoding="utf-8")
-        named = set(re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|pyi|rs|md|schema\.json))`", text))
-        named |= set(re.findall(r"\b(?:benches|tests)/[\w/]+\.py\b", text))
-        missing = {name for name in named if not any((root / name).exists() for root in roots)}
-        assert not missing, f"{page.name} names {sorted(missing)}"
 
 
 # Records that only stages make: what does not fit together there is a defect, to be seen with its trace.
@@ -306,18 +264,14 @@ CONVERSIONS = {
 }
 
 
-def is_of(handler, name):
-    """Whether a handler catches an exception by this name."""
-    return handler.type is not None and name in {n.id for n in ast.walk(handler.type) if isinstance(n, ast.Name)}
-
-
 def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
     """Where readings become numbers, ValueError is caught only round a conversion of one value or one note."""
     found = set()
     for room in ("estimate", "diagnose", "segment", "session", "channel_facts", "api", "fleet"):
         for path in (PACKAGE / room).rglob("*.py"):
             for node in nodes(path):
-                if isinstance(node, ast.Try) and any(is_of(h, "ValueError") for h in node.handlers):
+                caught = [h.type for h in node.handlers if h.type is not None] if isinstance(node, ast.Try) else []
+                if "ValueError" in {n.id for kind in caught for n in ast.walk(kind) if isinstance(n, ast.Name)}:
                     calls = [n.func for part in node.body for n in ast.walk(part) if isinstance(n, ast.Call)]
                     found |= {f"{path.relative_to(PACKAGE)}: {ast.unparse(called)}" for called in calls}
     assert found == CONVERSIONS

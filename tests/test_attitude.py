@@ -5,22 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron import _core
+from trihedron import _core, units
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import in_frame, other_form, other_form_jacobian, reframing
-from trihedron.units import (
-    AccelerationUnit,
-    RateUnit,
-    acceleration_lsb_to_si,
-    acceleration_to_si,
-    degrees_from_radians,
-    m_s2_from_micro_g,
-    mg_from_m_s2,
-    radians_from_degrees,
-    rate_lsb_to_si,
-    rate_to_si,
-)
+
+QUIET, NO_BIAS = _core.RateNoise(np.zeros(3), 0.0, np.inf), np.zeros((2, 3))
+MOVED = np.array([[1.1, 0.02, -0.03], [0.01, 0.9, 0.04], [-0.05, 0.02, 1.05]])
 
 
 def uneven(n: int, span: float, seed: int = 3) -> np.ndarray:
@@ -122,20 +113,10 @@ def test_bad_samples_are_refused_by_their_number(change, words):
         trihedron.integrate_rate(*change(t, w))
 
 
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        *(({"start": s}, "start") for s in (np.diag([1, 1, -1]), 1.01 * np.eye(3), [1.0, 1, 0, 0], [np.nan, 0, 0])),
-        ({"start": [1.0, 0.0]}, "start"),
-    ],
-)
-def test_a_start_that_is_no_attitude_is_refused(option, words):
-    with pytest.raises(ValueError, match=words):
-        trihedron.integrate_rate([0.0, 1.0], np.zeros((2, 3)), **option)
-
-
-QUIET, NO_BIAS = _core.RateNoise(np.zeros(3), 0.0, np.inf), np.zeros((2, 3))
-MOVED = np.array([[1.1, 0.02, -0.03], [0.01, 0.9, 0.04], [-0.05, 0.02, 1.05]])
+@pytest.mark.parametrize("start", [np.diag([1, 1, -1]), 1.01 * np.eye(3), [1.0, 1, 0, 0], [np.nan, 0, 0], [1.0, 0.0]])
+def test_a_start_that_is_no_attitude_is_refused(start):
+    with pytest.raises(ValueError, match="start"):
+        trihedron.integrate_rate([0.0, 1.0], np.zeros((2, 3)), start=start)
 
 
 def of_move(time_s, raw, degree, S=MOVED, b=NO_BIAS):
@@ -248,20 +229,13 @@ def test_a_frame_is_reached_by_a_proper_rotation_of_the_stated_derivative(frame,
         np.testing.assert_allclose(change.jacobian, numeric_jacobian(moved, parameters(S, b)), atol=1e-8)
 
 
-def both_sensors(seed: int) -> Calibration:
-    S, b = triad(seed)
-    S_w, b_w = triad(seed + 100)
-    rng = np.random.default_rng(seed)
-    root = 1e-3 * rng.standard_normal((24, 24))
-    covariance = root @ root.T
-    accelerometer = SensorCalibration(S, b, covariance[:12, :12], "m/s^2", "m/s^2", "test")
-    gyroscope = SensorCalibration(S_w, b_w, covariance[12:, 12:], "rad/s", "rad/s", "test")
-    return Calibration(accelerometer, gyroscope, covariance, "case", 9.81, "test")
-
-
 @pytest.mark.parametrize("frame", ["lower", "symmetric"])
 def test_the_gyro_turns_with_the_accelerometer_and_shares_its_uncertainty(frame):
-    calibration = both_sensors(7)
+    root = 1e-3 * np.random.default_rng(7).standard_normal((24, 24))
+    covariance = root @ root.T
+    accelerometer = SensorCalibration(*triad(7), covariance[:12, :12], "m/s^2", "m/s^2", "test")
+    gyroscope = SensorCalibration(*triad(107), covariance[12:, 12:], "rad/s", "rad/s", "test")
+    calibration = Calibration(accelerometer, gyroscope, covariance, "case", 9.81, "test")
     new = in_frame(calibration, frame)
     R = new.accelerometer.S @ np.linalg.inv(calibration.accelerometer.S)
     np.testing.assert_allclose(new.gyroscope.S, R @ calibration.gyroscope.S, atol=1e-14)
@@ -294,14 +268,15 @@ def test_normal_gravity_has_its_published_values_and_impossible_places_are_refus
 
 
 def test_units_have_the_sizes_of_the_international_system():
+    rate, of = units.rate_to_si, units.RateUnit
     # The unit g is defined as 9.80665 m/s²; a degree is pi/180.
-    assert acceleration_to_si(AccelerationUnit.G) == 9.80665
-    assert acceleration_to_si(AccelerationUnit.MG) == pytest.approx(9.80665e-3, rel=1e-15)
-    assert rate_to_si(RateUnit.DEG_S) == pytest.approx(0.017453292519943295, rel=1e-15)
-    assert (rate_to_si(RateUnit.MDEG_S), rate_to_si(RateUnit.MRAD_S)) == pytest.approx((1.7453292519943e-5, 1e-3))
-    assert (rate_to_si(RateUnit.DEG_H), rate_to_si(RateUnit.RPM)) == pytest.approx((4.848136811095e-6, 0.10471975512))
-    assert acceleration_lsb_to_si("0.061 mg") == pytest.approx(0.061e-3 * 9.80665)
-    assert rate_lsb_to_si("0.05 deg/s") == pytest.approx(8.726646259971648e-4)
-    assert mg_from_m_s2(9.80665) == pytest.approx(1000.0)
-    assert m_s2_from_micro_g(1e6) == pytest.approx(9.80665)
-    assert (degrees_from_radians(np.pi), radians_from_degrees(180.0)) == pytest.approx((180.0, np.pi))
+    assert units.acceleration_to_si(units.AccelerationUnit.G) == 9.80665
+    assert units.acceleration_to_si(units.AccelerationUnit.MG) == pytest.approx(9.80665e-3, rel=1e-15)
+    assert rate(of.DEG_S) == pytest.approx(0.017453292519943295, rel=1e-15)
+    assert (rate(of.MDEG_S), rate(of.MRAD_S)) == pytest.approx((1.7453292519943e-5, 1e-3))
+    assert (rate(of.DEG_H), rate(of.RPM)) == pytest.approx((4.848136811095e-6, 0.10471975512))
+    assert units.acceleration_lsb_to_si("0.061 mg") == pytest.approx(0.061e-3 * 9.80665)
+    assert units.rate_lsb_to_si("0.05 deg/s") == pytest.approx(8.726646259971648e-4)
+    assert units.mg_from_m_s2(9.80665) == pytest.approx(1000.0)
+    assert units.m_s2_from_micro_g(1e6) == pytest.approx(9.80665)
+    assert (units.degrees_from_radians(np.pi), units.radians_from_degrees(180.0)) == pytest.approx((180.0, np.pi))

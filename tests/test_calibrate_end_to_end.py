@@ -13,27 +13,23 @@ from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.errors import InputError
 from trihedron.records import FindingCode
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-from trihedron.units import STANDARD_GRAVITY_M_S2
+from trihedron.units import STANDARD_GRAVITY_M_S2 as G
 
 SHORT = hand_session(n_poses=18, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
+SCENARIO = replace(scenario_by_name("hand-session"), motion=SHORT)
 
 
 @pytest.fixture(scope="module")
-def scenario():
-    return replace(scenario_by_name("hand-session"), motion=SHORT)
-
-
-@pytest.fixture(scope="module")
-def recording(scenario):
-    return simulate(scenario, 11)[0]
+def recording():
+    return simulate(SCENARIO, 11)[0]
 
 
 @pytest.fixture(scope="module")
 def result(recording):
-    return trihedron.calibrate(recording, gravity_m_s2=STANDARD_GRAVITY_M_S2)
+    return trihedron.calibrate(recording, gravity_m_s2=G)
 
 
-def test_errors_over_their_error_bars_are_standard_normal(scenario):
+def test_errors_over_their_error_bars_are_standard_normal():
     """Six sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
 
     χ² of one session in the metric of its covariance has 21 degrees of freedom; their sum is tested at 1e-4 each side.
@@ -41,8 +37,8 @@ def test_errors_over_their_error_bars_are_standard_normal(scenario):
     """
     totals = []
     for seed in range(6):
-        recording, _ = simulate(scenario, seed)
-        truth = truth_of_the_day(scenario, seed)
+        recording, _ = simulate(SCENARIO, seed)
+        truth = truth_of_the_day(SCENARIO, seed)
         done = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
         totals.append(compare_with_truth(done.calibration, truth).chi2)
     low, high = stats.chi2.ppf([1e-4, 1.0 - 1e-4], 21 * len(totals))
@@ -50,16 +46,14 @@ def test_errors_over_their_error_bars_are_standard_normal(scenario):
 
 
 def test_a_wrong_gravity_goes_into_the_scale_and_nowhere_else(recording, result):
-    other = trihedron.calibrate(recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2 * 1.002)
+    other = trihedron.calibrate(recording, segments=result.segments, gravity_m_s2=G * 1.002)
     np.testing.assert_allclose(other.accelerometer.S, 1.002 * result.accelerometer.S, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(other.accelerometer.b, 1.002 * result.accelerometer.b, rtol=1e-5)
     np.testing.assert_allclose(other.gyroscope.S, result.gyroscope.S, rtol=1e-6, atol=1e-11)
 
 
 def test_both_methods_agree_within_their_error_bars_and_moves_sharpen_the_accelerometer(recording, result):
-    apart = trihedron.calibrate(
-        recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2, method="separate"
-    )
+    apart = trihedron.calibrate(recording, segments=result.segments, gravity_m_s2=G, method="separate")
     for name in ("accelerometer", "gyroscope"):
         one, other = getattr(result, name), getattr(apart, name)
         sigma = np.where(other.sigma_S > 0, other.sigma_S, 1.0)
@@ -73,9 +67,7 @@ def test_both_methods_agree_within_their_error_bars_and_moves_sharpen_the_accele
 
 
 def test_a_frame_is_a_choice_of_axes_and_changes_no_norm(recording, result):
-    symmetric = trihedron.calibrate(
-        recording, segments=result.segments, gravity_m_s2=STANDARD_GRAVITY_M_S2, frame="symmetric"
-    )
+    symmetric = trihedron.calibrate(recording, segments=result.segments, gravity_m_s2=G, frame="symmetric")
     S = symmetric.accelerometer.S
     np.testing.assert_allclose(S, S.T, atol=1e-15)
     readings = result.segments.accelerometer_mean
@@ -92,17 +84,17 @@ def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_
         trihedron.calibrate(replace(recording, accelerometer=None), gravity_m_s2=9.80665)
 
 
-def test_a_log_of_one_orientation_contradicts_nothing_and_verifies_nothing(scenario, result):
-    still, _ = simulate(replace(scenario, motion=hand_session(n_poses=1, pose_s=60.0)), 12)
+def test_a_log_of_one_orientation_contradicts_nothing_and_verifies_nothing(result):
+    still, _ = simulate(replace(SCENARIO, motion=hand_session(n_poses=1, pose_s=60.0)), 12)
     verified = trihedron.verify(result, still)
     assert FindingCode.NOT_TESTED in {one.code for one in verified.findings}
     assert " ".join(str(verified).split()).partition("tested on")[2].count("Not contradicted") == 1
     assert "Use the calibration" not in str(verified)
 
 
-def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_beyond_the_gyros_range(scenario, result):
+def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_beyond_the_gyros_range(result):
     motion = hand_session(n_poses=16, pose_s=3.0, move_s=1.5, layout=3)
-    other, truth = simulate(replace(scenario, motion=motion), 12)
+    other, truth = simulate(replace(SCENARIO, motion=motion), 12)
     judged = trihedron.verify(result, other).verification
     z = judged.norm_error / judged.norm_sigma
     # 16 poses: χ² within its 1e-4 limits.
@@ -120,8 +112,8 @@ def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_bey
     assert "without move 5" in str(verified)
 
 
-def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(scenario, result):
-    changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(1.2, -0.3834, 0.1025)))
+def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(result):
+    changed = replace(SCENARIO, accelerometer=replace(SCENARIO.accelerometer, b=(1.2, -0.3834, 0.1025)))
     other, _ = simulate(changed, 13)
     verified = trihedron.verify(result, other)
     finding = next(f for f in verified.findings if f.code.value == "residual-above-noise")
@@ -131,7 +123,7 @@ def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit
     wide = trihedron.verify(result, other, limit_mg=200.0)
     assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
     # A change of a few times the uncertainties is a warning.
-    slightly = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.303, -0.3834, 0.1025)))
+    slightly = replace(SCENARIO, accelerometer=replace(SCENARIO.accelerometer, b=(0.303, -0.3834, 0.1025)))
     near, _ = simulate(slightly, 13)
     assert all(f.severity.value != "serious" for f in trihedron.verify(result, near).findings)
 

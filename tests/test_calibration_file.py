@@ -3,11 +3,14 @@
 import json
 import math
 from dataclasses import fields, replace
+from functools import reduce
 from importlib.resources import files
+from operator import getitem
 
 import numpy as np
 import pytest
 
+from small_session import usual
 from trihedron import calibrate
 from trihedron.api.applying import apply
 from trihedron.files.calibration import (
@@ -17,28 +20,23 @@ from trihedron.files.calibration import (
     schema_of,
     write_calibration,
 )
-from trihedron.records import FitQuality
+from trihedron.records import FitQuality, diagnosis
 from trihedron.records.calibration import Observability
-from trihedron.records.diagnosis import (
-    AcceptedEffect,
-    Candidate,
-    EffectParameter,
-    LinearModel,
-    NoiseDifference,
-    ParameterDifference,
-    Relation,
-    Stage,
-)
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut, Where
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.plain import as_plain, from_plain
 from trihedron.records.reference import Estimate, FitToReference
-from written_session import usual
 
-
-@pytest.fixture(scope="module")
-def session():
-    return usual()[:2]
+OF_DIAGNOSIS = {
+    "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": diagnosis.EffectParameter,
+    "effect": diagnosis.AcceptedEffect, "candidate": diagnosis.Candidate, "linear": diagnosis.LinearModel,
+    "residuals": DomainResiduals, "finding": Finding, "parameter_difference": diagnosis.ParameterDifference,
+    "noise_difference": diagnosis.NoiseDifference, "relation": diagnosis.Relation, "stage": diagnosis.Stage,
+    "estimate": Estimate, "against_reference_sensor": FitToReference,
+}  # fmt: skip
+OF_CALIBRATION = {"residuals": FitQuality, "observability": Observability}
+EVERY = [("diagnosis", *item) for item in OF_DIAGNOSIS.items()]
+EVERY += [("calibration", *item) for item in OF_CALIBRATION.items()]
 
 
 def same(a, b):
@@ -49,8 +47,8 @@ def same(a, b):
     return a == b
 
 
-def test_a_round_trip_gives_back_every_number_exactly(session, tmp_path):
-    calibration = session[1].calibration
+def test_a_round_trip_gives_back_every_number_exactly(tmp_path):
+    calibration = usual()[1].calibration
     write_calibration(calibration, tmp_path / "c.json")
     back = read_calibration(tmp_path / "c.json")
     assert np.array_equal(back.covariance, calibration.covariance)
@@ -63,16 +61,16 @@ def test_a_round_trip_gives_back_every_number_exactly(session, tmp_path):
             assert all(same(before[key], after[key]) for key in before), part
     rest = ("frame", "gravity_m_s2", "gravity_source", "recording_source", "recording_sha256", "findings")
     assert all(getattr(back, key) == getattr(calibration, key) for key in rest)
-    alone = calibrate(replace(session[0], gyroscope=None), gravity_m_s2=9.80665).calibration
+    alone = calibrate(replace(usual()[0], gyroscope=None), gravity_m_s2=9.80665).calibration
     write_calibration(alone, tmp_path / "alone.json")
     assert read_calibration(tmp_path / "alone.json").gyroscope is None
     assert np.array_equal(read_calibration(tmp_path / "alone.json").covariance, alone.covariance)
 
 
-def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units(session):
+def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units():
     import jsonschema
 
-    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+    document = json.loads(json.dumps(calibration_document(usual()[1].calibration)))
     jsonschema.Draft202012Validator.check_schema(schema_of("calibration"))
     jsonschema.validate(document, schema_of("calibration"), cls=jsonschema.Draft202012Validator)
     assert document["format_version"] == 1
@@ -84,26 +82,15 @@ def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units
     assert len(document["recording"]["sha256"]) == 64
 
 
-def test_the_equation_written_in_the_file_reproduces_what_apply_does(session):
+def test_the_equation_written_in_the_file_reproduces_what_apply_does():
     """A user who follows the file's words, and nothing else, must get what the tool gets."""
-    recording, result = session
+    recording, result, _ = usual()
     document = json.loads(json.dumps(calibration_document(result.calibration)))
     corrected = apply(result, recording)
     for name in ("accelerometer", "gyroscope"):
         S, b = (np.array(document[name][key]) for key in ("S", "b"))
         expected = [S @ row + b for row in getattr(recording, name)[:50]]
         np.testing.assert_allclose(getattr(corrected, name)[:50], expected, rtol=0, atol=1e-12)
-
-
-def damaged(document, path, value):
-    at = document
-    for key in path[:-1]:
-        at = at[key]
-    if value is None:
-        del at[path[-1]]
-    else:
-        at[path[-1]] = value
-    return document
 
 
 @pytest.mark.parametrize(
@@ -121,25 +108,17 @@ def damaged(document, path, value):
         (("frame",), "sideways", "frame"),
     ],
 )
-def test_a_changed_file_is_refused_with_the_place_named(session, tmp_path, path, value, said):
-    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+def test_a_changed_file_is_refused_with_the_place_named(tmp_path, path, value, said):
+    document = json.loads(json.dumps(calibration_document(usual()[1].calibration)))
+    at = reduce(getitem, path[:-1], document)
+    at[path[-1]] = value
+    if value is None:
+        del at[path[-1]]
     file = tmp_path / "c.json"
-    file.write_text(json.dumps(damaged(document, path, value)))
+    file.write_text(json.dumps(document))
     with pytest.raises(CalibrationFileError, match=r"c\.json") as caught:
         read_calibration(file)
     assert said in str(caught.value)
-
-
-OF_DIAGNOSIS = {
-    "where": Where, "domain": DomainTest, "heldout": HeldOut, "parameter": EffectParameter, "effect": AcceptedEffect,
-    "candidate": Candidate, "linear": LinearModel, "residuals": DomainResiduals, "finding": Finding,
-    "parameter_difference": ParameterDifference, "noise_difference": NoiseDifference, "relation": Relation,
-    "stage": Stage,
-    "estimate": Estimate, "against_reference_sensor": FitToReference,
-}  # fmt: skip
-OF_CALIBRATION = {"residuals": FitQuality, "observability": Observability}
-EVERY = [("diagnosis", *item) for item in OF_DIAGNOSIS.items()]
-EVERY += [("calibration", *item) for item in OF_CALIBRATION.items()]
 
 
 @pytest.mark.parametrize(("which", "name", "record"), EVERY, ids=lambda v: getattr(v, "__name__", v))
@@ -154,28 +133,13 @@ def quality(**more):
     return FitQuality("m/s^2", np.array([0.1, -0.2]), np.array([0.1, 0.1]), 5.0, 1, 0.16, 0.2, 0.1, **more)
 
 
-def test_a_record_comes_back_from_plain_types_with_the_same_bits():
-    given = quality(held_out=np.array([[1 / 3, 2 / 3], [0.1, 1e-300]]), stopped_because="gradient")
-    back = from_plain(json.loads(json.dumps(as_plain(given))), FitQuality)
-    for field in fields(FitQuality):
-        a, b = getattr(given, field.name), getattr(back, field.name)
-        assert np.array_equal(a, b), field.name
-        assert type(a) is type(b), field.name
-    assert not back.residual.flags.writeable
-    seen = Observability(2, 3, 4.0, np.ones(2), "tilt", ("turn it",), (("a", "b", 0.95),))
-    again = from_plain(json.loads(json.dumps(as_plain(seen))), Observability)
-    assert (again.correlated, again.advice) == (seen.correlated, seen.advice)
-    finding = Finding(next(iter(FindingCode)), "note", "seen", numbers={"x": math.nan})  # type: ignore[arg-type]
-    found = from_plain(finding.to_dict() | {"numbers": {"x": None}}, Finding)
-    assert found.code is finding.code
-    assert math.isnan(found.numbers["x"])
-
-
 def test_null_is_no_finite_number_and_what_may_be_absent_stays_so():
     back = from_plain(as_plain(quality()) | {"chi2": None, "residual": [None, 1.0]}, FitQuality)
     assert math.isnan(back.chi2)
     assert math.isnan(back.residual[0])
     assert back.held_out is back.held_out_rms is None
+    finding = Finding(next(iter(FindingCode)), "note", "seen", numbers={"x": math.nan})  # type: ignore[arg-type]
+    assert math.isnan(from_plain(finding.to_dict() | {"numbers": {"x": None}}, Finding).numbers["x"])
 
 
 @pytest.mark.parametrize("harm", [{"surprise": 1}, {"dof": None}, {"chi2": "much"}, {"residual": "x"}])

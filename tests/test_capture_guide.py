@@ -26,6 +26,7 @@ from trihedron.simulate.motion.steps import Motion, MoveTo, Pose
 from trihedron.simulate.noise import stream
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 class FollowingHand:
@@ -80,9 +81,8 @@ def led():
         readings = readings_of(recording)
         for first, last in steps(recording.time_s[done:]):
             state["now"] = float(recording.time_s[done + last - 1])
-            views.append(
-                guide.advance(recording.time_s[done + first : done + last], readings[done + first : done + last])
-            )
+            rows = slice(done + first, done + last)
+            views.append(guide.advance(recording.time_s[rows], readings[rows]))
         done = recording.n_samples
         # A second more than requested: stillness is known half a second late.
         target = guide.view().target_up
@@ -211,9 +211,6 @@ def test_the_page_opens_once_with_its_token_and_only_for_its_own_address(led):
         assert told["instruction"] == "Done."
     finally:
         page.close()
-
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium or Chrome on this machine to look at the page with")

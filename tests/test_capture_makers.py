@@ -15,6 +15,8 @@ from trihedron.simulate.device.faults import Faults, Sent
 from trihedron.simulate.device.serving import Device
 
 N = 300
+# Half of the last digit: 16 g and 2000 deg/s in 2^15 steps, three and six digits, floats.
+STEPS = [("witmotion", 0.0024, 5.4e-4), ("witmotion-clock", 0.0024, 5.4e-4), ("vectornav", 5.1e-4, 5.1e-7)]
 
 
 def still(rate_hz=100.0) -> Recording:
@@ -26,10 +28,6 @@ def still(rate_hz=100.0) -> Recording:
 
 def sent_as(board: str, recording: Recording, faults: Faults | None = None) -> bytes:
     return b"".join(data for _, data in Device(recording, board, faults or Faults(), seed=3).pieces(Sent()))
-
-
-# Half of the last digit: 16 g and 2000 deg/s in 2^15 steps, three and six digits, floats.
-STEPS = [("witmotion", 0.0024, 5.4e-4), ("witmotion-clock", 0.0024, 5.4e-4), ("vectornav", 5.1e-4, 5.1e-7)]
 
 
 @pytest.mark.parametrize(("board", "force", "rate"), [*STEPS, ("sbg", 1e-6, 1e-8)])
@@ -51,12 +49,8 @@ def test_a_stream_of_a_known_maker_is_recognised_and_keeps_every_reading(board, 
 def test_what_a_clock_says_is_lost_stands_in_the_log(board, tmp_path):
     recording = still()
     encode = encoder_for(board)
-    frames = [
-        encode(k, float(t), a, w)
-        for k, (t, a, w) in enumerate(
-            zip(recording.time_s, recording.accelerometer / 100, recording.gyroscope, strict=True)
-        )
-    ]
+    force, rate = recording.accelerometer / 100, recording.gyroscope
+    frames = [encode(k, float(t), force[k], rate[k]) for k, t in enumerate(recording.time_s)]
     # One sample is gone whole, of another the last bytes.
     (tmp_path / "stream").write_bytes(b"".join(frames[:50] + frames[51:120] + [frames[120][:-20]] + frames[121:]))
     assert main(["capture", str(tmp_path / "stream"), "-o", str(tmp_path / "log.csv")]) == 0
@@ -95,10 +89,6 @@ def test_counts_of_an_sbg_are_as_large_as_its_status_says(status, per_rad_s):
     assert frame.ticks == 5000
 
 
-def repeated(*messages: bytes) -> bytes:
-    return b"".join(messages * 40)
-
-
 def of_words(body: bytes, n: int) -> bytes:
     return b"".join(body + np.random.default_rng(k).bytes(n) for k in range(40))
 
@@ -106,12 +96,12 @@ def of_words(body: bytes, n: int) -> bytes:
 FOREIGN = {
     "video": (b"\0\0\0\x14ftypmp41" + bytes(3000), "a video.*gopro-telemetry"),
     "gpmf": (b"DEVC\0\x01\x12\x34" + bytes(3000), "a GoPro GPMF.*gopro-telemetry"),
-    "angles": (repeated(b"$VNYPR,+010.071,+000.278,-002.026*60\r\n"), r"VectorNav text without.*\$VNIMU"),
+    "angles": ((40 * b"$VNYPR,+010.071,+000.278,-002.026*60\r\n"), r"VectorNav text without.*\$VNIMU"),
     "vectornav binary": (of_words(b"\xfa\x01\x21\x01", 60), "VectorNav binary output.*VNIMU"),
     "sbg": (of_words(b"\xff\x5a\x06\x00\x1c\x00", 33), "SBG sbgECom without IMU data.*switch"),
-    "witmotion": (repeated(b"\x55\x53" + bytes(8) + b"\xa8"), "WitMotion packets without.*switch"),
+    "witmotion": (40 * (b"\x55\x53" + bytes(8) + b"\xa8"), "WitMotion packets without.*switch"),
     "bluetooth": (of_words(b"\x55\x61", 18), "WitMotion's Bluetooth.*serial"),
-    "nmea": (repeated(b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"), "NMEA.*no IMU"),
+    "nmea": ((40 * b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"), "NMEA.*no IMU"),
     "mtdata": (of_words(b"\xfa\xff\x32\x1c", 29), "Xsens MTData of the old kind.*MTData2"),
 }
 

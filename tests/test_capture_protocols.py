@@ -23,6 +23,9 @@ COUNTED = [
     ("sbg", "sbg"),
 ]
 UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines"), ("vectornav",) * 2]
+SLOW = {board: pytest.mark.slow for board, _ in COUNTED if board not in ("declared", "xio")}
+RATES = [(*one, 100.0) for one in COUNTED]
+RATES += [pytest.param(*one, 1000.0, marks=SLOW.get(one[0], ())) for one in COUNTED]
 
 
 @pytest.fixture
@@ -80,12 +83,6 @@ def test_every_frame_of_a_clean_line_is_read_with_its_values(board, name, declar
     assert np.allclose(values, scale * truth, atol=1e-4 + 1e-6 * abs(scale) * 1023)
     # The log keeps the digits: its text is the value again.
     assert np.allclose([float(frame.text.split(",")[z]) for frame in frames], values, rtol=1e-8)
-
-
-FAST = ("declared", "xio")
-RATES = [(*one, 100.0) for one in COUNTED] + [
-    pytest.param(*one, 1000.0, marks=() if one[0] in FAST else pytest.mark.slow) for one in COUNTED
-]
 
 
 @pytest.mark.parametrize(("board", "name", "rate_hz"), RATES)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +26,19 @@ from trihedron.simulate.device.faults import Faults, Sent, parse_faults
 from trihedron.simulate.device.serving import Device
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+INPUT_ERRORS = [
+    (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
+    (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
+    (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
+    (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
+    (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
+    (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
+    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
+    (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
+    (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
+    (["capture", "NOISE"], "name the log to write"),
+    (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
+]
 
 
 def capture(port, path, **options):
@@ -32,6 +46,12 @@ def capture(port, path, **options):
     recorder = Recorder(source, found.make_decoder, path, first_bytes=found.first_bytes, **options)
     blocks = list(recorder)
     return recorder, blocks
+
+
+def sent(path, *device):
+    """A file of what a simulated board sends."""
+    path.write_bytes(b"".join(piece for _, piece in Device(*device).pieces(Sent())))
+    return str(path)
 
 
 @pytest.mark.parametrize("where", ["tcp", "file", "stdin"])
@@ -43,15 +63,13 @@ def test_any_stream_of_bytes_is_a_source(where, tmp_path):
             recorder, _ = capture(board.port, log, wait_for_return_s=0.0)
         assert recorder.count.tally.saved == 300
         return
-    data = b"".join(piece for _, piece in Device(recording, "lines").pieces(Sent()))
-    raw = tmp_path / "raw.txt"
-    raw.write_bytes(data)
+    raw = sent(tmp_path / "raw.txt", recording, "lines")
     if where == "file":
-        recorder, _ = capture(str(raw), log)
+        recorder, _ = capture(raw, log)
         assert recorder.count.tally.saved == 300
     else:
         command = [sys.executable, "-m", "trihedron", "capture", "-", "-o", str(log)]
-        subprocess.run(command, input=data, check=True, capture_output=True, timeout=60)
+        subprocess.run(command, input=Path(raw).read_bytes(), check=True, capture_output=True, timeout=60)
     back = trihedron.read(log)
     assert back.n_samples == 300
     assert np.array_equal(back.accelerometer, recording.accelerometer)
@@ -137,15 +155,14 @@ def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_l
 
 def test_a_full_disk_says_what_is_saved_and_leaves_a_whole_file(tmp_path):
     # The limit of the size of a file represents the disk.
-    raw = tmp_path / "raw.txt"
-    raw.write_bytes(b"".join(p for _, p in Device(counts_recording(5000, 100.0), "lines").pieces(Sent())))
+    raw = sent(tmp_path / "raw.txt", counts_recording(5000, 100.0), "lines")
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (60000, 60000));"
         "from trihedron.cli import main; sys.exit(main(sys.argv[1:]))"
     )
     log = tmp_path / "log.csv"
     done = subprocess.run(
-        [sys.executable, "-c", code, "capture", str(raw), "-o", str(log)], capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code, "capture", raw, "-o", str(log)], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 2
     assert "the disk is full" in done.stderr
@@ -169,21 +186,6 @@ def test_kill_9_loses_at_most_a_second_and_the_file_reads(tmp_path):
     assert process.returncode == -signal.SIGKILL
     back = trihedron.read(log)
     assert back.n_samples > 300
-
-
-INPUT_ERRORS = [
-    (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
-    (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
-    (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
-    (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
-    (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
-    (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
-    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
-    (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
-    (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
-    (["capture", "NOISE"], "name the log to write"),
-    (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
-]
 
 
 @pytest.mark.parametrize(("words", "sentence"), INPUT_ERRORS)
@@ -216,19 +218,15 @@ def test_a_silent_board_is_told_from_a_wrong_protocol_and_a_busy_port_is_named()
 
 
 def test_what_a_board_says_at_start_is_no_frame(tmp_path):
-    raw = tmp_path / "raw.txt"
-    device = Device(counts_recording(100, 100.0), "lines-label", parse_faults("text"))
-    raw.write_bytes(b"".join(piece for _, piece in device.pieces(Sent())))
-    recorder, _ = capture(str(raw), tmp_path / "log.csv")
+    raw = sent(tmp_path / "raw.txt", counts_recording(100, 100.0), "lines-label", parse_faults("text"))
+    recorder, _ = capture(raw, tmp_path / "log.csv")
     assert recorder.count.tally.saved == 100
     assert recorder.count.corrupt <= 1
 
 
 def test_a_board_whose_clock_runs_fast_writes_its_own_time(tmp_path):
-    raw = tmp_path / "raw.txt"
-    device = Device(counts_recording(1001, 100.0), "xio", Faults(drift_ppm=500.0))
-    raw.write_bytes(b"".join(piece for _, piece in device.pieces(Sent())))
-    _, blocks = capture(str(raw), tmp_path / "log.csv")
+    raw = sent(tmp_path / "raw.txt", counts_recording(1001, 100.0), "xio", Faults(drift_ppm=500.0))
+    _, blocks = capture(raw, tmp_path / "log.csv")
     times = np.concatenate([block.time_s for block in blocks])
     # Ten seconds and 5 ms, in whole microseconds.
     assert times[-1] - times[0] == pytest.approx(10.005, abs=2e-6)

@@ -13,6 +13,9 @@ from trihedron.records import Recording
 from trihedron.report.channels import channels_record, channels_table
 
 SCALE = 9.80665 / 16384
+FINER = 8
+SESSIONS = [((0.1, 0.15), 1, 100.0)]
+SESSIONS += [pytest.param(*one, marks=pytest.mark.slow) for one in (((0.2, 0.35), 2, 50.0), ((0.3, 0.08), 3, 400.0))]
 
 
 def session(seed, n=8000, amplitude=3000.0, sigma=1.0):
@@ -137,9 +140,6 @@ def test_a_level_under_noise_is_a_possible_limit_unless_everything_stands_still_
     assert all(abs(one.value - 1.0) < 5.0 * one.sigma for one in found)
 
 
-FINER = 8
-
-
 def filtered(noise, corner, order):
     """Samples behind an analogue Butterworth of half the power at ``corner`` (of the rate), sampled finely."""
     if not corner:
@@ -162,10 +162,6 @@ def log(seed, corners, order=2, rate_hz=100.0, seconds=240.0, step=0.0, rest=0.6
         x = size * noise / noise.std() + motion + level
         out.append(np.round(x / step) * step if step else x)
     return Recording.from_arrays(t, out[0], out[1])
-
-
-SESSIONS = [((0.1, 0.15), 1, 100.0)]
-SESSIONS += [pytest.param(*one, marks=pytest.mark.slow) for one in (((0.2, 0.35), 2, 50.0), ((0.3, 0.08), 3, 400.0))]
 
 
 @pytest.mark.parametrize(("corners", "order", "rate_hz"), SESSIONS)

@@ -1,5 +1,7 @@
 """Sessions of an independent generator (benches/confidence): within their bars, or marked, whatever the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,12 @@ from trihedron import calibrate, diagnose
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT
 from trihedron.estimate.session.solved import calibrate_joint
-from trihedron.records import FindingCode, Recording
+from trihedron.records import FindingCode
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
+
+RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
+NOISE = 0.02
 
 
 def gyro_z(result, truth):
@@ -35,9 +40,8 @@ def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds():
 def test_stated_turns_on_faces_win_over_a_wrong_nominal_scale_and_unstated_ones_are_read_by_gravity():
     f, w, rate, truth, motion = table(7, turns=(180.0, -180.0))
     stated = [angle for _, _, angle in motion.turns]
-    result = calibrate(
-        recorded(f, w, rate), gravity_m_s2=G, method="faces", turns_deg=stated, gyroscope_nominal=2.0 * truth.S_w[0, 0]
-    )
+    wrong = {"turns_deg": stated, "gyroscope_nominal": 2.0 * truth.S_w[0, 0]}
+    result = calibrate(recorded(f, w, rate), gravity_m_s2=G, method="faces", **wrong)
     z, relative = gyro_z(result, truth)
     assert np.abs(z).max() < 4.0
     assert relative < 1e-3
@@ -160,14 +164,10 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
             seed,
         )
         part = np.linspace(-0.5, 0.5, recording.n_samples)[:, np.newaxis]
-        drifting = Recording(
-            recording.time_s, recording.accelerometer + drift * part, recording.gyroscope, recording.rate_hz,
-            accelerometer_unit="m/s^2", gyroscope_unit="rad/s",
-        )  # fmt: skip
+        drifting = replace(recording, accelerometer=recording.accelerometer + drift * part)
         segments = segments_from_truth(drifting, truth)
-        alone, _ = calibrate_norm(
-            segments.accelerometer_mean, segments.accelerometer_sigma_mean, truth.gravity_m_s2, raw_unit="m/s^2"
-        )
+        means = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+        alone, _ = calibrate_norm(*means, truth.gravity_m_s2, raw_unit="m/s^2")
         found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given")
         middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
         # f = S a' + b, so that b is minus the bias.
@@ -179,10 +179,6 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
     f, w, rate, _, _ = hand(9002, move_s=1.5, gyro_flicker=np.radians(20.0 / 3600.0), accel_flicker=0.3e-3 * G)
     assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"
-
-
-RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
-NOISE = 0.02
 
 
 def log(seed, size=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):

@@ -34,9 +34,9 @@ def sensor(rng):
     return 2e-3 * S, rng.standard_normal(3)
 
 
-def fitted(S_a, b_a, S_g, b_g, sigma=1e-6):
+def fitted(S_a, b_a, S_g, b_g, sigma=1e-6, units=("counts", "counts")):
     covariance = np.diag(np.r_[np.full(9, sigma), np.full(3, 1e-3), np.full(9, sigma), np.full(3, 1e-5)] ** 2)
-    return FittedModel(FittedSensor(S_a, b_a, "counts"), FittedSensor(S_g, b_g, "counts"), covariance)
+    return FittedModel(FittedSensor(S_a, b_a, units[0]), FittedSensor(S_g, b_g, units[1]), covariance)
 
 
 @pytest.mark.parametrize(("sigmas", "named"), [((1.0, 2.5, 2.0), ["Y"]), ((8.0, 1.0, 5.0), ["X", "Z"])])

@@ -9,22 +9,25 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 import trihedron
+from test_diagnose_against import fitted
 from trihedron.comparison.frames import carried_gravity, sign_of_gravity
 from trihedron.comparison.noise import compare_noise, sampled
 from trihedron.comparison.slow import correlation_times
-from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
+RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
+POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
+STEP = 1e-4
+SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
+"""Noise of a reading, SI."""
+pytestmark = pytest.mark.usefixtures("without_corners")
+
 
 def model(accel_size, gyro_size, units=("m/s^2", "rad/s")):
     """Triads that read ``size`` times the truth, sides of one per cent between the axes."""
-    covariance = np.diag(np.r_[np.full(9, 1e-6), np.full(3, 1e-3), np.full(9, 1e-6), np.full(3, 1e-5)] ** 2)
-    return FittedModel(
-        FittedSensor(np.eye(3) / accel_size, np.zeros(3), units[0]),
-        FittedSensor(np.eye(3) / gyro_size, np.zeros(3), units[1]), covariance,
-    )  # fmt: skip
+    return fitted(np.eye(3) / accel_size, np.zeros(3), np.eye(3) / gyro_size, np.zeros(3), units=units)
 
 
 @pytest.mark.parametrize(
@@ -92,19 +95,8 @@ def test_gravity_of_the_other_sign_is_said_pose_by_pose_and_only_of_one_protocol
     assert sign_of_gravity((trihedron.segment(other), known), (segments, known)) is None
 
 
-RATE_HZ, POSE, EVERY, N_POSES = 100.0, 900, 1000, 12
-POSES = tuple(Pose(k, EVERY * k, EVERY * k + POSE, EVERY * k, EVERY * k + POSE) for k in range(N_POSES))
-STEP = 1e-4
-SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
-"""Noise of a reading, SI."""
-
-
 def numbers(accel_bias=(0.0, 0.0, 0.0), gyro_bias=(0.0, 0.0, 0.0)):
-    sigma = np.r_[np.full(9, 1e-5), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
-    return FittedModel(
-        FittedSensor(np.eye(3), -np.array(accel_bias), "m/s^2"), FittedSensor(np.eye(3), -np.array(gyro_bias), "rad/s"),
-        np.diag(sigma**2),
-    )  # fmt: skip
+    return fitted(np.eye(3), -np.array(accel_bias), np.eye(3), -np.array(gyro_bias), 1e-5, ("m/s^2", "rad/s"))
 
 
 @cache
@@ -126,16 +118,8 @@ def log(
         readings[sensor] = lsb * np.round(x / lsb) if lsb else x
     time = np.arange(n) / RATE_HZ + (jitter_s * rng.standard_normal(n) if jitter_s else 0.0)
     clock = {"time_s": time} if timed else {"time_s": None, "rate_hz": RATE_HZ}
-    made = Recording.from_arrays(**clock, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    made = Recording.from_arrays(**clock, **readings)
     return sampled(made, POSES, numbers())
-
-
-pytestmark = pytest.mark.usefixtures("without_corners")
-
-
-@pytest.fixture(scope="module")
-def real(without_corners):  # noqa: ARG001
-    return log(1)
 
 
 def said(model, recording):
@@ -143,8 +127,8 @@ def said(model, recording):
     return {(n.sensor, n.term): n.remark for n in rows if n.significant}
 
 
-def test_the_same_unit_again_has_made_no_mistake(real):
-    assert said(log(2), real) == {}
+def test_the_same_unit_again_has_made_no_mistake():
+    assert said(log(2), log(1)) == {}
 
 
 @pytest.mark.parametrize(
@@ -156,21 +140,21 @@ def test_the_same_unit_again_has_made_no_mistake(real):
         (20.0, 4.0 * RATE_HZ, "√400"),
     ],
 )
-def test_a_density_scaled_by_the_root_of_the_rate_is_named(real, factor, rate_hz, words):
-    found = said(replace(log(3, size=factor, step=STEP * min(factor, 1.0)), rate_hz=rate_hz), real)
+def test_a_density_scaled_by_the_root_of_the_rate_is_named(factor, rate_hz, words):
+    found = said(replace(log(3, size=factor, step=STEP * min(factor, 1.0)), rate_hz=rate_hz), log(1))
     assert all(words in found[sensor, "N"] for sensor in SENSORS)
 
 
-def test_uniform_noise_is_told_from_normal_noise_of_the_same_size(real):
-    found = said(log(4, uniform=True), real)
+def test_uniform_noise_is_told_from_normal_noise_of_the_same_size():
+    found = said(log(4, uniform=True), log(1))
     assert set(found) == {("accelerometer", "distribution"), ("gyroscope", "distribution")}
     assert "uniformly distributed" in found["gyroscope", "distribution"]
     # The other way round: a recording is what it is.
-    assert said(real, log(4, uniform=True)) == {}
+    assert said(log(1), log(4, uniform=True)) == {}
 
 
-def test_the_same_noise_on_all_axes_is_named_where_the_recordings_axes_differ(real):
-    found = said(log(5, axes=(1.1, 1.1, 1.1)), real)
+def test_the_same_noise_on_all_axes_is_named_where_the_recordings_axes_differ():
+    found = said(log(5, axes=(1.1, 1.1, 1.1)), log(1))
     assert "the same on all axes of the model" in found["gyroscope", "N"]
     even = log(6, axes=(1.1, 1.1, 1.1))
     assert not any("same on all axes" in words for words in said(log(5, axes=(1.3, 1.3, 1.3)), even).values())

@@ -26,42 +26,30 @@ from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 
+NAMED = threshold(0.01)
 
-def _with_gyro_bias(seed, bias):
-    """A healthy session whose second gyro reads ``bias`` (rad/s; poses, samples, generator) more, and gravity."""
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_bias_that_switches_follows_a_random_telegraph_signal_and_any_other_distribution_is_repeatability(seed):
     recording, truth = simulated(seed=seed)
-    scale = np.radians(1.0 / 131.0)
-    gyro = recording.gyroscope.copy()
-    gyro[:, 1] += bias(trihedron.segment(recording).poses, len(gyro), np.random.default_rng(seed)) / scale
-    return replace(recording, gyroscope=gyro), truth.gravity_m_s2
-
-
-def _switching(_poses, n, rng):
-    at = np.sort(rng.integers(0, n, 20))
-    return 0.0003 * (-1.0) ** np.searchsorted(at, np.arange(n), side="right")
-
-
-def _scattered(poses, n, rng):
-    of_pose = rng.normal(0.0, 0.0006, len(poses))
-    return np.interp(np.arange(n), [(pose.start + pose.stop) / 2 for pose in poses], of_pose)
-
-
-def test_a_bias_that_switches_between_two_levels_follows_a_random_telegraph_signal():
-    recording, gravity = _with_gyro_bias(1, _switching)
-    found = trihedron.diagnose(recording, gravity_m_s2=gravity)
+    rng, n = np.random.default_rng(seed), recording.n_samples
+    if seed == 1:
+        bias = 0.0003 * (-1.0) ** np.searchsorted(np.sort(rng.integers(0, n, 20)), np.arange(n), side="right")
+    else:
+        middles = [(pose.start + pose.stop) / 2 for pose in trihedron.segment(recording).poses]
+        bias = np.interp(np.arange(n), middles, rng.normal(0.0, 0.0006, len(middles)))
+    rates = recording.gyroscope + bias[:, None] / np.radians(1.0 / 131.0) * [0.0, 1.0, 0.0]
+    found = trihedron.diagnose(replace(recording, gyroscope=rates), gravity_m_s2=truth.gravity_m_s2)
+    if seed == 2:
+        assert [one.id for one in found.effects] == ["gyro-bias-repeatability"]
+        assert not found.relations
+        return
     assert found.verdict == "unexplained"
     (relation,) = (one for one in found.relations if one.depends_on == ("a random telegraph signal",))
     (height,) = relation.coefficients
     assert height.name.startswith("y")
     assert abs(height.value - 0.0003) < 0.00006  # poses in which it switches more than twice dilute it
     assert next(one for one in found.domains if one.domain == "static-gyro").disagrees
-
-
-def test_a_bias_of_any_other_distribution_is_bias_repeatability():
-    recording, gravity = _with_gyro_bias(2, _scattered)
-    found = trihedron.diagnose(recording, gravity_m_s2=gravity)
-    assert [one.id for one in found.effects] == ["gyro-bias-repeatability"]
-    assert not found.relations
 
 
 def test_the_error_of_a_mean_of_few_turns_covers_it():
@@ -89,9 +77,7 @@ def diagnosed(tmp_path, *drawn):
         ("none", 4500100519, []),  # soft supports that ring: named a line
     ],
 )
-def test_a_straight_line_among_zeros_that_scatter_is_no_curve_and_a_soft_support_no_vibration(
-    flaw, seed, first, tmp_path
-):
+def test_a_line_among_zeros_that_scatter_is_no_curve_and_a_soft_support_no_vibration(flaw, seed, first, tmp_path):
     found, _ = diagnosed(tmp_path, flaw, seed)
     assert [(one.id, one.model["variant"]) for one in found.effects[:1]] == first
 
@@ -110,9 +96,6 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
     # To one sample or one in ten of what is missing: gravity cannot count a loss in a turn about the vertical.
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1, abs=1.0), what
-
-
-NAMED = threshold(0.01)
 
 
 @cache

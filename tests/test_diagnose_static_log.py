@@ -13,6 +13,8 @@ from trihedron.report.diagnosis import diagnosis_report
 from trihedron.session.static_lines import means_beside_lines
 
 DEG = np.pi / 180.0
+RATE_HZ = 100.0
+SIGMA = 0.02
 
 
 def still(n, rate_hz, seed, force=(0.3, -0.2, 9.79)):
@@ -23,12 +25,6 @@ def still(n, rate_hz, seed, force=(0.3, -0.2, 9.79)):
     return t, accelerometer, gyroscope
 
 
-def recording(t, accelerometer, gyroscope, **more):
-    return trihedron.Recording.from_arrays(
-        t, accelerometer, gyroscope, accelerometer_unit="m/s^2", gyroscope_unit="rad/s", **more
-    )
-
-
 def chamber(seed, hysteresis=0.0):
     """Up from -10 to 60 °C and back, at 1 Hz in 80 min: the gyro's bias follows, lagging if there is hysteresis."""
     n, rate_hz = 4800, 1.0
@@ -37,11 +33,11 @@ def chamber(seed, hysteresis=0.0):
     heat = 25.0 - 35.0 * np.cos(2.0 * np.pi * u)
     own = np.array([0.01, -0.03, 0.004]) * DEG
     gyroscope += (heat - 25.0)[:, None] * own + hysteresis * np.sign(np.gradient(heat))[:, None] * np.array([1, 0, 0])
-    return recording(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
+    return Recording.from_arrays(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
 
 
 def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named():
-    d = trihedron.diagnose(recording(*still(15000, 100.0, 41)), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(*still(15000, 100.0, 41)), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
     assert d.effects == ()
     assert {t.domain for t in d.domains} >= {"static-gyro", "static-accel", "within-static"}
@@ -82,7 +78,7 @@ def test_branches_that_differ_while_heating_and_cooling_are_stated_in_degrees_pe
 def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
     t, accelerometer, gyroscope = still(30000, 25.0, 46)
     gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert [e.id for e in d.effects] == ["gyro-bias-drift"]
     spans = {p.name: p.value for p in d.effects[0].parameters}
     assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
@@ -91,14 +87,14 @@ def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
 def test_a_hum_in_a_static_log_is_named():
     t, accelerometer, gyroscope = still(15000, 100.0, 47)
     gyroscope[:, 0] += 0.04 * DEG * np.sin(2.0 * np.pi * 17.3 * t)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert [e.id for e in d.effects] == ["periodic-interference"]
     assert d.effects[0].parameters[0].value == pytest.approx(17.3, abs=1e-3)
 
 
 @pytest.mark.parametrize(("lasts_s", "is_for_noise"), [(6, False), (30, True)])
 def test_only_a_log_long_enough_for_noise_is_sent_to_allan(lasts_s, is_for_noise):
-    log = recording(*still(100 * lasts_s, 100.0, 42))
+    log = Recording.from_arrays(*still(100 * lasts_s, 100.0, 42))
     advice = [" ".join(one.action for one in trihedron.check(log).findings)]
     advice.append(diagnosis_report(trihedron.diagnose(log, gravity_m_s2=9.8)).next_step)
     assert ["allan" in one for one in advice] == [is_for_noise] * 2
@@ -111,13 +107,9 @@ def test_a_log_in_motion_names_nothing():
     accelerometer[:, 0] += 9.8 * np.sin(angle)
     accelerometer[:, 2] += 9.8 * (np.cos(angle) - 1.0)
     gyroscope[:, 1] += np.gradient(angle, t)
-    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
     assert d.verdict == "not-testable"
     assert d.effects == ()
-
-
-RATE_HZ = 100.0
-SIGMA = 0.02
 
 
 def poses(seed, n_poses, amplitude, colour=0.0):
@@ -135,9 +127,7 @@ def poses(seed, n_poses, amplitude, colour=0.0):
             cycles = rng.integers(8, int(0.4 * lengths[k])) + 0.5
             phase = 2.0 * np.pi * cycles * np.arange(lengths[k]) / lengths[k] + rng.uniform(0.0, 2.0 * np.pi)
             x[here] += amplitude * np.sin(phase)[:, None] * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.5, 3)
-    recording = Recording(
-        time_s=np.arange(len(x)) / RATE_HZ, accelerometer=x, gyroscope=None, rate_hz=RATE_HZ,
-    )  # fmt: skip
+    recording = Recording(np.arange(len(x)) / RATE_HZ, x, None, RATE_HZ)
     mean = np.array([x[a:b].mean(axis=0) for a, b in pairwise(edges)])
     error = SIGMA / np.sqrt(lengths)[:, None] * np.ones(3)
     segments = Segments(
@@ -171,8 +161,13 @@ def test_poses_without_a_line_keep_their_means(colour):
     assert not swing.any()
 
 
-def session(seed, shaken_share, gain, rate_line):
-    """A hand session; in a share of its poses 1 m/s² of shaking with ``gain`` times its square, a line in rates.
+@pytest.mark.parametrize(
+    ("seed", "shaken_share", "gain", "rate_line", "named"),
+    # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
+    [(1, 0.35, 0.005, 0.0, "vibration-rectification"), (4, 0.0, 0.0, 3e-3, "periodic-interference")],
+)
+def test_an_offset_of_shaken_poses_is_rectification_and_a_line_interference(seed, shaken_share, gain, rate_line, named):
+    """In a share of the poses 1 m/s² of shaking with ``gain`` times its square, a line in rates.
 
     The truth's own poses are shaken from end to end, at a frequency that is no whole number of cycles of any.
     """
@@ -187,15 +182,5 @@ def session(seed, shaken_share, gain, rate_line):
         force[here] += (shake + gain * shake**2) @ np.linalg.inv(np.asarray(truth.accelerometer_S)).T
     rate += rate_line * np.outer(np.sin(2.0 * np.pi * f * t), np.linalg.solve(truth.gyroscope_S, np.ones(3)))
     log = replace(recording, accelerometer=force, gyroscope=rate)
-    return trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-
-
-@pytest.mark.parametrize(
-    ("seed", "shaken_share", "gain", "rate_line", "named"),
-    # 0.005 of a mean square of 1.1²/2 m²/s⁴ is 3 mm/s², of 0.8²/2 half of that.
-    [(1, 0.35, 0.005, 0.0, "vibration-rectification"), (4, 0.0, 0.0, 3e-3, "periodic-interference")],
-)
-def test_a_few_mm_s2_that_go_with_the_shaking_are_rectification_and_a_line_in_every_pose_is_interference(
-    seed, shaken_share, gain, rate_line, named
-):
-    assert [effect.id for effect in session(seed, shaken_share, gain, rate_line).effects] == [named]
+    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert [effect.id for effect in found.effects] == [named]

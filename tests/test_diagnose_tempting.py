@@ -117,9 +117,8 @@ def test_one_bad_pose_is_one_bad_pose():
     # A steady push in one pose, eight times the noise of its mean, seen by no gyro.
     push = np.zeros_like(recording.accelerometer)
     push[pose.start : pose.stop] = np.linalg.solve(truth.accelerometer_S, (0.03, -0.05, 0.04))
-    found = trihedron.diagnose(
-        replace(recording, accelerometer=recording.accelerometer + np.round(push)), gravity_m_s2=truth.gravity_m_s2
-    )
+    pushed = replace(recording, accelerometer=recording.accelerometer + np.round(push))
+    found = trihedron.diagnose(pushed, gravity_m_s2=truth.gravity_m_s2)
     assert_not_taken_in(found, "disturbed-pose")
     poses = [p.value for e in found.effects if e.id == "disturbed-pose" for p in e.parameters if p.name == "pose"]
     # The tenth, as reports count.
@@ -127,13 +126,10 @@ def test_one_bad_pose_is_one_bad_pose():
     assert "Pose 10 was disturbed" in trihedron.report(found)
 
 
-def designed(seed, **levels):
-    """A session of benches/confidence/design.py diagnosed: none of its levels is an effect with a name."""
-    made = design.session(seed, grade="industrial", **levels)
-    recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
-    return {effect.id for effect in trihedron.diagnose(recording, gravity_m_s2=design.G).effects}
-
-
 def test_the_curvature_of_quick_motion_is_not_jitter():
-    # Both sensors saw a common time error of 0.4 ms, 7 of its standard errors.
-    assert "timing-jitter" not in designed(0, rate_hz=50.0, move_s=1.2, path="axis by axis", tremor_deg_s=0.0)
+    # Both sensors saw a common time error of 0.4 ms, 7 of its standard errors; no level of the design is an effect.
+    levels = {"grade": "industrial", "rate_hz": 50.0, "move_s": 1.2, "path": "axis by axis", "tremor_deg_s": 0.0}
+    made = design.session(0, **levels)
+    recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
+    found = trihedron.diagnose(recording, gravity_m_s2=design.G)
+    assert "timing-jitter" not in {effect.id for effect in found.effects}

@@ -19,11 +19,12 @@ import trihedron
 from documented import DOCS
 
 ROOT = DOCS.parent
+PACKAGE = ROOT / "python" / "trihedron"
+ROOTS = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", DOCS]
 PAGES = sorted(DOCS.rglob("*.md"))
 # Made from the code when the site is built (docs/hooks/reference.py), or from a notebook beside it.
-MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
-    "tutorials/notebook.md"
-}
+MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")}
+MADE |= {"tutorials/notebook.md"}
 # What a fence may say behind its backticks: a language, and nothing else.
 FENCE = re.compile(r"^ *```(.*)$", re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -43,7 +44,7 @@ def test_every_page_is_in_the_navigation_once():
 
 
 @pytest.mark.parametrize("page", [*PAGES, *ROOT.glob("*.md")], ids=lambda page: page.stem)
-def test_links_of_the_sources_hold_fences_say_their_language_and_commands_name_programs_that_are_there(page):
+def test_links_of_the_sources_hold_fences_say_their_language_and_files_that_they_name_are_there(page):
     text = page.read_text(encoding="utf-8")
     prose = re.sub(r"^```.*?^```|`[^`\n]+`", "", text, flags=re.MULTILINE | re.DOTALL)
     paths = {link.partition("#")[0] for link in LINK.findall(prose) if not re.match(r"\w+:", link)} - {""}
@@ -51,15 +52,16 @@ def test_links_of_the_sources_hold_fences_say_their_language_and_commands_name_p
     made = {DOCS / name for name in MADE}
     assert [path for path, place in places.items() if not place.exists() and place not in made] == []
     # What a figure was made with can be run again.
-    programs = re.findall(r"python (benches/\w+(?:\.py)?)", text)
-    assert [name for name in programs if not (ROOT / name).exists()] == []
+    named = set(re.findall(r"(?<=python )benches/\w+(?:\.py)?|\b(?:benches|tests)/[\w/]+\.py\b", text))
+    # Paths with a file's ending, looked for where a reader would look.
+    named |= set(re.findall(r"`([\w./-]+/[\w.-]+\.(?:py|pyi|rs|md|schema\.json))`", text))
+    assert [name for name in named if not any((root / name).exists() for root in ROOTS)] == []
     said = FENCE.findall(text) if page in PAGES else []
     assert not [words for words in said if not re.fullmatch(r"\w*", words)]
     assert len(said) % 2 == 0
 
 
 def test_the_readme_is_short_and_its_pictures_are_in_the_repository():
-
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 140
     pictures = re.findall(r"!\[[^]]*\]\((\S+)\)", text)
@@ -93,26 +95,20 @@ def test_what_a_release_says_of_itself_agrees():
     assert len(changes.splitlines()) <= 40
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
+@pytest.mark.slow
+def test_nothing_of_the_site_is_loaded_from_elsewhere(tmp_path):
     """The site as it is published."""
     needed = ("mkdocs", "material", "mkdocstrings", "mkdocs_gen_files", "latex2mathml")
     missing = [name for name in needed if not find_spec(name)]
     if missing:
         pytest.skip(f"the site cannot be built without {', '.join(missing)} (extra docs)")
-    made = tmp_path_factory.mktemp("site")
     quiet = {"NO_MKDOCS_2_WARNING": "1", "DISABLE_MKDOCS_2_WARNING": "true"}
     quiet |= {"PYTHONPATH": str(Path(trihedron.__file__).parents[1])}
     # Without -q, which silences the warnings before --strict counts them.
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(made)]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(tmp_path)]
     built = subprocess.run(
         command, cwd=ROOT, env={**os.environ, **quiet}, capture_output=True, text=True, timeout=600, check=False
     )
     assert built.returncode == 0, built.stdout + built.stderr
-    return made
-
-
-@pytest.mark.slow
-def test_nothing_of_the_site_is_loaded_from_elsewhere(site):
     elsewhere = re.compile(r"""(?:src|href)="(?:https?:)?//[^"]+\.(?:js|css|woff2?)\"""")
-    assert not [page for page in site.rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]
+    assert not [page for page in tmp_path.rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]

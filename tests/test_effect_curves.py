@@ -26,6 +26,7 @@ from trihedron.report.findings.wording import places
 from trihedron.report.text import to_text
 
 G = 9.80665
+DEG = np.pi / 180.0
 
 
 @pytest.mark.parametrize(
@@ -43,9 +44,8 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
     found = diagnosed(effect_id, n_poses=18, **size)
     effect = next(effect for effect in found.effects if effect.id == effect_id)
     curves = effect.curves
-    assert [(c.sensor, c.axis, c.driver, c.is_relative) for c in curves] == [
-        ("accelerometer", j, driver, is_relative) for j in range(3)
-    ]
+    seen = [(c.sensor, c.axis, c.driver, c.is_relative) for c in curves]
+    assert seen == [("accelerometer", j, driver, is_relative) for j in range(3)]
     for j, curve in enumerate(curves):
         left = curve.data - np.interp(curve.data_x, curve.x, curve.value)
         # Half of what it adds: the weakest of these is a few times the noise of a pose.
@@ -88,7 +88,6 @@ def test_errors_of_latitude_and_north_are_those_they_say(sigma):
 
 def test_a_vector_that_is_not_the_earths_is_not_called_so():
     effect, sigma = EarthRate(), np.diag(np.square([3e-6, 3e-6, 3e-6]))
-
     at_home, here = Variant(NO_DISTORTION, ("x", "y", "z"), ("rad/s",) * 3), np.radians(35.0)
     assert effect.is_plausible(at_home, turning(here, 1.0), sigma)
     assert effect.is_plausible(at_home, turning(-here, 1.0), sigma)
@@ -103,14 +102,10 @@ def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_
     assert np.degrees(near.latitude_std) < 15.0
 
 
-ROOT = Path(__file__).parents[1]
-DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
+DIAGNOSE = Path(__file__).parents[1] / "python" / "trihedron" / "diagnose"
 STATIC = {"static", "static-counts"}
-
-
-def ours():
-    """Effects of the package: other tests may have added their own."""
-    return [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
+# Effects of the package: other tests may have added their own.
+OURS = [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
 
 
 def cases_of(effect):
@@ -125,14 +120,14 @@ def cases_of(effect):
 
 
 def test_every_effect_has_its_words_and_every_word_its_effect():
-    assert set(CATALOGUE) == {effect.id for effect in ours()}
+    assert set(CATALOGUE) == {effect.id for effect in OURS}
     assert all(entry.mechanism and entry.experiment for entry in CATALOGUE.values())
     assert set(re.findall(r"^## (\S+)$", effects_page(), re.MULTILINE)) == set(CATALOGUE)
 
 
 def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
     asked = 0
-    for effect in ours():
+    for effect in OURS:
         said, seen = dict(CATALOGUE[effect.id].said), set()
         for case, given in cases_of(effect):
             # A case that the run chooses: each that nothing else requests takes these values.
@@ -173,9 +168,6 @@ def test_an_effect_of_a_users_own_file_brings_its_own_words():
     assert own.separating_experiment() == "wait a fortnight"
     with pytest.raises(KeyError):
         own.reported("no such case")
-
-
-DEG = np.pi / 180.0
 
 
 def session(seed, n_poses=30):

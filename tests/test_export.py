@@ -18,9 +18,17 @@ from trihedron.records import Calibration, Finding, FindingCode, SensorCalibrati
 from trihedron.sensor_model import in_frame
 
 READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
-
 # Residue of writing numbers with all digits and evaluating in another order.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
+NOISE = ExportOptions(
+    SensorNoise(NoiseFigure(2e-3), NoiseFigure(4e-5, is_limit=True)),
+    SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
+    rate_hz=200.0,
+    topic="/imu",
+    current_parameters="none",
+)
+IN_LSB = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
+FOUR = [f"{sensor}_{kind}" for sensor in ("accelerometer", "gyroscope") for kind in ("noise_density", "random_walk")]
 
 
 def export_calibration(known, target, options=None):
@@ -58,9 +66,8 @@ def test_python_snippet_runs_and_agrees(handed, frame):
     scope = {}
     exec(export_calibration(known, "python"), scope)
     for name, sensor in (("ACCELEROMETER", known.accelerometer), ("GYROSCOPE", known.gyroscope)):
-        np.testing.assert_allclose(
-            scope["correct"](READINGS, scope[f"S_{name}"], scope[f"B_{name}"]), corrected(sensor)
-        )
+        made = scope["correct"](READINGS, scope[f"S_{name}"], scope[f"B_{name}"])
+        np.testing.assert_allclose(made, corrected(sensor))
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
@@ -123,19 +130,6 @@ def test_rust_module_compiles_without_warnings_and_agrees(tmp_path):
     np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope)[:5], **ROUNDING)
 
 
-NOISE = ExportOptions(
-    SensorNoise(NoiseFigure(2e-3), NoiseFigure(4e-5, is_limit=True)),
-    SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
-    rate_hz=200.0,
-    topic="/imu",
-    current_parameters="none",
-)
-SIX = (
-    "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
-    "update_rate", "rostopic",
-)  # fmt: skip
-
-
 def with_g_sensitivity(known):
     G = 1e-3 * np.array([[1.0, -2.0, 0.5], [0.3, 0.7, -1.1], [2.0, 0.0, -0.4]])
     parameters = [{"name": f"G_{i}{j}", "value": G[a, b]} for a, i in enumerate("xyz") for b, j in enumerate("xyz")]
@@ -152,7 +146,7 @@ def test_kalibr_distorts_truth_into_the_readings(mirrored):
         known = replace(known, gyroscope=replace(known.gyroscope, S=known.gyroscope.S @ turn))
     known, G = with_g_sensitivity(known)
     document = yaml.safe_load(export_calibration(known, "kalibr", NOISE))
-    assert set(SIX) <= set(document)
+    assert {*FOUR, "update_rate", "rostopic"} <= set(document)
     M_a, b_a = np.array(document["accelerometers"]["M"]), np.array(document["accelerometers"]["b"])
     gyro = {key: np.array(value) for key, value in document["gyroscopes"].items()}
     np.testing.assert_array_equal(M_a, np.tril(M_a))
@@ -182,11 +176,9 @@ def test_openvins_corrects_the_readings():
     # OpenCV takes a comment behind a value for a sequence.
     assert not [line for line in text.splitlines() if "#" in line and not line.strip().startswith("#")]
     imu = yaml.safe_load(text.replace("%YAML:1.0", ""))["imu0"]
-    assert set(SIX) <= set(imu)
+    assert {*FOUR, "update_rate", "rostopic"} <= set(imu)
     Tw, R, Ta, Tg = (np.array(imu[key]) for key in ("Tw", "R_IMUtoGYRO", "Ta", "Tg"))
-    b_a, b_w = (
-        np.array(numbers(re.search(rf"#   {name} \[(.*)\]", text)[1])) for name in ("accelerometer", "gyroscope")
-    )
+    b_a, b_w = (numbers(re.search(rf"#   {name} \[(.*)\]", text)[1]) for name in ("accelerometer", "gyroscope"))
     force = corrected(known.accelerometer)
     np.testing.assert_allclose((READINGS - b_a) @ np.linalg.inv(Ta).T, force, **ROUNDING)
     readings = READINGS + force @ (np.linalg.inv(known.gyroscope.S) @ G).T
@@ -194,9 +186,7 @@ def test_openvins_corrects_the_readings():
     np.testing.assert_allclose(rate, corrected(known.gyroscope), **ROUNDING)
 
 
-@pytest.mark.parametrize(
-    ("target", "keys"), [("kalibr", SIX[:4]), ("vins-fusion", ("acc_n", "acc_w", "gyr_n", "gyr_w"))]
-)
+@pytest.mark.parametrize(("target", "keys"), [("kalibr", FOUR), ("vins-fusion", ("acc_n", "acc_w", "gyr_n", "gyr_w"))])
 def test_noise_goes_into_the_file_and_an_absent_walk_as_a_limit_that_is_labelled(target, keys):
     text = export_calibration(calibration("si"), target, NOISE)
     document = yaml.safe_load(text.replace("%YAML:1.0", ""))
@@ -213,13 +203,9 @@ def test_ros_covariances_are_those_of_one_message():
     assert document["orientation_covariance"][0] == -1.0
 
 
-RAW = ExportOptions(current_parameters="none")
-
-
 @pytest.mark.parametrize("target", ["px4", "ardupilot"])
 def test_what_an_autopilot_cannot_hold_is_written_into_the_file_with_its_size(target):
-    known = calibration("si")
-    text = export_calibration(known, target, RAW)
+    text = export_calibration(calibration("si"), target, ExportOptions(current_parameters="none"))
     # Half of 0.006, the angle between X and Z, at 9.81 m/s²: the other half is a turn of the triad as a whole.
     assert re.search(r"% of the accelerometer's is lost, 2\d(\.\d)? mm/s\^2 at 1 g", text)
     assert "gyro scale" in text
@@ -235,8 +221,7 @@ def test_of_an_instrument_that_is_right_within_its_uncertainty_no_target_loses_a
         for s in (known.accelerometer, known.gyroscope)
     ]
     known = replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
-    options = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
-    text = " ".join(export_files(known, target, options).values())
+    text = " ".join(export_files(known, target, IN_LSB).values())
     said = [line for line in text.splitlines() if re.search(r"\d.* (is|are) lost|lost: |are lost, ", line)]
     assert not [line for line in said if "walk" not in line]
 
@@ -269,9 +254,8 @@ def test_basalt_subtracts_the_zero_after_the_matrix_and_has_noise_and_rate():
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - a[:3], corrected(known.accelerometer), **ROUNDING)
     M = w[3:].reshape(3, 3).T
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - w[:3], corrected(known.gyroscope), **ROUNDING)
-    assert (document["imu_update_rate"], document["accel_noise_std"], document["gyro_bias_std"]) == (
-        200.0, [2e-3] * 3, [2e-6] * 3,
-    )  # fmt: skip
+    stated = [document[key] for key in ("imu_update_rate", "accel_noise_std", "gyro_bias_std")]
+    assert stated == [200.0, [2e-3] * 3, [2e-6] * 3]
 
 
 @pytest.mark.parametrize("target", ["basalt", "kalibr", "openvins", "px4", "ardupilot"])
@@ -307,10 +291,9 @@ def test_pyins_distorts_truth_into_the_readings():
 @pytest.mark.parametrize("target", targets())
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
-    options = replace(NOISE, accel_lsb="0.488 mg", gyro_lsb="0.061 deg/s")
-    assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, options)
+    assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, IN_LSB)
     serious = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "it did not settle.")
-    assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, options)
+    assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, IN_LSB)
 
 
 def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path, capsys):

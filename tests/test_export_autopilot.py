@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import trihedron
 from test_export import export_calibration
@@ -15,15 +16,23 @@ from trihedron.files.formats.autopilot import orientation, parameters_in
 from trihedron.records import Calibration, Onboard, SensorCalibration
 
 AXES = "XYZ"
+TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
+        "INS_GYR1_CALTEMP": 40.0, "INS_TCAL1_ACC1_X": 900.0, "INS_TCAL1_ACC2_Y": -30.0, "INS_TCAL1_ACC3_Z": 0.7,
+        "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
+ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
+ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
+ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
+ARDUPILOT |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0}
+PX4 = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
+PX4 |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
+PX4 |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
+TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
+      "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
 
 
 def turn(roll, pitch, yaw):
     """Sensor to board: yaw, pitch, roll, in the manner of both autopilots."""
-    r, p, y = np.radians([roll, pitch, yaw])
-    Rx = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
-    Ry = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
-    Rz = np.array([[np.cos(y), -np.sin(y), 0], [np.sin(y), np.cos(y), 0], [0, 0, 1]])
-    return Rz @ Ry @ Rx
+    return Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True).as_matrix()
 
 
 def ardupilot(p, raw_accel, raw_gyro, T, imu, R):
@@ -61,9 +70,8 @@ def px4(p, raw_accel, raw_gyro, T, accel, gyro, R):
             group = next(i for i in range(4) if p.get(f"TC_{letter}{i}_ID") == p[f"CAL_{word}{k}_ID"])
             low, high = p[f"TC_{letter}{group}_TMIN"], p[f"TC_{letter}{group}_TMAX"]
             t = (np.clip(T, low, high) - p[f"TC_{letter}{group}_TREF"])[:, None]
-            v = v - sum(
-                t**n * np.array([p.get(f"TC_{letter}{group}_X{n}_{axis}", 0.0) for axis in range(3)]) for n in range(4)
-            )
+            for n in range(4):
+                v = v - t**n * [p.get(f"TC_{letter}{group}_X{n}_{axis}", 0.0) for axis in range(3)]
         v = v - [p[f"CAL_{word}{k}_{a}OFF"] for a in AXES]
         v = v * [p.get(f"CAL_{word}{k}_{a}SCALE", 1.0) for a in AXES]
         out.append(v @ R.T)
@@ -140,9 +148,8 @@ def log_of(autopilot, parameters, stage="body"):
     t = np.arange(n) / 100.0
     recording = trihedron.read({"t": t, "acc": rng.normal(0, 5, (n, 3)), "gyr": rng.normal(0, 1, (n, 3))},
                                accelerometer_unit="m/s^2", gyroscope_unit="rad/s")  # fmt: skip
-    return replace(
-        recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=Onboard(autopilot, 0, 0, stage, parameters)
-    )
+    onboard = Onboard(autopilot, 0, 0, stage, parameters)
+    return replace(recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=onboard)
 
 
 def with_temperature(known, reference=28.0):
@@ -158,22 +165,6 @@ def with_temperature(known, reference=28.0):
         })  # fmt: skip
     extensions = {**known.extensions, "effects": effects, "references": {"temperature_degc": reference}}
     return replace(known, extensions={**extensions, "valid_range": {"temperature_degc": [15.0, 55.0]}})
-
-
-TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
-        "INS_GYR1_CALTEMP": 40.0, "INS_TCAL1_ACC1_X": 900.0, "INS_TCAL1_ACC2_Y": -30.0, "INS_TCAL1_ACC3_Z": 0.7,
-        "INS_TCAL1_GYR1_Z": 55.0}  # fmt: skip
-
-
-ARDUPILOT = {f"INS_ACCOFFS_{a}": v for a, v in zip(AXES, (0.3, -0.2, 0.1), strict=True)}
-ARDUPILOT |= {f"INS_ACCSCAL_{a}": v for a, v in zip(AXES, (1.01, 0.99, 1.02), strict=True)}
-ARDUPILOT |= {f"INS_GYROFFS_{a}": v for a, v in zip(AXES, (0.01, 0.02, -0.03), strict=True)}
-ARDUPILOT |= {"AHRS_ORIENTATION": 10.0, "INS_ACC_ID": 2753036.0}
-PX4 = {"CAL_ACC0_ID": 1310988.0, "CAL_GYRO0_ID": 2490378.0, "SENS_BOARD_ROT": 2.0}
-PX4 |= {f"CAL_ACC0_{a}OFF": 0.1 for a in AXES} | {f"CAL_ACC0_{a}SCALE": 1.02 for a in AXES}
-PX4 |= {f"CAL_GYRO0_{a}OFF": -0.01 for a in AXES}
-TC = {"TC_A_ENABLE": 1.0, "TC_A1_ID": 1310988.0, "TC_A1_TREF": 31.0, "TC_A1_TMIN": 12.0, "TC_A1_TMAX": 58.0,
-      "TC_A1_X0_0": 0.05, "TC_A1_X1_1": 3e-3, "TC_A1_X2_2": 1e-4, "TC_A1_X3_0": 2e-6}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -283,9 +274,8 @@ def test_settings_of_inav_on_raw_counts_are_what_apply_gives(exact):
         zero, gain = zero + 0.3, gain + 1e-4
     S_a, S_g = np.diag(gain) * counts[0], np.eye(3) * counts[1]
     known = given((S_a, -S_a @ zero), (S_g, -S_g @ [9.0, -11.0, -4.0]), 9.80665, "counts")
-    text = export_calibration(
-        known, "inav", ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
-    )
+    sizes = ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
+    text = export_calibration(known, "inav", sizes)
     raw = np.random.default_rng(2).integers(-3000, 3000, (50, 3)).astype(float)
     # As INAV's acceleration.c and gyro.c correct, but for their rounding of the result.
     p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}

@@ -14,6 +14,7 @@ from true_segments import codes, segments_from_truth, z_scores
 
 SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
 BIAS = (0.01, -0.02, 0.005)
+SWAP = np.eye(3)[:, [0, 2, 1]]
 
 
 def scenario(motion: Motion, gyro_noise=2e-4, accel_noise=1e-3, S=SCALE, b=BIAS, **gyroscope):
@@ -82,9 +83,6 @@ def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_rep
     assert np.linalg.det(found.S) * np.linalg.det(axes) > 0.0
     assert np.abs(z_scores(found, truth)).max() < 4.0
     assert FindingCode.LEFT_HANDED in codes(findings)  # which says that axes differ in name
-
-
-SWAP = np.eye(3)[:, [0, 2, 1]]
 
 
 @pytest.mark.parametrize(

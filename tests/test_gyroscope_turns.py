@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from test_gyroscope_moves import BIAS, SCALE
 from trihedron.estimate.gyroscope import turn_system
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
@@ -13,8 +14,6 @@ from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import codes, segments_from_truth, z_scores
 
-SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
-BIAS = (0.01, -0.02, 0.005)
 DEG = math.pi / 180.0
 
 

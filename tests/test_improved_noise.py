@@ -19,21 +19,14 @@ from trihedron.comparison.quantisation import quantisation_noise, white_and_quan
 from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
-from trihedron.simulate import (
-    NoiseTerms,
-    Smoother,
-    hand_session,
-    low_pass_like,
-    make_noise,
-    noise_of_octaves,
-    simulate,
-)
+from trihedron.simulate import NoiseTerms, Smoother, hand_session, low_pass_like, make_noise, noise_of_octaves, simulate
 from trihedron.simulate.noise import bias_in_moves as straying
 
 RATE = 100.0
-
-
 pytestmark = pytest.mark.usefixtures("few_simulations")
+N = 1e-3
+# At half the rate the two terms are as large as each other: 4 RATE Q² = N².
+EQUAL = N / (2.0 * RATE**0.5)
 
 
 @pytest.mark.parametrize(
@@ -111,11 +104,6 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     assert little is None or max(little) < 0.4 * 2e-3
 
 
-N = 1e-3
-# At half the rate the two terms are as large as each other: 4 RATE Q² = N².
-EQUAL = N / (2.0 * RATE**0.5)
-
-
 def sampled(Q, seed):
     x = make_noise(NoiseTerms(N=(N,) * 3, Q=Q), 30 * 500, 1.0 / RATE, seed, "quantisation")
     axes = tuple(noise_of_poses(x, RATE, [(k * 500, k * 500 + 450) for k in range(30)]))
@@ -141,9 +129,8 @@ def test_a_difference_is_said_of_the_axis_that_has_it_and_nothing_where_both_are
     assert not any(row.significant for row in same)
     assert quantisation_noise(sampled((0.0,) * 3, 0), sampled((0.0,) * 3, 100), alpha=0.01) == ()
     rows = quantisation_noise(sampled((4 * EQUAL, EQUAL, 0.0), 1), sampled((EQUAL, EQUAL, 2 * EQUAL), 2), alpha=0.01)
-    assert [(row.axis, row.term, row.significant) for row in rows] == [
-        ("x", "Q", True), ("y", "Q", False), ("z", "Q", True),
-    ]  # fmt: skip
+    seen = [(row.axis, row.term, row.significant) for row in rows]
+    assert seen == [("x", "Q", True), ("y", "Q", False), ("z", "Q", True)]
     assert rows[0].ratio == pytest.approx(4.0, rel=0.2)
     assert rows[0].interval[0] < 4.0 < rows[0].interval[1]
     assert "Only the recording" in rows[2].remark

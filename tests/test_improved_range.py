@@ -13,13 +13,7 @@ from diagnosed_session import simulated, unit_of
 from trihedron.api import driving
 from trihedron.api.improving import _mean_drift, improve
 from trihedron.records.channel_facts import ChannelFacts, Limit
-from trihedron.simulate import (
-    Drift,
-    diagnosed_sizes,
-    hand_session,
-    read_scenario,
-    simulate,
-)
+from trihedron.simulate import Drift, diagnosed_sizes, hand_session, read_scenario, simulate
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.twin import unclipped
 
@@ -52,11 +46,10 @@ def improved(clipped, tmp_path_factory):
     folder = tmp_path_factory.mktemp("range")
     given, better = folder / "ideal.toml", folder / "better.toml"
     given.write_text(IDEAL)
-    patch = pytest.MonkeyPatch()
-    patch.setattr(driving, "N_SEEDS", 2)
-    found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
-    better.write_text(improve(given, found).text)
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driving, "N_SEEDS", 2)
+        found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
+        better.write_text(improve(given, found).text)
     return found, better
 
 
@@ -88,21 +81,15 @@ def test_a_scenario_without_noise_takes_the_recordings(improved):
         assert density == pytest.approx(np.array(own.noise.N) * np.ones(3), rel=0.15), name
 
 
-def triangle(peak, limit):
-    """Readings of a triangle of 41 samples, cut at ``limit``, along X."""
-    x = np.zeros((81, 3))
-    x[20:61, 0] = peak * (1.0 - np.abs(np.arange(-20, 21)) / 20.0)
-    cut = np.minimum(x, limit)
-    at = np.flatnonzero(cut[:, 0] == limit)
-    runs = np.array([[at[0], at[-1] + 1]])
-    facts = ChannelFacts(np.zeros(3), np.zeros(3), (Limit(0, limit, True, runs),))
-    return x, cut, facts
-
-
 def test_a_cut_peak_is_drawn_beyond_the_limit_and_nothing_else_is_touched():
-    x, cut, facts = triangle(100.0, 80.0)
-    out = unclipped(cut, facts)
+    # A triangle of 41 samples along X, cut at 80.
+    x = np.zeros((81, 3))
+    x[20:61, 0] = 100.0 * (1.0 - np.abs(np.arange(-20, 21)) / 20.0)
+    cut = np.minimum(x, 80.0)
     at = cut[:, 0] == 80.0
+    runs = np.flatnonzero(at)[[0, -1]][None] + [0, 1]
+    facts = ChannelFacts(np.zeros(3), np.zeros(3), (Limit(0, 80.0, True, runs),))
+    out = unclipped(cut, facts)
     assert np.array_equal(out[~at], cut[~at])
     # A cubic reaches a quarter to half as high as the tip of a triangle of its slopes, and never inside the limit.
     assert np.all(out[at, 0] >= 80.0)

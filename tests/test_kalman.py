@@ -6,28 +6,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import twins_kalman as twins
 from trihedron import _core
 from trihedron.estimate.kalman.per_axis import calibrate_with_references, shaping_model
 from trihedron.records import AxisNoise, FindingCode, PoseTable
-from twins_kalman import (
-    ARTICLE_CONSTANTS,
-    DIVIDING_HEAD_ANGLES_DEG,
-    GRAVITY,
-    covariance_of_pose_means,
-    generalised_least_squares,
-    normalised_error_squared,
-)
 
-SIGMA = 0.11 * 0.032002 / GRAVITY
+SIGMA = 0.11 * 0.032002 / twins.GRAVITY
 """The article's ADC noise of 0.11 m/s² in volts."""
+START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
+ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
+WALKING = AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
 
 
 def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
     names = "quantisation white flicker walk ramp gauss_markov gauss_markov_rate resolution dither"
     named = dict.fromkeys(names.split(), 0.0)
-    return _core.AxisKalmanModel(
-        **(named | terms), flicker_rates=list(rates), ramp_frequency=ramp_frequency, ramp_damping=0.7, averages=averages
-    )
+    named |= terms | {"flicker_rates": list(rates), "ramp_frequency": ramp_frequency, "ramp_damping": 0.7}
+    return _core.AxisKalmanModel(**named, averages=averages)
 
 
 def session(seed, n):
@@ -36,7 +31,7 @@ def session(seed, n):
     pause = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(0.5, 40.0, n))
     start = 100.0 + np.cumsum(np.concatenate([[0.0], (pose + pause)[:-1]]))
     f = rng.standard_normal((n, 3))
-    return start, pose, GRAVITY * f / np.linalg.norm(f, axis=1)[:, None], rng
+    return start, pose, twins.GRAVITY * f / np.linalg.norm(f, axis=1)[:, None], rng
 
 
 MIXES = {
@@ -56,19 +51,6 @@ MIXES["everything"] = {
 }
 
 
-def covariance_by_hand(mix, start, pose):
-    terms = dict(mix)
-    terms.pop("ramp_frequency", None)
-    terms["slope"] = terms.pop("ramp", 0.0)
-    flicker, rates = terms.pop("flicker", 0.0), terms.pop("rates", ())
-    sigma = flicker * np.sqrt(np.log(10.0) / np.pi)
-    ends = {min(rates, default=0.0), max(rates, default=0.0)}
-    # The slowest and fastest process also represent what lies beyond them.
-    alone = (terms.pop("gauss_markov_rate", 0.0), terms.pop("gauss_markov", 0.0))
-    processes = [(beta, sigma * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
-    return covariance_of_pose_means(start, pose, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
-
-
 @pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
 def test_the_filter_is_generalised_least_squares_on_every_prefix_under_the_covariance_of_integrals_by_hand(mix):
     start, pose, f, rng = session(4, 30)
@@ -79,12 +61,21 @@ def test_the_filter_is_generalised_least_squares_on_every_prefix_under_the_covar
         _core.KalmanStart(np.zeros(4), diffuse, np.zeros(4)),
         _core.KalmanPoses(readings, f, start, pose, np.zeros(30)),
     )
-    covariance = covariance_by_hand(mix, start, pose)
+    terms = dict(mix)
+    terms.pop("ramp_frequency", None)
+    terms["slope"] = terms.pop("ramp", 0.0)
+    flicker, rates = terms.pop("flicker", 0.0), terms.pop("rates", ())
+    each = flicker * np.sqrt(np.log(10.0) / np.pi)
+    ends = {min(rates, default=0.0), max(rates, default=0.0)}
+    # The slowest and fastest process also represent what lies beyond them.
+    alone = (terms.pop("gauss_markov_rate", 0.0), terms.pop("gauss_markov", 0.0))
+    processes = [(beta, each * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
+    covariance = twins.covariance_of_pose_means(start, pose, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
     got = _core.kalman_noise_covariance(model, start, pose, np.zeros(30))
     # The second-order ramp with ω₀ = 1e-11 rad/s departs from a straight line by ω₀ t ~ 1e-8 over 600 s.
     np.testing.assert_allclose(got, covariance, rtol=1e-7, atol=1e-14)
     for n in (5, 12, 30):
-        expected, cov = generalised_least_squares(f[:n], readings[:n], covariance[:n, :n])
+        expected, cov = twins.generalised_least_squares(f[:n], readings[:n], covariance[:n, :n])
         stated = np.sqrt(np.diag(cov))
         # 1e-5 σ: rounding of the dense inverse, and the ramp's ω₀ where few poses separate it from U0.
         np.testing.assert_allclose((constants[n - 1] - expected) / stated, 0.0, atol=1e-5)
@@ -95,13 +86,12 @@ def test_the_smoother_is_the_conditional_expectation_given_all_readings():
     start, pose, f, rng = session(5, 40)
     readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(40)
     model = compiled(white=0.02, walk=0.004, flicker=0.02, rates=(0.003, 0.03), averages=False)
-    start_of = (np.zeros(4), np.full(4, 1e7), np.zeros(4))
-    _, _, drift, drift_sigma = _core.kalman_smooth(
-        model, _core.KalmanStart(*start_of), _core.KalmanPoses(readings, f, start, pose, np.zeros(40))
-    )
+    begun = _core.KalmanStart(np.zeros(4), np.full(4, 1e7), np.zeros(4))
+    poses = _core.KalmanPoses(readings, f, start, pose, np.zeros(40))
+    _, _, drift, drift_sigma = _core.kalman_smooth(model, begun, poses)
     total = _core.kalman_noise_covariance(model, start, pose, np.zeros(40))
     slow = total - np.diag([model.white_variance(h) for h in pose])
-    constants, cov = generalised_least_squares(f, readings, total)
+    constants, cov = twins.generalised_least_squares(f, readings, total)
     h = np.column_stack([f, np.ones(40)])
     gain = slow @ np.linalg.inv(total)
     expected = gain @ (readings - h @ constants)
@@ -134,9 +124,6 @@ def test_dither_removes_the_rounding_error_from_a_mean():
     assert hidden[2] == pytest.approx(np.mean(error**2), rel=0.01)
 
 
-START, POSE = 10.0 * np.arange(324), np.full(324, 5.0)
-
-
 @functools.cache
 def noise_factor(noise):
     """(324, 324) root of the covariance of the article's poses: 5 s each with 5 s between."""
@@ -147,11 +134,9 @@ def noise_factor(noise):
 def article_readings(seed, noise):
     """References and readings of the article's session, noise drawn from the model of pose means."""
     draws = noise_factor(noise) @ np.random.default_rng(seed).standard_normal((324, 3))
-    table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
-    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, POSE
-
-
-ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
+    table = PoseTable.from_angles(*twins.DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=twins.GRAVITY)
+    scales, biases = np.split(twins.ARTICLE_CONSTANTS, [3], axis=1)
+    return table, table.specific_force @ scales.T + biases[:, 0] + draws, START, POSE
 
 
 def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars():
@@ -160,17 +145,14 @@ def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars
         table, readings, start, pose = article_readings(seed, ARTICLE_MIX)
         result = calibrate_with_references(readings, table, ARTICLE_MIX, start_s=start, pose_s=pose, raw_unit="V")
         for axis in result.axes:
-            error = axis.constants - ARTICLE_CONSTANTS[axis.axis]
-            nees.append(normalised_error_squared(error, axis.covariance))
+            error = axis.constants - twins.ARTICLE_CONSTANTS[axis.axis]
+            nees.append(twins.normalised_error_squared(error, axis.covariance))
             z.append(error / axis.sigma)
     # 60 independent draws of chi-square with 4 degrees of freedom; two-sided 99.9 % limits of their sum.
     low, high = stats.chi2.ppf([0.0005, 0.9995], 4 * len(nees))
     assert low < np.sum(nees) < high
     # Largest of 240 standard normals: beyond 4.8 once in 2600 such tests.
     assert np.max(np.abs(z)) < 4.8
-
-
-WALKING = AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,12 @@ from trihedron.simulate import (
 )
 from twins_kalman import B_TRUE, DIVIDING_HEAD_ANGLES_DEG, GRAVITY, S_TRUE, normalised_error_squared
 
+S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
+B_NORM = np.array([-19.57, -22.47, -20.3])
+LOWER = [0, 3, 4, 6, 7, 8, 9, 10, 11]
+"""Places of the nine free parameters among S row by row and b."""
+NOISE = AxisNoise(white=1.0, walk=0.01)
+
 
 @pytest.fixture(scope="module")
 def head():
@@ -63,10 +69,9 @@ def test_pose_numbers_pick_poses_and_a_mismatch_is_said(head, table):
         pose_readings(recording, segments, PoseTable(table.specific_force[:1], pose=np.array([499])))
     with pytest.raises(ValueError, match="each once"):
         pose_readings(recording, segments, PoseTable(table.specific_force[:2], pose=np.array([3, 3])))
+    late = PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
     with pytest.raises(ValueError, match="0 readings"):
-        pose_readings(
-            recording, segments, PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
-        )
+        pose_readings(recording, segments, late)
 
 
 def test_a_coarse_converter_is_charged_with_its_step(head):
@@ -131,13 +136,6 @@ def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
         read_pose_table(path, gravity_m_s2=GRAVITY)
 
 
-S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
-B_NORM = np.array([-19.57, -22.47, -20.3])
-LOWER = [0, 3, 4, 6, 7, 8, 9, 10, 11]
-"""Places of the nine free parameters among S row by row and b."""
-NOISE = AxisNoise(white=1.0, walk=0.01)
-
-
 def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):
     rng = np.random.default_rng(seed)
     f = rng.standard_normal((n, 3))
@@ -149,15 +147,9 @@ def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):
     return (f - b) @ np.linalg.inv(S).T + noise_now, start, pose, covariance
 
 
-def calibrate(readings, start_s, pose_s, **options):
-    return calibrate_without_references(
-        readings, NOISE, start_s=start_s, pose_s=pose_s, gravity_m_s2=GRAVITY, **options
-    )
-
-
 def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
     readings, start, pose, covariance = session(1)
-    result = calibrate(readings, start, pose)
+    result = calibrate_without_references(readings, NOISE, start_s=start, pose_s=pose, gravity_m_s2=GRAVITY)
     S, b = result.accelerometer.S, result.accelerometer.b
     f = readings @ S.T + b
     along = (f / np.linalg.norm(f, axis=1)[:, None]) @ S
@@ -182,7 +174,8 @@ def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
 def test_errors_are_as_large_as_stated():
     nees = []
     for seed in range(100, 200):
-        result = calibrate(*session(seed)[:3])
+        readings, start, pose, _ = session(seed)
+        result = calibrate_without_references(readings, NOISE, start_s=start, pose_s=pose, gravity_m_s2=GRAVITY)
         error = np.concatenate([(result.accelerometer.S - S_NORM).ravel(), result.accelerometer.b - B_NORM])[LOWER]
         nees.append(normalised_error_squared(error, result.accelerometer.covariance[np.ix_(LOWER, LOWER)]))
     # 100 draws of chi-square with 9 degrees of freedom, two-sided 99.9 % limits of the sum.
@@ -198,9 +191,7 @@ def files(tmp_path_factory):
     recording = simulate(scenario, seed=1)[0]
     rows = np.column_stack([recording.time_s, recording.accelerometer])
     np.savetxt(folder / "log.csv", rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
-    np.savetxt(
-        folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, delimiter=",", header="pitch,roll", comments="", fmt="%g"
-    )
+    np.savetxt(folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, "%g", ",", header="pitch,roll", comments="")
     (folder / "noise.json").write_text('{"white": 0.01, "walk": [0.001, 0.001, 0.001]}')
     return folder
 

@@ -8,7 +8,24 @@ from scipy.ndimage import gaussian_filter1d
 
 from trihedron import _core, probability
 from trihedron.diagnose.context import smoothed_slope
-from trihedron.ranges import edges_of, ranges_of
+from trihedron.ranges import ranges_of
+
+RNG = np.random.default_rng(20261)
+TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
+VALUES = np.cumsum(RNG.normal(size=(90, 3)), axis=0)
+MOVES = np.array([[5, 40], [40, 43], [50, 90]])
+TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
+# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
+RTOL = 1e-9
+BELOW = [1e-9, 1e-4, 0.2, 0.5, 0.9]
+DISTRIBUTIONS = [
+    *(("chdtri", dof, tail) for dof in (0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000) for tail in TAILS),
+    *(("stdtrit", dof, below) for dof in (1, 3, 12, 500) for below in BELOW),
+    *(("ndtri", below) for below in BELOW),
+    *(("ndtr", special.ndtri(below)) for below in BELOW),
+    *(("bdtrc", count, n, 0.5) for count, n in ((0, 1), (3, 10), (60, 100), (700, 1000), (10, 10))),
+    *(("betaincinv", a, b, q) for a, b in ((1, 20), (7, 14), (20, 1), (150, 1851)) for q in (0.025, 0.5, 0.975)),
+]
 
 
 def test_means_over_ranges_pass_over_what_is_no_number():
@@ -74,11 +91,6 @@ def test_the_share_of_a_gyro_foretells_the_changes_that_it_made_although_one_axi
     assert np.abs(found[[1, 4, 7]]).max() < 1e-6
 
 
-def explained(t, x, f):
-    basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
-    return float(((basis @ np.linalg.lstsq(basis, x, rcond=None)[0]) ** 2).sum())
-
-
 @pytest.mark.parametrize("n", [3, 511, 512, 5000])
 def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     rng = np.random.default_rng(n)
@@ -86,16 +98,13 @@ def test_every_frequency_of_the_grid_is_plain_least_squares(n):
     t = 4000.0 + np.sort(rng.uniform(0.0, 20.0, n)) + np.where(np.arange(n) > n // 2, 7.0, 0.0)
     x = np.sin(2 * np.pi * 3.1 * t) + rng.normal(size=n)
     found = _core.sinusoid_power(t, np.repeat(x, 2)[::2], start_hz=2.9, step_hz=0.011, count=41)
-    plain = [explained(t, x, 2.9 + 0.011 * k) for k in range(41)]
+    plain = []
+    for k in range(41):
+        turned = 2 * np.pi * (2.9 + 0.011 * k) * t
+        basis = np.column_stack([np.cos(turned), np.sin(turned)])
+        plain.append(((basis @ np.linalg.lstsq(basis, x, rcond=None)[0]) ** 2).sum())
     # A phase of 10^4 turns is good to 10^-11 of a turn; three samples may see sine and cosine nearly alike.
     assert np.abs(found - plain).max() < 1e-8 * (x @ x)
-
-
-def exact(values, time_s, width):
-    narrow, wide = (
-        np.gradient(gaussian_filter1d(values, times * max(width, 1.0), mode="nearest"), time_s) for times in (1.0, 2.0)
-    )
-    return (4.0 * narrow - wide) / 3.0
 
 
 @pytest.mark.parametrize("width", [3.0, 40.0, 1003.7])
@@ -103,10 +112,11 @@ def test_inside_it_is_the_slope_of_the_smoothed_signal(width):
     rng = np.random.default_rng(int(width))
     time = np.arange(20_000) / 100.0
     # A temperature in tenths of a kelvin that warms, swings and is noisy.
-    values = np.round(
-        20.0 + 6.0 * (1.0 - np.exp(-time / 60.0)) + np.sin(time / 25.0) + rng.normal(0.0, 0.05, 20_000), 1
-    )
-    slope, asked = smoothed_slope(values, time, width), exact(values, time, width)
+    warmed = 26.0 - 6.0 * np.exp(-time / 60.0)
+    values = np.round(warmed + np.sin(time / 25.0) + rng.normal(0.0, 0.05, 20_000), 1)
+    smoothed = [gaussian_filter1d(values, times * width, mode="nearest") for times in (1.0, 2.0)]
+    narrow, wide = (np.gradient(one, time) for one in smoothed)
+    slope, asked = smoothed_slope(values, time, width), (4.0 * narrow - wide) / 3.0
     inside = slice(int(8 * width), len(time) - int(8 * width))
     # Blocks of a tenth of the width: the width is wrong by 1/2400, the line between their middles by (1/10)²/8.
     assert np.abs(slope - asked)[inside].max() < 0.02 * np.abs(asked).max()
@@ -120,29 +130,9 @@ def test_a_slope_that_turns_within_a_few_widths_keeps_its_size():
     assert np.abs(found - asked)[2000:-2000].max() < 0.015 * np.abs(asked).max()
 
 
-def walked(mask):
-    out, first = [], None
-    for k, is_true in enumerate([*mask, False]):
-        if is_true and first is None:
-            first = k
-        if not is_true and first is not None:
-            out.append((first, k))
-            first = None
-    return out
-
-
-@pytest.mark.parametrize("n", [0, 1, 2, 7, 300])
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.8, 1.0])
-def test_runs_are_those_of_a_walk_along_the_mask(n, share):
-    mask = np.random.default_rng(n).random(n) < share
-    assert ranges_of(mask) == walked(mask)
-    assert edges_of(mask).shape == (len(walked(mask)), 2)
-
-
-RNG = np.random.default_rng(20261)
-TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
-VALUES = np.cumsum(RNG.normal(size=(90, 3)), axis=0)
-MOVES = np.array([[5, 40], [40, 43], [50, 90]])
+def test_runs_of_a_mask_are_found_up_to_both_its_ends():
+    for mask, runs in (("", []), ("1", [(0, 1)]), ("00", []), ("1101", [(0, 2), (3, 4)]), ("0110", [(1, 3)])):
+        assert ranges_of(np.array([c == "1" for c in mask], dtype=bool)) == runs
 
 
 def test_play_is_the_running_clip_of_its_definition():
@@ -170,7 +160,11 @@ def test_a_shift_reads_the_clamped_spline_of_every_move(ahead_s):
     assert np.abs(_core.move_shifted(TIME, VALUES, MOVES, ahead_s) - expected).max() < 1e-11
 
 
-def test_moves_beyond_the_values_are_refused():
+def test_moves_beyond_the_values_and_times_out_of_order_are_refused():
+    one = np.ones(3)
+    poses = 0 * one, np.arange(3), np.ones((3, 1)), np.ones((1, 5))
+    with pytest.raises(ValueError, match="order of time"):
+        _core.bias_process_grams(np.ones((3, 1)), one, one[::-1] * [3, 2, 1], *poses)
     with pytest.raises(ValueError, match="within 90 points"):
         _core.move_derivative(TIME, VALUES, np.array([[80, 91]]))
     with pytest.raises(ValueError, match="as many times"):
@@ -179,18 +173,12 @@ def test_moves_beyond_the_values_are_refused():
         _core.play(VALUES, 0.0)
 
 
-DOF = [0.5, 1, 2, 3, 9, 27.5, 200, 5000, 150_000]
-TAILS = [1e-12, 1e-7, 1e-5, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.999]
-# A tail is exp of a sum of thousands at the largest parameters: 1e-16 of that sum is the remainder.
-RTOL = 1e-9
-
-
-@pytest.mark.parametrize("dof", DOF)
-@pytest.mark.parametrize("tail", TAILS)
-def test_chi_square(dof, tail):
-    value = special.chdtri(dof, tail)
-    assert probability.chdtri(dof, tail) == pytest.approx(value, rel=RTOL)
-    assert probability.chdtrc(dof, value) == pytest.approx(tail, rel=RTOL)
+def test_distributions_are_those_of_scipy_and_the_tail_of_chi_square_is_the_inverse_of_its_limit():
+    for name, *given in DISTRIBUTIONS:
+        expected = getattr(special, name)(*given)
+        assert getattr(probability, name)(*given) == pytest.approx(expected, rel=RTOL, abs=1e-12), (name, given)
+        assert name != "chdtri" or probability.chdtrc(given[0], expected) == pytest.approx(given[1], rel=RTOL), given
+    assert probability.bdtrc(-1, 5, 0.5) == 1.0
 
 
 @pytest.mark.parametrize("top", [1, 2, 9, 40, 3000])
@@ -202,29 +190,6 @@ def test_f(top, bottom, tail):
     rounding = 3e-16 / tail
     assert special.fdtrc(top, bottom, value) == pytest.approx(tail, rel=3.0 * RTOL + rounding)
     assert probability.fdtrc(top, bottom, value) == pytest.approx(special.fdtrc(top, bottom, value), rel=3.0 * RTOL)
-
-
-@pytest.mark.parametrize("dof", [1, 3, 12, 500])
-@pytest.mark.parametrize("below", [1e-9, 1e-4, 0.2, 0.5, 0.9])
-def test_student_and_normal(dof, below):
-    assert probability.stdtrit(dof, below) == pytest.approx(special.stdtrit(dof, below), rel=RTOL, abs=1e-12)
-    assert probability.ndtri(below) == pytest.approx(special.ndtri(below), rel=RTOL, abs=1e-12)
-    value = special.ndtri(below)
-    assert probability.ndtr(value) == pytest.approx(below, rel=RTOL)
-
-
-@pytest.mark.parametrize(("count", "trials"), [(0, 1), (3, 10), (60, 100), (700, 1000), (10, 10), (-1, 5)])
-def test_counts(count, trials):
-    expected = 1.0 if count < 0 else special.bdtrc(count, trials, 0.5)
-    assert probability.bdtrc(count, trials, 0.5) == pytest.approx(float(expected), rel=RTOL)
-
-
-@pytest.mark.parametrize(("k", "n"), [(1, 20), (7, 20), (20, 20), (150, 2000)])
-def test_shares(k, n):
-    for below in (0.025, 0.5, 0.975):
-        assert probability.betaincinv(k, n - k + 1, below) == pytest.approx(
-            special.betaincinv(k, n - k + 1, below), rel=RTOL
-        )
 
 
 def test_no_number_is_made_of_what_is_none():
@@ -269,11 +234,3 @@ def test_the_filter_whitens_as_the_dense_covariance_does(directions):
         dense = columns.T @ np.linalg.solve(V, columns)
         size = np.sqrt(np.outer(np.diag(dense), np.diag(dense)))
         np.testing.assert_allclose(gram[k] / size, dense / size, atol=1e-3)
-
-
-def test_a_question_out_of_order_is_refused():
-    one = np.ones(3)
-    with pytest.raises(ValueError, match="order of time"):
-        _core.bias_process_grams(
-            np.ones((3, 1)), one, one[::-1] * [3, 2, 1], 0 * one, np.arange(3), np.ones((3, 1)), np.ones((1, 5))
-        )

@@ -5,7 +5,6 @@ One word for one thing, the field's own: bias, pose, timestamp, uncertainty, res
 
 import ast
 import dataclasses
-import html
 import inspect
 import json
 import re
@@ -19,11 +18,9 @@ import trihedron
 from trihedron.cli import COMMANDS, build_app
 from trihedron.records.finding import FindingCode
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
-from written_session import G, usual
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python/trihedron"
-
 RETIRED = {
     # Only where zero means a bias: as a number it stays.
     r"\bzero[- ]readings?": "bias",
@@ -57,6 +54,12 @@ RETIRED = {
     r"\bwalking bias(es)?\b|\bbias(es)?( that)? walks?\b": "bias random walk",
     r"(?-i:\b(gyro|accelerometer|about|along|axis|axes) [xyz]\b(?![\w'′_^])|(?<!w, )\bx, y,? (and )?z\b)": "X, Y, Z",
 }
+CHANNELS = re.compile(r"((tow|time|gyro|accelerometer|accel|acc)( [xyz])?( \[[^\]]+\])?,?)+")
+Said = Iterator[tuple[str, str]]
+"""Texts, each with where it stands."""
+RETIRED_IN_NAMES = re.compile(
+    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|scatter|converters?|hidden|wander|rest)(?![a-z])"
+)
 
 
 def retired(text: str, words: dict[str, str] = RETIRED) -> list[str]:
@@ -68,17 +71,6 @@ def retired(text: str, words: dict[str, str] = RETIRED) -> list[str]:
     ]
 
 
-def test_the_words_are_found_where_they_are():
-    assert retired("The gyro's zero is -0.3 °/s; gravity at rest missed by 3 mm/s² in hold 3.")
-    assert retired("Still poses tell a converter's steps; stamps of axis 1; the law of its twin.")
-    assert not retired("The log holds zeros where nothing was read; the timestamp of X; a digital twin; rows of zeros.")
-
-
-CHANNELS = re.compile(r"((tow|time|gyro|accelerometer|accel|acc)( [xyz])?( \[[^\]]+\])?,?)+")
-Said = Iterator[tuple[str, str]]
-"""Texts, each with where it stands."""
-
-
 def helps() -> Said:
     group = typer.main.get_command(build_app())
     for name in ("", *(command.__name__.replace("_", "-") for command in COMMANDS)):
@@ -88,7 +80,8 @@ def helps() -> Said:
 
 
 def modules() -> Said:
-    """Texts of two words and more, docstrings apart: errors, prompts, comments in exported files."""
+    """Texts of two words and more and headings, docstrings apart: all that reports, errors and exported files say."""
+    yield from ((path.name, re.sub(r"<[^>]*>", " ", path.read_text("utf-8"))) for path in PACKAGE.rglob("*.j2"))
     for path in PACKAGE.rglob("*.py"):
         nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
         inside = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
@@ -105,7 +98,8 @@ def modules() -> Said:
             # A label of a random stream keeps its letters, or every seed would draw another series; verbs are bare.
             # Channels have names as in the records: "gyro x".
             is_verbs = set(text.split()) <= set(trihedron.__all__)
-            if " " in text.strip() and not text.startswith("{/") and not is_verbs and not CHANNELS.fullmatch(text):
+            is_said = " " in text.strip() or text[:1].isupper()
+            if is_said and not text.startswith("{/") and not is_verbs and not CHANNELS.fullmatch(text):
                 yield str(path.relative_to(PACKAGE)), text
 
 
@@ -163,48 +157,10 @@ def test_nothing_that_a_user_reads_uses_a_retired_word(source):
         assert [(where, found) for where, text in said for found in retired(text)] == []
 
 
-RETIRED_IN_NAMES = re.compile(
-    r"(?<![a-z])(zeros?|holds?|bars|stamps?|laws?|creeps?|scatter|converters?|hidden|wander|rest)(?![a-z])"
-)
-
-
-def keys_of(node: object) -> Iterator[str]:
-    """Keys at every depth, the laid-out report apart: its drawings have the names of shapes."""
-    for key, child in node.items() if isinstance(node, dict) else ():
-        yield key
-        yield from keys_of(child) if key != "report" else ()
-    for child in node if isinstance(node, list) else ():
-        yield from keys_of(child)
-
-
-@pytest.fixture(scope="module")
-def results():
-    recording, made, diagnosis = usual()
-    return {
-        "calibration": made,
-        "verification": trihedron.verify(made, recording, gravity_m_s2=float(G)),
-        "diagnosis": diagnosis,
-        "check": trihedron.check(recording),
-        "segments": trihedron.segment(recording),
-        "ranking": trihedron.rank([made, made], recording, gravity_m_s2=float(G)),
-        "plan": trihedron.plan(),
-    }
-
-
-def test_no_report_and_no_key_of_its_json_uses_a_retired_word(results, tmp_path):
-    for kind, result in results.items():
-        assert retired(trihedron.report(result, tmp_path / f"{kind}.html")) == []
-        page = re.sub(
-            r"<(style|script)\b.*?</\1>", " ", (tmp_path / f"{kind}.html").read_text("utf-8"), flags=re.DOTALL
-        )
-        assert retired(html.unescape(re.sub(r"<[^>]*>", " ", page))) == []
-        trihedron.report(result, tmp_path / f"{kind}.json")
-        keys = keys_of(json.loads((tmp_path / f"{kind}.json").read_text("utf-8")))
-        assert {key for key in keys if RETIRED_IN_NAMES.search(key)} == set()
-
-
-def test_no_public_name_is_a_retired_word():
+def test_no_public_name_and_no_key_of_a_file_is_a_retired_word():
     names = {*(code.value for code in FindingCode), *EFFECTS}
+    for path in (PACKAGE / "files/schema").glob("*.json"):
+        names |= set(re.findall(r'"(\w+)":', path.read_text(encoding="utf-8")))
     for name in filter(str.isidentifier, trihedron.__all__):
         public = getattr(trihedron, name)
         names.add(name)

@@ -66,9 +66,8 @@ def test_a_clock_of_its_own_rules_losses_out():
 
 def session(share, seed, move_s=2.0, grade="mpu"):
     """A session at 100 Hz from which a share of all rows is missing, numbered anew."""
-    log, _ = simulate(
-        unit_of(hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed), seed, grade), seed
-    )
+    motion = hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed)
+    log, _ = simulate(unit_of(motion, seed, grade), seed)
     kept = np.random.default_rng(seed).random(log.n_samples) >= share
     return replace(
         log, time_s=np.arange(kept.sum()) / 100.0, accelerometer=log.accelerometer[kept], gyroscope=log.gyroscope[kept],

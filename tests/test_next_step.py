@@ -8,44 +8,34 @@ from types import SimpleNamespace
 import pytest
 
 from trihedron.cli import main
+from trihedron.cli import run as now
 from trihedron.cli.options import GravitySource, LogSource
-from trihedron.cli.run import (
-    again,
-    begin,
-    note_excluded,
-    note_file,
-    note_log,
-    note_place,
-    note_reference,
-    with_arguments,
-)
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document, FindingList, Section
+
+MY_LOG = "'my log.csv' --rate 50"
 
 
 @pytest.fixture(autouse=True)
 def run():
     """A run on a log whose name has a space, at a stated rate and latitude."""
-    begin(("calibrate", "my log.csv", "--rate", "50", "--report", "page.html", "--full", "--latitude", "59.9"))
-    note_log(LogSource(log=Path("my log.csv"), rate=50.0))
-    note_place(GravitySource(latitude=59.9))
+    now.begin(("calibrate", "my log.csv", "--rate", "50", "--report", "page.html", "--full", "--latitude", "59.9"))
+    now.note_log(LogSource(log=Path("my log.csv"), rate=50.0))
+    now.note_place(GravitySource(latitude=59.9))
     yield
-    begin(())
+    now.begin(())
 
 
 def filled(step):
-    return with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
-
-
-MY_LOG = "'my log.csv' --rate 50"
+    return now.with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
 
 
 @pytest.mark.parametrize(
     ("notes", "step", "said"),
     [
         (
-            [(note_file, "cal.json")],
+            [(now.note_file, "cal.json")],
             "`trihedron verify FILE OTHER_LOG`; `trihedron apply FILE LOG`.",
             f"`trihedron verify cal.json OTHER_LOG`; `trihedron apply cal.json {MY_LOG}`.",
         ),
@@ -53,7 +43,7 @@ MY_LOG = "'my log.csv' --rate 50"
         ([], "`trihedron diagnose 'my log.csv'`", f"`trihedron diagnose {MY_LOG} --latitude 59.9`"),
         # The place and a reference go to commands that take them.
         (
-            [(note_reference, "motion.csv")],
+            [(now.note_reference, "motion.csv")],
             "`trihedron diagnose LOG`, `trihedron segment LOG`",
             f"`trihedron diagnose {MY_LOG} --reference motion.csv --latitude 59.9`, `trihedron segment {MY_LOG}`",
         ),
@@ -76,7 +66,7 @@ def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_
     found = Finding(FindingCode.GYRO_G_SENSITIVITY, Severity.WARNING, "Seen.", "", action)
     sections = (Section("Findings", (FindingList((found,)),)),)
     used = "Use it: `trihedron apply FILE LOG`."
-    said = with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step
+    said = now.with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step
     assert said.count("-o calibration.json") == 1
     assert "--extended -o calibration.json`" in said
 
@@ -91,23 +81,22 @@ def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_wit
 
 
 def test_outputs_are_not_repeated():
-    assert again(("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")) == (
-        "trihedron noise a.csv --rate=9"
-    )
+    words = ("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")
+    assert now.again(words) == "trihedron noise a.csv --rate=9"
 
 
 def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_which_replaces_its_file():
-    begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
-    note_log(LogSource(log=Path("my log.csv"), rate=50.0))
+    now.begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
+    now.note_log(LogSource(log=Path("my log.csv"), rate=50.0))
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json --force`"
-    begin(("calibrate", "a.csv", "b.csv", "--rate", "50"))
+    now.begin(("calibrate", "a.csv", "b.csv", "--rate", "50"))
     for name in ("a.csv", "b.csv"):
-        note_log(LogSource(log=Path(name), rate=50.0))
+        now.note_log(LogSource(log=Path(name), rate=50.0))
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG_1 NEW_LOG_2 --rate 50`"
 
 
 def test_several_logs_are_all_named_in_a_command_of_another_verb():
-    begin(("diagnose", "one.csv", "two.csv", "--alpha", "0.02", "--gravity", "9.8", "--json", "out.json"))
+    now.begin(("diagnose", "one.csv", "two.csv", "--alpha", "0.02", "--gravity", "9.8", "--json", "out.json"))
     said = filled("Calibrate: `trihedron calibrate ... -o calibration.json`.")
     assert said == "Calibrate: `trihedron calibrate one.csv two.csv --gravity 9.8 -o calibration.json`."
 
@@ -138,10 +127,10 @@ def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
 
 
 def test_a_log_that_was_excluded_is_not_in_the_next_command():
-    begin(("calibrate", "bad.csv", "good.csv", "fine.csv", "--latitude", "59.9"))
+    now.begin(("calibrate", "bad.csv", "good.csv", "fine.csv", "--latitude", "59.9"))
     logs = [LogSource(log=Path(name)) for name in ("bad.csv", "good.csv", "fine.csv")]
-    note_log(logs[0])
-    note_excluded(["bad.csv"], logs)
+    now.note_log(logs[0])
+    now.note_excluded(["bad.csv"], logs)
     said = filled("Store it: `... -o calibration.json`; use it: `trihedron apply FILE LOG`.")
     assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said
     assert "calibration.json good.csv`" in said

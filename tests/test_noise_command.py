@@ -129,14 +129,8 @@ def test_lost_rows_become_missing_readings_not_shorter_time():
 def test_a_calibration_gives_a_log_in_counts_its_units_axis_by_axis(log):
     whole, per_count = trihedron.read(log), np.array([1e-4, 2e-4, 4e-4])
     counts = replace(whole, **{s: getattr(whole, s)[:20_000] for s in ("time_s", "accelerometer", "gyroscope")})
-    raw = replace(
-        counts,
-        gyroscope=counts.gyroscope / per_count,
-        accelerometer=counts.accelerometer / 6e-4,
-        gyroscope_unit=RateUnit.COUNTS,
-        accelerometer_unit=AccelerationUnit.COUNTS,
-    )
-
+    readings = {"gyroscope": counts.gyroscope / per_count, "accelerometer": counts.accelerometer / 6e-4}
+    raw = replace(counts, **readings, gyroscope_unit=RateUnit.COUNTS, accelerometer_unit=AccelerationUnit.COUNTS)
     sensors = [
         SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), "counts", unit, "joint")
         for S, unit in ((6e-4 * np.eye(3), "m/s^2"), (np.diag(per_count), "rad/s"))

@@ -19,6 +19,9 @@ from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import noise_record
 
 RATE = 100.0
+CURVE_RATE = 2.0
+N_READINGS = 4096
+CLUSTERS = np.array([8, 16, 64, 512, 1024])
 
 
 def present(axis):
@@ -231,11 +234,6 @@ def test_scattered_loss_leaves_the_terms_where_they_are(truth):
         inside += sum(terms[TermName(s)].lower <= v <= terms[TermName(s)].upper for s, v in truth.items())
     # Twelve intervals of 95 %: nine or more with a probability of 0.998.
     assert inside >= 9
-
-
-CURVE_RATE = 2.0
-N_READINGS = 4096
-CLUSTERS = np.array([8, 16, 64, 512, 1024])
 
 
 @pytest.mark.parametrize("terms", [{"B": 1.0}, {"Q": 1.0, "N": 0.1, "R": 0.01}], ids="".join)

@@ -13,6 +13,7 @@ from trihedron.estimate.noise.slow import PoseBiases, compare_slow
 from trihedron.quantiles import median, medians, quantile, quantiles
 
 N, POSE_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
+RATE = 100.0
 
 
 def session(seed, walk, scatter=0.0, poses=POSES):
@@ -101,11 +102,8 @@ def test_a_missing_value_has_no_place_and_no_quantile_lies_outside():
             quantile(rows[:, 0], outside)
 
 
-RATE = 100.0
-
-
-def poses_of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, impacts=0, line=0.0, rate=RATE):
-    """Readings (n,) of one axis and windows of its poses, a second of handling between them."""
+def of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, impacts=0, line=0.0, rate=RATE):
+    """Noise of one axis in poses, a second of handling between them."""
     parts, windows, at = [], [], 0
     for k in range(poses):
         n = int(rate * seconds * rng.uniform(0.7, 1.4))
@@ -125,12 +123,7 @@ def poses_of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0
         parts += [x, 5.0 * rng.standard_normal(int(rate))]
         windows.append((at, at + n))
         at += n + int(rate)
-    return np.concatenate(parts), windows
-
-
-def of(rng, **options):
-    readings, windows = poses_of(rng, **options)
-    return noise_of_poses(readings, RATE, windows)[0]
+    return noise_of_poses(np.concatenate(parts), rate, windows)[0]
 
 
 @pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "impacts": 2}], ids=str)

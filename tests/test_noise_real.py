@@ -11,10 +11,11 @@ from trihedron.api.identifying import allan, noise_of_curve
 from trihedron.records import Recording
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
+from true_segments import codes
 
-
-def codes(axis):
-    return {finding.code for finding in axis.findings}
+N, RATE = 360_000, 100.0
+WHITE = 1e-4
+"""N of readings that scatter by 1e-3 at 100 Hz."""
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +62,6 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
         assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)
         mine, theirs = axis.terms[TermName.BIAS_INSTABILITY], logged.terms[TermName.BIAS_INSTABILITY]
         assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
-
-
-N, RATE = 360_000, 100.0
-WHITE = 1e-4
-"""N of readings that scatter by 1e-3 at 100 Hz."""
 
 
 def axes_of(x):

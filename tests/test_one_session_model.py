@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from diagnosed_session import nearest_pose, simulated
+from small_session import G
+from small_session import simulated as of_motion
 from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
@@ -19,15 +21,16 @@ from trihedron.report.machine import calibration_record
 from trihedron.segment import segment_recording
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.model import MOVES
-from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.simulate import hand_session
+
+SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
+GRAVITY = {"gravity_m_s2": float(G)}
 
 
 @pytest.fixture(scope="module")
 def healthy():
-    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(18, layout=118))
-    recording, truth = simulate(scenario, 118)
-    result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
-    return recording, truth.gravity_m_s2, result, diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+    recording = of_motion(hand_session(18, layout=118), 118)
+    return recording, float(G), calibrate(recording, **GRAVITY), diagnose(recording, **GRAVITY)
 
 
 def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy):
@@ -69,9 +72,8 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
 def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):
     recording, gravity, result, _ = healthy
     checked = verify(result.calibration, recording, gravity_m_s2=gravity)
-    assert np.sqrt(np.mean(checked.verification.norm_error**2)) == pytest.approx(
-        result.accelerometer.quality.rms, rel=1e-9
-    )
+    rms = np.sqrt(np.mean(checked.verification.norm_error**2))
+    assert rms == pytest.approx(result.accelerometer.quality.rms, rel=1e-9)
     # Directions of the poses come from the same means; the noise of a pose was measured with another accelerometer.
     np.testing.assert_allclose(checked.verification.angle_deg, result.gyroscope.quality.angle_deg, rtol=1e-6)
 
@@ -86,10 +88,6 @@ def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without
     np.testing.assert_allclose(np.linalg.norm(force, axis=1) - gravity, quality.residual, atol=1e-12)
 
 
-def session_of(seed, n_poses=18):
-    return simulated(seed=seed, n_poses=n_poses, grade="adis")
-
-
 def fitted_to(recording, gravity):
     segments = segment_recording(recording)
     calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
@@ -98,10 +96,8 @@ def fitted_to(recording, gravity):
 
 
 def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data):
-    folder = real_data / "getovermassif"
-    recording = read_recording(
-        accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt"
-    )
+    paths = {f"{sensor}_path": real_data / f"getovermassif/session4_{stem}.txt" for sensor, stem in SENSORS}
+    recording = read_recording(**paths)
     fitted, _ = fitted_to(recording, 9.803)
     # imu_tk found 1.000 on the log's own unit; shrunk by its biases' scatter it was 0.816, moves 4.70 deg.
     assert fitted.state.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
@@ -115,7 +111,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
 
 
 def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
-    recording, truth = session_of(4)
+    recording, truth = simulated(seed=4, n_poses=18, grade="adis")
     plain, _ = fitted_to(recording, truth.gravity_m_s2)
     timestamps = recording.time_s.copy()
     moves = segment_recording(recording).moves
@@ -129,7 +125,7 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
 
 
 def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_and_prediction():
-    recording, truth = session_of(3, 12)
+    recording, truth = simulated(seed=3, n_poses=12, grade="adis")
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     J, r = fitted.core.jacobian(), fitted.system.residual
     size = np.linalg.norm(J, axis=0)
@@ -158,9 +154,7 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
 
 
 @pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 2.6)])
-def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_poses_alone(
-    real_data, name, expected_mm_s2
-):
+def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_poses_alone(real_data, name, expected_mm_s2):
     # Moves of this log miss by degrees (lost samples, timestamps of arrival). Over the accelerometer they left 19
     # and 24 mm/s² where the report said 3.7 and 10.4; the poses alone, with biases that are lines in time, leave 2.79
     # and 2.09: the second accelerometer drifts by 40 mm/s².
@@ -180,7 +174,7 @@ def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_the_pos
 def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     scores = []
     for seed in range(4):
-        recording, truth = session_of(seed + 20, 24)
+        recording, truth = simulated(seed=seed + 20, grade="adis")
         segments = segment_recording(recording)
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))
@@ -199,9 +193,6 @@ def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     squares = np.array(scores) ** 2
     # 60 correlated scores of unit variance: their mean square lies in 1 ± 0.3 (15 parameters a session, four sessions).
     assert 0.5 < squares.mean() < 1.6
-
-
-SENSORS = (("accelerometer", "acc"), ("gyroscope", "gyro"))
 
 
 def diagnosed(gravity: float, first: float = 0.0, last: float = 1.0, **arguments: object):
@@ -290,13 +281,11 @@ def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(xsens)
 
 
 def _drawn(n_poses: int, seed: int):
-    motion = hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0)
-    recording, truth = simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)
-    return recording, {"gravity_m_s2": truth.gravity_m_s2}
+    return of_motion(hand_session(n_poses=n_poses, pose_s=3.0, move_s=2.5, first_pose_s=5.0), seed)
 
 
 def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_leave_them() -> None:
-    found = [calibrate(log, **gravity).accelerometer.quality for log, gravity in (_drawn(12, k) for k in range(16))]
+    found = [calibrate(_drawn(12, k), **GRAVITY).accelerometer.quality for k in range(16)]
     chi2, dof = (sum(getattr(one, name) for one in found) for name in ("chi2", "dof"))
     # The poses alone would leave 3 each; χ² of all scatters by sqrt(2 dof), dof is a whole number of each.
     assert dof > 16 * 5
@@ -309,5 +298,4 @@ def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_le
     ("n_poses", "verdict"), [(6, "not-testable"), (10, "consistent")], ids=["undetermined", "one-row-left-by-the-norms"]
 )
 def test_few_poses_are_consistent_only_where_they_determine_the_model(n_poses: int, verdict: str) -> None:
-    log, gravity = _drawn(n_poses, 7001)
-    assert diagnose(log, **gravity).verdict == verdict
+    assert diagnose(_drawn(n_poses, 7001), **GRAVITY).verdict == verdict

@@ -23,8 +23,11 @@ pytestmark = [
     pytest.mark.filterwarnings("default"),
 ]
 KINDS = ("calibrate", "verify", "segment", "check", "allan", "kalman", "diagnose", "simulate", "plan")
+WIDTH = "document.documentElement.scrollWidth"
 # Pages share one sheet of styles: these hold all parts that it gives a colour to, and a verdict with its figure.
 WITH_A_FIGURE = ("calibrate", "allan", "diagnose")
+# What these are laid out of stands in the others as well.
+ALIKE = {"segment", "check", "kalman"}
 
 
 @pytest.fixture(scope="module")
@@ -94,21 +97,13 @@ def barriers_of(page, axe):
     return [(v["id"], v["nodes"][0]["html"][:160]) for v in found]
 
 
-def width_of(page):
-    return page.evaluate("document.documentElement.scrollWidth")
-
-
-# What these are laid out of stands in the others as well.
-ALIKE = {"segment", "check", "kalman"}
-
-
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow if k in ALIKE else ()) for k in KINDS])
 def test_a_report_fits_a_phone_and_the_paper_and_has_no_barrier(folder, browser, axe, kind):
     visit = Visit(browser, folder / f"{kind}.html", 695, "light")
     page = visit.page
     # A4 less margins of 13 mm: 184 mm at 96 to the inch.
     page.emulate_media(media="print")
-    assert width_of(page) <= 695
+    assert page.evaluate(WIDTH) <= 695
     page.emulate_media(media="screen")
     page.set_viewport_size({"width": 390, "height": 844})
     # Tools of a figure hide no mark.
@@ -116,7 +111,7 @@ def test_a_report_fits_a_phone_and_the_paper_and_has_no_barrier(folder, browser,
         tools, plot = panel.query_selector(".tools").bounding_box(), panel.query_selector(".plot").bounding_box()
         assert tools["y"] + tools["height"] <= plot["y"] + 1.0
     assert barriers_of(page, axe) == []
-    assert width_of(page) <= 390
+    assert page.evaluate(WIDTH) <= 390
     # A table without a caption is announced as a mere table.
     assert 'aria-label="table"' not in (folder / f"{kind}.html").read_text(encoding="utf-8")
     assert visit.said == []
@@ -137,7 +132,7 @@ def test_a_report_has_result_and_remedy_on_its_first_screen_and_is_read_in_the_d
             assert 0 < box["y"] < 800
             assert box["height"] > 10
         assert barriers_of(page, axe) == []
-    assert width_of(page) <= 1280
+    assert page.evaluate(WIDTH) <= 1280
     page.close()
 
 

@@ -11,6 +11,9 @@ from trihedron.records import FindingCode, Recording
 
 G = 9.80665
 RATE = 100.0
+STEP = np.ones(3)
+NOISE = np.full(3, 3.0)
+COARSE = G / 50.0
 
 
 def posed(n_poses, *, noise, step, limit=np.inf, seed=1, pose_s=4.0, move_s=1.0):
@@ -46,9 +49,8 @@ def test_poses_inside_a_range_below_gravity_are_found_and_those_beyond_are_left_
     assert abs(found[FindingCode.POSE_AT_RANGE_LIMIT].numbers["reading"]) == pytest.approx(limit, abs=0.0012)
     result = calibrate(recording, gravity_m_s2=G)
     # A pose at the limit reads up to 0.5 m/s² less than gravity; taken for a reading it moves a scale by per cents.
-    np.testing.assert_allclose(
-        np.diag(result.accelerometer.S), 1.0, atol=5 * np.sqrt(np.diag(result.accelerometer.covariance)[:9:4].max())
-    )
+    found = result.accelerometer
+    np.testing.assert_allclose(np.diag(found.S), 1.0, atol=5 * np.diag(found.sigma_S).max())
 
 
 @pytest.mark.parametrize(
@@ -68,10 +70,6 @@ def test_a_range_that_only_moves_reach_loses_no_pose():
     jolted[450::500] = 19.6
     segments = segment(replace(recording, accelerometer=np.clip(jolted, -19.6, 19.6)))
     assert len(segments.poses) == 24
-
-
-STEP = np.ones(3)
-NOISE = np.full(3, 3.0)
 
 
 def swung(seed, n=6000, height=12000.0):
@@ -128,9 +126,6 @@ def test_a_sensor_that_is_read_as_fast_as_it_measures_holds_nothing():
         assert new_readings(np.clip(swung(seed), -5000, 5000), NOISE, STEP) is None
         # Eight bits: neighbouring rows are often the same, and three axes together at every turning point.
         assert new_readings(np.round(swung(seed) / 100.0), np.zeros(3), STEP) is None
-
-
-COARSE = G / 50.0
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.28, 0.7])

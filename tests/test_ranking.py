@@ -61,9 +61,8 @@ def test_five_wrong_files_of_a_phones_imu_are_rejected_on_another_session(real_d
 
 def test_files_of_other_makers_are_ranked_and_what_they_do_not_hold_is_taken_from_the_log(session, tmp_path, capsys):
     log, known = session
-    size = ExportOptions(
-        SensorNoise(NoiseFigure(1e-3), NoiseFigure(1e-5)), SensorNoise(NoiseFigure(1e-4), NoiseFigure(1e-6)), 100.0
-    )
+    noise = (SensorNoise(NoiseFigure(N), NoiseFigure(N / 100.0)) for N in (1e-3, 1e-4))
+    size = ExportOptions(*noise, 100.0)
     trihedron.write_calibration(known, tmp_path / "own.json")
     for target, name in (("xio", "fusion.txt"), ("imucal", "imucal.json"), ("pyins", "pyins.txt")):
         (tmp_path / name).write_text(export_calibration(known, target, size))
@@ -105,20 +104,15 @@ def test_an_extended_calibration_is_ranked_on_the_poses_of_the_others(session):
     assert [len(one.verification.norm_error) for one in ranking.candidates] == [len(fewer.poses)] * 2
 
 
-def wide(sensor):
-    return replace(sensor, S=1.05 * sensor.S, b=1.05 * sensor.b, covariance=1e4 * sensor.covariance)
-
-
 def test_verify_rejects_a_gyro_bias_that_is_wrong_and_what_is_worse_than_nothing_however_uncertain(session):
     log, known = session
     a, w = known.accelerometer, known.gyroscope
+    sensors = [replace(s, S=1.05 * s.S, b=1.05 * s.b, covariance=1e4 * s.covariance) for s in (a, w)]
+    wide = {"accelerometer": sensors[0], "gyroscope": sensors[1]}
     assert trihedron.verify(known, log, gravity_m_s2=9.81).is_passed
     for off, code in (
         (replace(known, gyroscope=replace(w, b=w.b + np.radians(5.0))), FindingCode.CALIBRATION_SHIFT),
-        (
-            replace(known, accelerometer=wide(a), gyroscope=wide(w), covariance=1e4 * known.covariance),
-            FindingCode.WORSE_THAN_UNCALIBRATED,
-        ),
+        (replace(known, **wide, covariance=1e4 * known.covariance), FindingCode.WORSE_THAN_UNCALIBRATED),
     ):
         result = trihedron.verify(off, log, gravity_m_s2=9.81)
         assert not result.is_passed

@@ -17,6 +17,21 @@ from trihedron.units import AccelerationUnit, RateUnit
 # By name: the package also exports a function called `read`.
 text_module = importlib.import_module("trihedron.read.text.blocks")
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
+# Header, separator, decimal mark, what stands before and behind a row, what ends it.
+LAYOUTS = {
+    "csv": (HEADER, ",", ".", "", "", "\n"),
+    "crlf": (HEADER, ",", ".", "", "", "\r\n"),
+    "cr": (HEADER, ",", ".", "", "", "\r"),
+    "byte-order-mark": ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
+    "tsv": (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
+    "decimal-comma": (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
+    "tab-decimal-comma": (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
+    "blanks": ("", "   ", ".", "  ", "  ", "\n"),
+    "comment-header": ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
+    "trailing-comma": (HEADER, ",", ".", "", ",", "\n"),
+    "preamble": ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
+    "quoted": ('"t","ax","ay","az","gx","gy","gz"\n', '","', ".", '"', '"', "\n"),
+}
 
 
 def readings(n: int = 200, seed: int = 1, rate_hz: float = 100.0) -> np.ndarray:
@@ -49,23 +64,6 @@ def assert_same(recording: Recording, table: np.ndarray) -> None:
     np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
     # Times are made relative to the first timestamp: one rounding of numbers up to 100 s.
     np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
-
-
-# Header, separator, decimal mark, what stands before and behind a row, what ends it.
-LAYOUTS = {
-    "csv": (HEADER, ",", ".", "", "", "\n"),
-    "crlf": (HEADER, ",", ".", "", "", "\r\n"),
-    "cr": (HEADER, ",", ".", "", "", "\r"),
-    "byte-order-mark": ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
-    "tsv": (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
-    "decimal-comma": (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
-    "tab-decimal-comma": (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
-    "blanks": ("", "   ", ".", "  ", "  ", "\n"),
-    "comment-header": ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
-    "trailing-comma": (HEADER, ",", ".", "", ",", "\n"),
-    "preamble": ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
-    "quoted": ('"t","ax","ay","az","gx","gy","gz"\n', '","', ".", '"', '"', "\n"),
-}
 
 
 @pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
@@ -234,15 +232,6 @@ def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
         read_recording(path, accelerometer_unit="furlong")
     with pytest.raises(ReadError, match="not a time unit"):
         read_recording(path, time_unit="fortnight")
-
-
-def test_a_counter_that_starts_again_from_zero_is_continued(tmp_path):
-    table = readings()
-    ticks = table.copy()
-    ticks[:, 0] = (2**32 - 500_000 + np.arange(200) * 10_000) % 2**32
-    recording = read_recording(write(tmp_path / "log.csv", ticks, HEADER.replace("t,", "micros,")))
-    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=1e-9)
-    assert FindingCode.TIME_WRAPPED in codes(recording)
 
 
 def test_one_sensor_alone_is_a_recording(tmp_path):

@@ -19,6 +19,13 @@ from trihedron.records import Recording
 
 ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
 TEXT = HEADER + "\n".join(ROWS) + "\n"
+FEW = settings(
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+FUZZ = settings(FEW, max_examples=120)
+WORDS = "1 0 -2.5 1e5 nan inf -inf abc 1,5 0x1F 1e999 1e300 - # % é t ax gx acc_x time None 9999999999999999999999"
+TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]", "2024-01-01 00:00:00"])
+FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
 
 
 def with_row(index: int, row: str) -> str:
@@ -54,6 +61,9 @@ CASES = {
     "not-parquet": (b"PAR1" + bytes(range(256)), "damaged or cut off"),
     "hdf5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5|h5py cannot read this file"),
     "ros-bag": (b"#ROSBAG V2.0\n" + bytes(100), "ROS bag|rosbags cannot read this bag"),
+    "mcap": (b"\x89MCAP0\r\n" + bytes(range(256)) * 3, r"\w"),
+    "sqlite": (b"SQLite format 3\x00" + bytes(range(256)) * 3, r"\w"),
+    "ulog": (b"ULog\x01\x12\x35\x01" + bytes(range(256)) * 3, r"\w"),
     "nine-unnamed-columns": ((",".join("123456789") + "\n").encode() * 9, "9 columns without names"),
     "all-nan": ((HEADER + "\n".join(f"{i},nan,1,{i},3,{i},5" for i in range(9))).encode(), "contains no finite number"),
     "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
@@ -146,12 +156,6 @@ def test_words_of_a_library_are_printed_but_for_those_of_a_panic(capfd, said, le
     assert capfd.readouterr().err == left
 
 
-FEW = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-FUZZ = settings(FEW, max_examples=120)
-
-
 def read_bytes(tmp_path, content: bytes, **options) -> Recording | None:
     """The recording, or None when it was rejected in one sentence. Anything else is a failure of the test."""
     path = tmp_path / "fuzz.csv"
@@ -168,10 +172,6 @@ def read_bytes(tmp_path, content: bytes, **options) -> Recording | None:
     return None
 
 
-WORDS = "1 0 -2.5 1e5 nan inf -inf abc 1,5 0x1F 1e999 1e300 - # % é t ax gx acc_x time None 9999999999999999999999"
-TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]", "2024-01-01 00:00:00"])
-
-
 @FUZZ
 @given(
     st.lists(st.lists(TOKENS, min_size=4, max_size=4), min_size=1, max_size=12),
@@ -181,9 +181,6 @@ TOKENS = st.sampled_from([*WORDS.split(), "", " ", '"', "\x00", "gyr_x [deg/s]",
 def test_any_table_of_log_words_under_a_header_is_a_recording_or_a_sentence(tmp_path, rows, separator, packed):
     text = "\n".join([separator.join(["t", "ax", "ay", "az"]), *map(separator.join, rows)])
     read_bytes(tmp_path, gzip.compress(text.encode()) if packed else text.encode())
-
-
-FINITE = st.floats(-1e12, 1e12, allow_nan=False, allow_subnormal=False)
 
 
 @FEW

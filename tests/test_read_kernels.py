@@ -9,6 +9,8 @@ from trihedron.read import read_recording
 from trihedron.read.text.reader import TextReader
 
 LENGTHS = (2, 3, 7, 64, 65, 66, 129, 65536, 65537, 200_003)
+DAMAGED = ("1,2\n3\n", "1,2,3\n4,5\n", "1,2\n\n3,4\n", "1,2\n# remark\n3,4\n", "1,\n2,3\n", "1,2\r3,4\r")
+NO_NUMBERS = ("1,nan\n", '"1",2\n', "1,2x\n", "1,2e\n", "1,--2\n", "1,.\n", "1,2,\n", "1;2\n", "1,0x10\n", "1,2 3\n")
 
 
 def timestamps(n: int, seed: int) -> np.ndarray:
@@ -119,10 +121,6 @@ def test_every_number_is_the_double_nearest_to_its_digits(separator, ends):
         found = columns_of(body, separator, 5)
         assert found is not None
         np.testing.assert_array_equal(found, expected)
-
-
-DAMAGED = ("1,2\n3\n", "1,2,3\n4,5\n", "1,2\n\n3,4\n", "1,2\n# remark\n3,4\n", "1,\n2,3\n", "1,2\r3,4\r")
-NO_NUMBERS = ("1,nan\n", '"1",2\n', "1,2x\n", "1,2e\n", "1,--2\n", "1,.\n", "1,2,\n", "1;2\n", "1,0x10\n", "1,2 3\n")
 
 
 @pytest.mark.parametrize("text", [*DAMAGED, *NO_NUMBERS])

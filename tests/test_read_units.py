@@ -14,10 +14,10 @@ from trihedron.records import FindingCode, Severity
 from trihedron.units import RateUnit
 
 RATE_HZ = 100.0
-
-
-def session(n_poses=6, turn_s=1.0):
-    return motion(RATE_HZ, 3, n_poses, turn_s)
+OTHERS = (
+    "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
+    "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
+)
 
 
 def saved(path, time_s, force, rate, header=HEADER):
@@ -29,14 +29,14 @@ def saved(path, time_s, force, rate, header=HEADER):
 )
 @pytest.mark.parametrize("turn_s", [0.7, 6.0])
 def test_the_gyro_unit_is_told_by_turning_gravity(tmp_path, scale, unit, turn_s):
-    time_s, force, rate = session(turn_s=turn_s)
+    time_s, force, rate = motion(RATE_HZ, 3, 6, turn_s)
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate * scale))
     assert recording.gyroscope_unit is unit
     assert FindingCode.UNIT_ASSUMED not in codes(recording)
 
 
 def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_gravity_is_serious(tmp_path):
-    time_s, force, rate = session()
+    time_s, force, rate = motion(RATE_HZ, 3, 6, 1.0)
     turned = np.column_stack([-rate[:, 2], rate[:, 0], -rate[:, 1]])
     assert read_recording(saved(tmp_path / "log.csv", time_s, force, turned)).gyroscope_unit is RateUnit.RAD_S
     path = saved(tmp_path / "log.csv", time_s, force, rate, "t,ax,ay,az,gx_dps,gy_dps,gz_dps\n")
@@ -48,7 +48,7 @@ def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_grav
 
 @pytest.mark.parametrize("names", ["t,gx,gy,gz,ax,ay,az", "t [s],gx [rad/s],gy [rad/s],gz [rad/s],ax [m/s^2],ay,az"])
 def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(tmp_path, names):
-    time_s, force, rate = session()
+    time_s, force, rate = motion(RATE_HZ, 3, 6, 1.0)
     path = saved(tmp_path / "log.csv", time_s, force, rate, f"{names}\n")
     (found,) = [f for f in read_recording(path).findings if f.code is FindingCode.SENSORS_EXCHANGED]
     assert found.severity is Severity.SERIOUS
@@ -58,7 +58,7 @@ def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(t
 
 
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
-    time_s, force, rate = (part[:200] for part in session(n_poses=1))
+    time_s, force, rate = (part[:200] for part in motion(RATE_HZ, 3, 1, 1.0))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))
     assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
@@ -69,14 +69,13 @@ def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_ser
 @pytest.mark.parametrize("gyro_first", [False, True])
 @pytest.mark.parametrize("n_poses", [1, 6])
 def test_six_columns_without_names_are_put_in_order_by_gravity(tmp_path, gyro_first, n_poses):
-    _, force, rate = session(n_poses=n_poses)
+    _, force, rate = motion(RATE_HZ, 3, n_poses, 1.0)
     pair = [rate, force] if gyro_first else [force, rate]
     recording = read_recording(write(tmp_path / "log.txt", np.column_stack(pair), "", separator=" "), rate_hz=RATE_HZ)
     np.testing.assert_array_equal(recording.accelerometer, force)
     np.testing.assert_array_equal(recording.gyroscope, rate)
-    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is (
-        Severity.WARNING if gyro_first else Severity.NOTE
-    )
+    severity = Severity.WARNING if gyro_first else Severity.NOTE
+    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is severity
 
 
 def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
@@ -88,12 +87,8 @@ def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
 # Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two
 # code points for a micro.
 MEANINGS = {
-    (
-        "accelerometer",
-        "x",
-        "",
-    ): "ax | acc_x | Acc_X | AccX | linear_acceleration.x | ACCEL_XOUT | AcX | уск_x | Уск_Х | accélération_x",
-    ("accelerometer", "y", ""): "fy",
+    ("accelerometer", "x", ""): "ax | acc_x | Acc_X | AccX | linear_acceleration.x | ACCEL_XOUT | AcX | уск_x | Уск_Х",
+    ("accelerometer", "y", ""): "fy | accélération_y",
     ("accelerometer", "z", ""): "accel_z",
     ("accelerometer", "x", "counts"): "ax_adc",
     ("accelerometer", "x", "g"): "ax_g | accelerometerAccelerationX(G) | Beschl. X [g] | 加速度X(g) | X轴加速度（g）",
@@ -133,12 +128,6 @@ NAMES = [(name, meaning) for meaning, names in MEANINGS.items() for name in name
 def test_a_column_is_recognised_with_its_role_axis_and_unit(name, meaning):
     parsed = parse_name(name)
     assert (parsed.role, parsed.axis, parsed.unit or parsed.time_unit) == meaning
-
-
-OTHERS = (
-    "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
-    "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
-)
 
 
 @pytest.mark.parametrize("name", ["", *OTHERS.split(" | ")])

@@ -16,11 +16,9 @@ from trihedron.records import FindingCode, Severity
 from trihedron.units import AccelerationUnit
 
 ROWS = 3000
-
-
-def accounts(recording) -> bool:
-    reported = sum(f.numbers.get("rows_left_out", 0) for f in recording.findings)
-    return recording.rows_in_file == recording.rows_read + reported
+T, FORCE, RATE = motion(50.0, 7)
+NAMES = "ax,ay,az,gx,gy,gz"
+OF_THE_RATE = ("# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz")
 
 
 @pytest.mark.parametrize(
@@ -30,7 +28,7 @@ def test_columns_that_are_empty_throughout_leave_the_names_of_the_others_alone(t
     table = readings(ROWS)
     recording = read_recording(write(tmp_path / "log.csv", table, header=header, end=end))
     assert_same(recording, table)
-    assert accounts(recording)
+    assert recording.rows_in_file == recording.rows_read + recording.rows_reported
     assert not header or FindingCode.COLUMNS_ASSUMED not in codes(recording)
 
 
@@ -45,7 +43,7 @@ def test_a_remark_here_and_there_in_the_last_column_is_no_damage(tmp_path, monke
     path.write_text("\n".join(lines) + "\n")
     recording = read_recording(path)
     assert_same(recording, table)
-    assert accounts(recording)
+    assert recording.rows_in_file == recording.rows_read + recording.rows_reported
     (left,) = [f for f in recording.findings if f.code is FindingCode.COLUMN_LEFT_OUT]
     assert "pose 0" in left.seen
     np.testing.assert_array_equal(recording.auxiliary["sat"], np.full(ROWS, 7.0))
@@ -57,9 +55,7 @@ def test_a_typeset_minus_is_a_minus(tmp_path, separator, decimal, encoding, monk
     if encoding == "utf-8":  # a log in UTF-16 is read in one block
         monkeypatch.setattr(text_module, "BLOCK_BYTES", 1 << 16)
     table = readings(ROWS)
-    path = write(
-        tmp_path / "log.csv", table, header=HEADER.replace(",", separator), separator=separator, decimal=decimal
-    )
+    path = write(tmp_path / "log.csv", table, HEADER.replace(",", separator), separator, decimal)
     path.write_bytes(path.read_text().replace("-", "\u2212").encode(encoding))
     recording = read_recording(path)
     assert_same(recording, table)
@@ -114,7 +110,7 @@ def test_rows_of_two_sensors_in_turn_are_two_logs_joined_on_their_stamps(tmp_pat
     path, table = in_turn(tmp_path, 1)
     recording = read_recording(path)
     assert recording.rows_in_file == 2 * ROWS
-    assert accounts(recording)
+    assert recording.rows_in_file == recording.rows_read + recording.rows_reported
     # The first acceleration lies before the first rate.
     np.testing.assert_array_equal(recording.accelerometer, table[1:, 1:4])
     # The gyro 8 ms before and 2 ms behind: linear interpolation, to the rounding of timestamps in a settled clock.
@@ -135,16 +131,11 @@ def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp
     np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
 
 
-def overtaken(n, seed=0):
-    """(n, 7) rows at 1 kHz of which some stand up to five places late, and the same in order."""
-    rng = np.random.default_rng(seed)
-    ordered = np.column_stack([np.arange(n) / 1000.0, rng.normal(9.8, 0.02, (n, 3)), rng.normal(0.0, 0.002, (n, 3))])
-    late = np.arange(n) + np.where(rng.random(n) < 1e-2, 5.5, 0.0)
-    return ordered[np.argsort(late, kind="stable")], ordered
-
-
 def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_path):
-    given, ordered = overtaken(5000)
+    # Rows at 1 kHz of which some stand up to five places late.
+    n, rng = 5000, np.random.default_rng(0)
+    ordered = np.column_stack([np.arange(n) / 1000.0, rng.normal(9.8, 0.02, (n, 3)), rng.normal(0.0, 0.002, (n, 3))])
+    given = ordered[np.argsort(np.arange(n) + np.where(rng.random(n) < 1e-2, 5.5, 0.0), kind="stable")]
     path = tmp_path / "log.csv"
     np.savetxt(path, given, delimiter=",", header="time [s],ax,ay,az,gx,gy,gz", comments="", fmt="%.6f")
     recording = trihedron.read(path)
@@ -157,10 +148,6 @@ def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_pa
     np.testing.assert_array_equal(force, before[0])
     np.testing.assert_array_equal(rate, before[1])
     np.testing.assert_array_equal(recording.accelerometer, ordered[:, 1:4])
-
-
-T, FORCE, RATE = motion(50.0, 7)
-NAMES = "ax,ay,az,gx,gy,gz"
 
 
 def stated(path, clock, names, remark="", force=FORCE, rate=RATE):
@@ -185,19 +172,13 @@ def doubts(recording):
     ],
 )
 def test_the_size_of_a_tick_is_taken_from_where_it_is_stated(tmp_path, remark, name, per_s):
-    recording = read_recording(
-        stated(
-            tmp_path / "log.csv", np.rint(T * per_s).astype(int) if per_s > 1 else T * per_s, f"{name},{NAMES}", remark
-        )
-    )
+    clock = np.rint(T * per_s).astype(int) if per_s > 1 else T * per_s
+    recording = read_recording(stated(tmp_path / "log.csv", clock, f"{name},{NAMES}", remark))
     # Ticks of 62.5 us round the time to 3e-3 of a step.
     assert recording.rate_hz == pytest.approx(50.0, rel=1e-3)
     assert not doubts(recording)
     # Of other times nothing is said.
     assert not any(clock_said(*said) for said in (("start time", "5 s"), ("exposure time", "ms"), ("time", "25 us")))
-
-
-OF_THE_RATE = ("# ODR = 50 Hz", "# fs=50 Hz", "% sample_rate_hz: 50", "// Output rate: 0.05 kHz")
 
 
 @pytest.mark.parametrize("remark", [*OF_THE_RATE, "# fs = 4 g", "# baud rate: 115200", "# i2c frequency: 400000"])
@@ -249,11 +230,9 @@ def test_a_column_t_that_falls_is_no_clock(tmp_path):
 
 
 def test_a_column_that_changes_where_the_clock_goes_back_identifies_devices(tmp_path):
-    one = [f"left,{t:.4f}" for t in T]
+    clock = [f"{wrist},{t:.4f}" for wrist in ("left", "right") for t in T]
     force, rate = np.concatenate([FORCE, 1.01 * FORCE]), np.concatenate([RATE, RATE])
-    log = stated(
-        tmp_path / "log.csv", [*one, *(r.replace("left", "right") for r in one)], f"wrist,t,{NAMES}", "", force, rate
-    )
+    log = stated(tmp_path / "log.csv", clock, f"wrist,t,{NAMES}", "", force, rate)
     with pytest.raises(ReadError, match="'wrist' identifies 2 devices: left"):
         read_recording(log)
     assert len(read_recording(log, instance="right").time_s) == len(T)

@@ -16,7 +16,7 @@ from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.session import solved as of_session
 from trihedron.estimate.session.fit import refitted, solve_session
-from trihedron.records import Calibration, FindingCode, Pose, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, Recording, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
 from trihedron.units import RateUnit
@@ -104,36 +104,6 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
         assert quality.covariance_scale > 1.0
     else:
         assert low < quality.chi2 < high
-
-
-def poses_of(means, sigma, ranges):
-    """Segments of nothing but poses, as somebody else annotated or averaged them."""
-    n = len(means)
-    poses = tuple(Pose(k, first, last, first, last) for k, (first, last) in enumerate(ranges))
-    lengths = np.array([last - first for first, last in ranges])
-    middles = np.array([0.5 * (first + last) for first, last in ranges])
-    return Segments(
-        poses, (), np.full(3, np.nan), None, means, None, np.broadcast_to(sigma, (n, 3)).copy(), None, lengths,
-        middles, lengths.astype(float),
-    )  # fmt: skip
-
-
-def test_ferraris_annotated_faces_reproduce_the_published_matrices(real_data):
-    folder = real_data / "imucal_ferraris"
-    recording = trihedron.read(folder / "example_ferraris_session.csv", rate_hz=102.4)
-    regions = {1: (540, 1271), -1: (1620, 2361), 2: (2814, 3298), -2: (3740, 4152), 3: (4522, 4975), -3: (5376, 5983)}
-    parts = [recording.accelerometer[first:last] for first, last in regions.values()]
-    means = np.array([part.mean(axis=0) for part in parts])
-    sigma = np.array([part.std(axis=0) / np.sqrt(len(part)) for part in parts])
-    segments = poses_of(means, sigma, regions.values())
-    alone = replace(recording, gyroscope=None)
-    automatic = trihedron.calibrate(alone, segments=segments, gravity_m_s2=9.81, method="faces")
-    told = trihedron.calibrate(alone, segments=segments, gravity_m_s2=9.81, method="faces", faces=list(regions))
-    np.testing.assert_array_equal(automatic.accelerometer.S, told.accelerometer.S)
-    published = json.loads((folder / "ferraris_result_imucal260.json").read_text())
-    S_a, b_a = other_form(told.accelerometer.S, told.accelerometer.b)
-    np.testing.assert_allclose(S_a, np.array(published["K_a"]) @ np.array(published["R_a"]), atol=3e-3)
-    np.testing.assert_allclose(b_a, published["b_a"], atol=3e-3)
 
 
 def test_ferraris_session_is_calibrated_by_method_one_and_refused_by_method_two(real_data, capsys):

@@ -16,6 +16,9 @@ from trihedron.records import FindingCode
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 from trihedron.simulate import hand_session, scenario_by_name
 
+EARTH_RAD_S = 7.292115e-5
+NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
+
 
 @pytest.fixture(scope="module")
 def posed():
@@ -47,10 +50,6 @@ def test_gyro_clock_and_lever_arm_come_out_within_their_error_bars(posed, found)
     assert np.all(np.abs(found.lever_arm.value - posed.arm) < 4.5 * found.lever_arm.std)
     assert np.all(found.lever_arm.std < 5e-3)
     assert np.degrees(np.arccos(found.vertical.value[2])) < 1.0
-
-
-EARTH_RAD_S = 7.292115e-5
-NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
 
 
 def fine_unit(seed, earth=None):
@@ -129,9 +128,7 @@ def test_a_log_of_a_gyro_alone_is_diagnosed_and_its_calibration_refused_in_one_s
 def test_a_log_without_poses_is_calibrated_by_its_reference_and_a_rates_own_clock_stretches_no_scale(table):
     n = len(table.log.time_s)
     level = np.tile([0.0, 0.0, G], (n, 1)) + 0.01 * np.sin(np.arange(3.0 * n)).reshape(-1, 3)
-    log = trihedron.Recording.from_arrays(
-        table.log.time_s, level, table.log.gyroscope, accelerometer_unit="m/s^2", gyroscope_unit="counts"
-    )
+    log = trihedron.Recording.from_arrays(table.log.time_s, level, table.log.gyroscope, gyroscope_unit="counts")
     result = trihedron.calibrate(log, reference=table.motion, gravity_m_s2=G)
     assert "before calibration" not in trihedron.report(result)
     fast = replace(table.motion, time_s=table.motion.time_s * (1.0 + 3e-4))
@@ -201,9 +198,8 @@ def test_attitudes_from_world_to_body_are_read_so_and_it_is_said():
 
 def test_a_reference_that_is_mirrored_or_of_another_motion_is_refused(posed):
     flip = np.diag([1.0, -1.0, 1.0])
-    mirrored = replace(
-        posed.motion, attitude=flip @ posed.motion.attitude @ flip, position=posed.motion.position @ flip
-    )
+    motion = posed.motion
+    mirrored = replace(motion, attitude=flip @ motion.attitude @ flip, position=motion.position @ flip)
     with pytest.raises(ValueError, match=r"mirrored against the log.*Turn the sign of one axis"):
         fit_reference(posed.log, mirrored, G)
     with pytest.raises(ValueError, match="share no motion"):
@@ -240,9 +236,8 @@ def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_ot
 def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own(posed, found):
     # The unit of this seed again, for nine seconds: by itself it shows less than the first.
     more = tracked(3, seconds=9)
-    result = trihedron.calibrate_references(
-        [posed.log, more.log], [posed.motion, more.motion], gravity_m_s2=G, frame="case"
-    )
+    both = [posed.log, more.log], [posed.motion, more.motion]
+    result = trihedron.calibrate_references(*both, gravity_m_s2=G, frame="case")
     one, other = result.references
     assert np.array_equal(one.gyroscope.S, other.gyroscope.S)
     assert not np.array_equal(one.gyroscope.b, other.gyroscope.b)
@@ -267,8 +262,6 @@ def test_an_attitude_that_the_gyro_itself_carried_is_not_independent(found):
 
 def test_as_many_references_behind_the_option_as_logs_before_it_are_one_each():
     words = ["calibrate", "A", "B", "--reference", "TA", "TB", "--gravity", "9.8"]
-    assert _a_reference_each(words) == [
-        "calibrate", "A", "B", "--reference", "TA", "--reference", "TB", "--gravity", "9.8",
-    ]  # fmt: skip
+    assert _a_reference_each(words) == [*words[:5], "--reference", *words[5:]]
     alone = ["diagnose", "--reference", "T", "A"]
     assert _a_reference_each(alone) == alone

@@ -21,15 +21,12 @@ import trihedron
 from small_session import made_once
 from trihedron.records import SensorCalibration
 
-
-@pytest.fixture(scope="module")
-def folder():
-    return made_once()
+SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
 
 
 @pytest.fixture(scope="module")
-def recording(folder):
-    return trihedron.read(folder / "log.csv")
+def recording():
+    return trihedron.read(made_once() / "log.csv")
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +35,9 @@ def result(recording):
 
 
 @pytest.fixture(scope="module")
-def right(folder, recording, result, tmp_path_factory):
+def right(recording, result, tmp_path_factory):
     """Arguments that each verb needs, all of them right."""
-    place = tmp_path_factory.mktemp("api")
+    folder, place = made_once(), tmp_path_factory.mktemp("api")
     x = np.random.default_rng(0).normal(size=(2000, 3))
     both = {"calibration": result, "recording": recording}
     return {
@@ -84,7 +81,6 @@ NO_ARRAY = (None, "x", object(), [["a"]], [[1, 2], [3]], np.ones((50, 3)) * 1j, 
 NO_ARRAY += (np.array([object()]), np.array(["2020-01-01"], "M8[s]"), np.array(1.0), {1, 2}, [10**400])
 NO_CALL = (3, "x", object(), [1], int, np.zeros(3))
 NO_TABLE = (object(), 3, np.zeros(3), b"x", "a\0b", [1])
-
 BY_KIND = {
     "float": (*NO_NUMBER, *NO_QUANTITY),
     "int": (*NO_NUMBER, 1.5, float("nan"), 10**400, Fraction(1, 3)),
@@ -127,19 +123,6 @@ OF_A_LIBRARY = re.compile(
 )
 
 
-def verbs():
-    return [name for name in trihedron.__all__ if inspect.isfunction(getattr(trihedron, name))]
-
-
-def wrong_for(name, annotation):
-    kinds = annotation.removesuffix(" | None")
-    listed = next((kind for kind in (kinds, *FIRST) if kind in BY_KIND and kind in kinds), None)
-    values = BY_KIND[listed or kinds]
-    if annotation.endswith("| None"):
-        values = [value for value in values if value is not None]
-    return [*values, *([-3] if name in ALSO_NEGATIVE else []), *([0] if name in ALSO_ZERO else [])]
-
-
 def rejected(what, ask):
     """That a call ends in one sentence of ours, raised by us."""
     try:
@@ -158,7 +141,8 @@ def rejected(what, ask):
     pytest.fail(f"{what} was taken")
 
 
-WALK = [(verb, name) for verb in verbs() for name in inspect.signature(getattr(trihedron, verb)).parameters]
+VERBS = [name for name in trihedron.__all__ if inspect.isfunction(getattr(trihedron, name))]
+WALK = [(verb, name) for verb in VERBS for name in inspect.signature(getattr(trihedron, verb)).parameters]
 
 
 @pytest.mark.parametrize(("verb", "name"), WALK)
@@ -170,14 +154,18 @@ def test_every_wrong_argument_of_every_verb_is_one_sentence_of_ours(right, verb,
         rejected(f"{verb}(nonsense=1)", lambda: ask("log.csv", "x.csv", nonsense=1))
         rejected(f"{verb}(rate_hz='x')", lambda: ask("log.csv", "x.csv", rate_hz="x"))
         return
-    for value in wrong_for(name, str(parameter.annotation)):
+    annotation = str(parameter.annotation)
+    kinds = annotation.removesuffix(" | None")
+    listed = next((kind for kind in (kinds, *FIRST) if kind in BY_KIND and kind in kinds), kinds)
+    wrong = [value for value in BY_KIND[listed] if value is not None or kinds == annotation]
+    for value in [*wrong, *([-3] if name in ALSO_NEGATIVE else []), *([0] if name in ALSO_ZERO else [])]:
         arguments = {**right[verb], name: value}
         rejected(f"{verb}({name}={value!r:.60})", lambda ask=ask, arguments=arguments: ask(**arguments))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_or_a_missing_argument_is_a_sentence():
-    for verb in verbs():
+    for verb in VERBS:
         rejected(verb, lambda verb=verb: getattr(trihedron, verb)(nonsense=1))
 
 
@@ -218,9 +206,9 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
 
 
 @pytest.fixture(scope="module")
-def results(folder, recording, result):
+def results(recording, result):
+    folder = made_once()
     rest = folder / "static.csv"
-    x = np.random.default_rng(0).normal(size=(2000, 2))
     return {
         "read": recording,
         "simulate": trihedron.simulate("six-faces", 4),
@@ -233,7 +221,7 @@ def results(folder, recording, result):
         "extend": trihedron.extend(result),
         "kalman": trihedron.kalman(recording, gravity_m_s2=9.80665),
         "allan": trihedron.allan(rest),
-        "allan_deviation": trihedron.allan_deviation(x, 100.0),
+        "allan_deviation": trihedron.allan_deviation(np.random.default_rng(0).normal(size=(2000, 2)), 100.0),
         "plan": trihedron.plan(),
         "apply": trihedron.apply(result, recording),
         "twin": trihedron.twin(recording, result),
@@ -284,9 +272,6 @@ def test_nobody_can_write_into_a_result_or_what_pickle_and_deepcopy_make_of_it_w
             assert type(copied) is type(one)
             seen[name] += len(arrays)
     assert sum(seen.values()) > 300
-
-
-SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
 
 
 @pytest.mark.parametrize("name", [*SHOWN, "read_calibration"])

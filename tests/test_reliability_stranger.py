@@ -14,17 +14,20 @@ import numpy as np
 import pytest
 
 import trihedron
-from small_session import G, copied, leftovers, made_once, run, started
+from small_session import G, copied, leftovers, made_once, run, started, usual
 from trihedron import _core
 from trihedron.documents import DocumentError, parse_json
 from trihedron.read import read_recording
-from written_session import usual
 
 # C without UTF-8; an unknown locale, no home and a dumb terminal.
 ENVIRONMENTS = (
     {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
     {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
 )
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+ONE_SECOND = 1.0
+LOADED = 4.0
+"""A machine with ten busy processes on two cores gives a process a fifth of one."""
 
 
 def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path):
@@ -53,19 +56,6 @@ def test_closed_streams_lose_no_result_and_reach_no_file(tmp_path, closed, statu
     assert leftovers(folder) == []
 
 
-@pytest.mark.parametrize("options", [[], ["--force"]])
-def test_of_writers_of_one_output_each_says_whether_it_wrote(tmp_path, options):
-    folder = copied(tmp_path)
-    line = ["convert", "log.csv", "-o", "one.csv", *options]
-    writers = [started(*line, cwd=folder) for _ in range(2)]
-    said = [writer.communicate(timeout=120)[1].decode() for writer in writers]
-    written = [writer.returncode == 0 for writer in writers]
-    assert sum(written) == (2 if options else 1)
-    assert all("left alone" in text for text, wrote in zip(said, written, strict=True) if not wrote)
-    assert read_recording(folder / "one.csv").n_samples == read_recording(folder / "log.csv").n_samples
-    assert leftovers(folder) == []
-
-
 def test_a_log_that_grows_while_it_is_read_is_what_it_was_at_some_moment(tmp_path):
     folder = copied(tmp_path)
     log = folder / "log.csv"
@@ -90,17 +80,6 @@ def test_a_key_given_twice_is_refused_and_not_the_last_taken(text):
         parse_json(text)
 
 
-@pytest.mark.parametrize(
-    "text", ["a = " + "[" * 5000 + "]" * 5000, ".".join("a" * 5000) + " = 1", "a = " + "{b=" * 3000 + "1" + "}" * 3000]
-)
-def test_toml_nested_beyond_reason_is_refused(tmp_path, text):
-    from trihedron.simulate.scenario_file import read_scenario
-
-    (tmp_path / "s.toml").write_text(text + "\n")
-    with pytest.raises(ValueError, match="nested too deeply"):
-        read_scenario(tmp_path / "s.toml")
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
 def test_names_of_files_break_no_line_of_a_repr_and_those_that_are_no_text_are_spelled_out(tmp_path):
     folder = copied(tmp_path)
@@ -122,13 +101,6 @@ def test_names_of_files_break_no_line_of_a_repr_and_those_that_are_no_text_are_s
         assert json.load(stream)
 
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-
-ONE_SECOND = 1.0
-LOADED = 4.0
-"""A machine with ten busy processes on two cores gives a process a fifth of one."""
-
-
 @pytest.fixture(scope="module")
 def long_log(tmp_path_factory):
     """Five million rows: every command on it takes seconds."""
@@ -144,19 +116,13 @@ def long_log(tmp_path_factory):
     return path
 
 
-def wait_until_it_listens(process):
-    """Until the command has its handlers: the interpreter itself starts for some 50 ms."""
-    while True:
-        with open(f"/proc/{process.pid}/status") as status:
-            caught = next(int(line.split()[1], 16) for line in status if line.startswith("SigCgt"))
-        if caught >> (signal.SIGTERM - 1) & 1 or process.poll() is not None:
-            return
-        time.sleep(0.005)
-
-
 def interrupted(process, number, after_s):
-    """Status, stderr and how long the process lived on."""
-    wait_until_it_listens(process)
+    """Status, stderr and how long the process lived on, from when it has its handlers: it starts for some 50 ms."""
+    caught = 0
+    while not caught >> (signal.SIGTERM - 1) & 1 and process.poll() is None:
+        with open(f"/proc/{process.pid}/status") as now:
+            caught = next(int(line.split()[1], 16) for line in now if line.startswith("SigCgt"))
+        time.sleep(0.005)
     time.sleep(after_s)
     if process.poll() is not None:
         process.communicate()

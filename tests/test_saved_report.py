@@ -6,11 +6,14 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 import pytest
 
 import trihedron
+from small_session import G, simulated, usual
 from trihedron.cli import COMMANDS, main
 from trihedron.errors import InputError
 from trihedron.records import Finding, FindingCode, Severity
@@ -32,7 +35,9 @@ from trihedron.report.saved import report_of, with_report
 from trihedron.report.text import Style, to_text
 from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
-from written_session import G, simulated, usual
+
+HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
 
 
 def chart():
@@ -79,9 +84,7 @@ def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
 )
 def test_what_is_of_another_kind_than_it_should_be_is_refused(path, value):
     saved = json.loads(json_text(with_report({}, document())))
-    place = saved["report"]["document"]
-    for key in path[:-1]:
-        place = place[key]
+    place = reduce(getitem, path[:-1], saved["report"]["document"])
     assert path[-1] in place if isinstance(place, dict) else True
     place[path[-1]] = value
     with pytest.raises(InputError, match="malformed"):
@@ -105,12 +108,9 @@ def test_the_command_lays_out_what_another_one_saved(tmp_path, capsys):
     assert "not a saved result" in capsys.readouterr().err
 
 
-GRAVITY = float(G)
-
-
 def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
     recording, result, _ = usual()
-    checked = trihedron.verify(result, recording, gravity_m_s2=GRAVITY)
+    checked = trihedron.verify(result, recording, gravity_m_s2=float(G))
     document = verification_report(checked.verification, checked.segments)
     moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
     assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
@@ -137,10 +137,9 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     # The figure is printed to two digits of its uncertainty, in mm/s².
     assert abs(float(line[1].replace("−", "-")) - 1000.0 * expected[0]) < float(line[2])
     other = simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0), seed=4)
-    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=GRAVITY)
-    common = next(
-        one for one in several.model.repeated if (one.parameter.id, one.parameter.name) == ("accel-bias", "x")
-    )
+    several = trihedron.calibrate_sessions([recording, other], gravity_m_s2=float(G))
+    biases = (one for one in several.model.repeated if one.parameter.id == "accel-bias")
+    common = next(one for one in biases if one.parameter.name == "x")
     # Two sessions of one simulated unit: their common bias is that of the first within both uncertainties.
     assert abs(common.value - expected[0]) < 5.0 * common.std
     again = trihedron.diagnose(recording, calibration=result)
@@ -193,14 +192,10 @@ def test_small_numbers_have_one_notation_in_tables_and_sentences():
     one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
     (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
     assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
-
-
-@pytest.mark.parametrize(
-    ("exponent", "unit", "printed"),
-    [(-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s"), (-3, "", "10⁻³")],
-)
-def test_a_power_of_ten_is_a_prefix_where_the_unit_takes_one(exponent, unit, printed):
-    assert unit_with_power(exponent, unit) == printed
+    # A power of ten is a prefix where the unit takes one.
+    for exponent, unit, printed in ((-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s")):
+        assert unit_with_power(exponent, unit) == printed
+    assert unit_with_power(-3, "") == "10⁻³"
 
 
 def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_a_gap():
@@ -209,20 +204,13 @@ def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_
     assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
 
 
-HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
-ROW = ("tilt error after a rotation", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
-
-
-def long_document():
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
     table = Table(HEAD, (ROW, ROW), "What every domain says, " + "at length, " * 12)
     facts = Facts((("a label that is far longer than half of a narrow terminal has columns", "text " * 40),))
     section = Section("Where", (table, facts, Paragraph("word " * 80)))
-    return Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
-
-
-@pytest.mark.parametrize("width", [60, 80, 200])
-def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
-    text = to_text(long_document(), width=width)
+    long = Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
+    text = to_text(long, width=width)
     assert max(len(line) for line in text.splitlines()) <= width
     # Heads, and names of rows, may stand on several lines.
     said = text.split()
@@ -235,22 +223,18 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
 def test_names_from_a_log_steer_no_terminal_and_stay_one_line_of_a_page():
     hostile = Document("t", "log\x1b[2J.csv", "v", True, (Section("S", (Paragraph("a\x9bb"),)),))
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", to_text(hostile, style=Style(80)))
-    page = to_html(
-        Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, (Section("Poses of a\nb", ()),))
-    )
+    sections = (Section("Poses of a\nb", ()),)
+    page = to_html(Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, sections))
     assert r"/logs/a\nNOT TO BE TRUSTED\t.csv" in page
     assert "a\nNOT TO BE" not in page
     assert not re.search("a\nb|[\x00-\x09\x0b-\x1f\x7f-\x9f]", page)
 
 
-def piped(*words, **environment):
-    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
-    program = [sys.executable, "-m", "trihedron", *words]
-    return subprocess.run(program, env=known | environment, capture_output=True, check=True).stdout
-
-
 def test_a_pipe_gets_no_colour_columns_are_obeyed_and_without_utf_8_it_is_ascii():
-    out = piped("plan", COLUMNS="64", PYTHONIOENCODING="cp1252").decode("ascii")
+    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
+    known |= {"COLUMNS": "64", "PYTHONIOENCODING": "cp1252"}
+    done = subprocess.run([sys.executable, "-m", "trihedron", "plan"], env=known, capture_output=True, check=True)
+    out = done.stdout.decode("ascii")
     assert "deg/s/sqrt(Hz)" in out
     assert "?" not in out
     assert "\x1b" not in out

@@ -14,24 +14,10 @@ import pytest
 from trihedron import _core
 
 STUB = ast.parse((Path(_core.__file__).parent / "_core.pyi").read_text())
-
-
-def callables() -> dict[str, ast.arguments]:
-    """Every function, constructor and method of the compiled core with its declared parameters."""
-    found: dict[str, ast.arguments] = {}
-    for node in STUB.body:
-        if isinstance(node, ast.FunctionDef):
-            found[node.name] = node.args
-        elif isinstance(node, ast.ClassDef):
-            for item in node.body:
-                if isinstance(item, ast.FunctionDef) and not item.decorator_list:
-                    found[f"{node.name}.{item.name}"] = item.args
-    return found
-
-
-CALLABLES = callables()
-
-
+# Functions and constructors of the compiled core with their declared parameters.
+CALLABLES = {node.name: node.args for node in STUB.body if isinstance(node, ast.FunctionDef)}
+CLASSES = [node for node in STUB.body if isinstance(node, ast.ClassDef)]
+CALLABLES |= {kind.name: one.args for kind in CLASSES for one in kind.body if getattr(one, "name", "") == "__new__"}
 KINDS = ("empty", "not finite", "flat", "deep", "no number")
 ARRAYS = (
     np.zeros((0, 3)), np.full((4, 3), np.nan), np.arange(5.0), np.ones((2, 2, 2, 2)), np.array(["x", None], object),
@@ -51,14 +37,14 @@ def odd(annotation: str, kind: int) -> object:
 
 
 @pytest.mark.parametrize("first", range(len(KINDS)), ids=KINDS)
-@pytest.mark.parametrize("name", [n for n in CALLABLES if "." not in n or n.endswith("__new__")])
+@pytest.mark.parametrize("name", CALLABLES)
 def test_odd_arguments_are_answered_or_refused_in_words(name, first):
     declared = [a for a in (*CALLABLES[name].args, *CALLABLES[name].kwonlyargs) if a.annotation]
     # Another kind for every argument in turn.
     given = {a.arg: odd(ast.unparse(a.annotation), (first + k) % len(KINDS)) for k, a in enumerate(declared)}
     said = "answered"
     try:
-        getattr(_core, name.removesuffix(".__new__"))(**given)
+        getattr(_core, name)(**given)
     except (ValueError, TypeError, OverflowError) as rejection:
         said = str(rejection)
     assert said
@@ -119,59 +105,38 @@ def test_the_allan_kernels_refuse_an_array_they_would_have_to_copy():
 
 
 LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS", "POLARS_MAX_THREADS")
-
-
-FIT = """
-import hashlib
-import numpy as np
-import trihedron
-from trihedron import _core
-rng = np.random.default_rng(3)
-d = rng.standard_normal((60_000, 3))
-raw = 9.81 * d / np.linalg.norm(d, axis=1)[:, None] * [1.01, 0.99, 1.02] + 0.1 + rng.normal(0.0, 1e-2, d.shape)
-fit = _core.fit_norm(raw, 1e-4 * np.eye(3)[None], _core.NormSettings(9.81))
-deviation = _core.allan_variance(raw, [1, 8, 512], _core.AllanKind.Overlapping)[0]
-attitude = trihedron.integrate_rate(np.arange(60_000) / 100.0, d)
-found = (fit.S, fit.b, fit.covariance, deviation, attitude)
-print([hashlib.sha256(np.ascontiguousarray(x).tobytes()).hexdigest() for x in found])
-"""
-
-
-def test_sums_shared_between_threads_have_the_same_bits():
-    assert len({_printed(threads) for threads in ("1", "3")}) == 1
-
-
-def _printed(threads):
-    path = os.pathsep.join(p for p in sys.path if p)
-    environment = {**os.environ, **dict.fromkeys(LIBRARIES, threads), "PYTHONPATH": path}
-    return subprocess.run([sys.executable, "-c", FIT], env=environment, capture_output=True, check=True).stdout
-
-
 PROGRAM = """
 import json, numpy as np, trihedron
 from trihedron import _core
 rng = np.random.default_rng(8)
-t = np.cumsum(rng.uniform(0.005, 0.015, 1500)); w = 2.0 * rng.standard_normal((1500, 3))
-up = rng.standard_normal((37, 3)); up *= 9.8 / np.linalg.norm(up, axis=1, keepdims=True)
+t = np.cumsum(rng.uniform(0.005, 0.015, 60_000)); w = 2.0 * rng.standard_normal((60_000, 3))
+up = rng.standard_normal((60_000, 3)); up *= 9.8 / np.linalg.norm(up, axis=1, keepdims=True)
 readings = up @ np.array([[1.02, 0, 0], [0.01, 0.97, 0], [-0.02, 0.03, 1.0]]).T + [0.1, -0.2, 0.3]
-readings += 1e-3 * rng.standard_normal((37, 3))
-out = [trihedron.integrate_rate(t, w)[-1], *_core.block_statistics(w, 7)[:2]]
+readings += 1e-3 * rng.standard_normal((60_000, 3))
+out = [trihedron.integrate_rate(t, w)[[1500, -1]], *_core.block_statistics(w, 7)[:2]]
+out += _core.allan_variance(readings, [1, 8, 512], _core.AllanKind.Overlapping)[:1]
 edges, anchors = np.array([[3, 700], [701, 1490]]), np.array([[-1.0, 8.0], [6.0, 20.0]])
 zero = np.full((2, 3), 0.01)
 noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)
 out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, noise)
-for symmetric in (False, True):
-    fit = _core.fit_norm(readings, 1e-6 * np.eye(3)[None], _core.NormSettings(9.8, symmetric=symmetric))
+for few, symmetric in ((readings[:37], False), (readings[:37], True), (readings, False)):
+    fit = _core.fit_norm(few, 1e-6 * np.eye(3)[None], _core.NormSettings(9.8, symmetric=symmetric))
     out += [fit.S, fit.b, fit.covariance / fit.covariance.max(), fit.residuals]
 print(json.dumps(np.concatenate([np.ravel(part) for part in out]).tolist()))
 """
 
 
 @cache
-def answers(instructions: str) -> np.ndarray:
-    environment = os.environ | {"TRIHEDRON_INSTRUCTIONS": instructions}
+def answers(instructions: str, threads: str = "1") -> np.ndarray:
+    path = os.pathsep.join(p for p in sys.path if p)
+    environment = {**os.environ, **dict.fromkeys(LIBRARIES, threads), "PYTHONPATH": path}
+    environment["TRIHEDRON_INSTRUCTIONS"] = instructions
     done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)
     return np.array(json.loads(done.stdout))
+
+
+def test_sums_shared_between_threads_have_the_same_bits():
+    np.testing.assert_array_equal(answers("widest", "3"), answers("widest"))
 
 
 @pytest.mark.parametrize("instructions", ["avx2", "portable"])

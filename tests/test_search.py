@@ -18,6 +18,12 @@ from trihedron.diagnose.session.starting_point import start_state
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import contiguous, core_state
 from trihedron.session.noise import ANYTHING
+from trihedron.simulate import diagnosed_sizes
+
+CASES = {
+    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
+    "timing-jitter": {"jitter_s": 1e-3},
+}
 
 
 @cache
@@ -38,23 +44,12 @@ def test_a_move_is_found_by_its_pose_whichever_moves_were_left_out_before():
     assert [left.move_ranges[m] for m in left.moves_from(begins)] == [obs.move_ranges[9]]
 
 
-def refitted(model, strengths):
-    """The model's session without effects at given strengths."""
-    state = model.fitted.state
-    session = model.obs.model(state.gravity, None, is_scatter_free=True)
-    return session.fit(state=core_state(state), strengths=strengths, force_effect=None, rate_effect=None)
-
-
-def term(model, effect_id, label=""):
-    effect = next(one for one in catalogue() if one.id == effect_id)
-    variant = next(v for v in effect.variants(model.context) if label in v.label)
-    return Term(effect, variant, effect.sizes(model.context, variant))
-
-
 @pytest.mark.parametrize("effect_id", ["accel-quadratic", "gyro-g-sensitivity", "accel-gyro-time-offset"])
 def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effect_id):
     model = fitted()
-    one = term(model, effect_id)
+    effect = next(one for one in catalogue() if one.id == effect_id)
+    variant = effect.variants(model.context)[0]
+    one = Term(effect, variant, effect.sizes(model.context, variant))
     core = model.fitted.core
     columns = (contiguous(one.distortion.force), contiguous(one.distortion.rate))
     asked = [(*columns, one.sizes.tolist())]
@@ -71,7 +66,9 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     # The strengths found with it, and what a look there says beside the plain session at the same strengths.
     ((tuned, strengths, value, covariance),) = core.evidence(asked, [core.strengths], ANYTHING)
     ((looked, at, spread),) = core.candidate_gains(asked, [1.0], [strengths])
-    plain = refitted(model, strengths).log_marginal
+    state = model.fitted.state
+    session = model.obs.model(state.gravity, None, is_scatter_free=True)
+    plain = session.fit(state=core_state(state), strengths=strengths, force_effect=None, rate_effect=None).log_marginal
     assert tuned - plain == pytest.approx(looked[0, 0], abs=0.05)  # moves are carried anew: second order
     np.testing.assert_allclose(at, value, atol=0.02 * np.sqrt(np.diag(covariance)).max())
     np.testing.assert_allclose(spread, covariance, rtol=1e-6)
@@ -100,6 +97,8 @@ def test_a_long_delay_is_a_delay_of_that_length():
     assert first.id == "accel-gyro-time-offset"
     # 40 ms were called 26 ms and a lag of -14 ms; half a millisecond is a twentieth of a sample.
     assert first.parameters[0].value == pytest.approx(0.04, abs=5e-4)
+    # A simulation of what was found has it with its sign.
+    assert diagnosed_sizes([first.to_dict()])[0] == [(first.id, {"offset_s": pytest.approx(0.04, abs=5e-4)})]
     assert not any(p.name.endswith("_lag") and p.value < 0.0 for e in d.effects for p in e.parameters)
     for effect in d.effects:  # nothing whose size is unknown
         assert any(abs(p.value) > p.std for p in effect.parameters), effect.id
@@ -135,12 +134,6 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     thermal = effects["gyro-thermal-bias"]
     assert thermal.confounded_with == ("gyro-bias-drift",)
     assert "temperature" in thermal.separating_experiment
-
-
-CASES = {
-    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
-    "timing-jitter": {"jitter_s": 1e-3},
-}
 
 
 @pytest.mark.parametrize("effect_id", CASES)

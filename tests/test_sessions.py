@@ -111,16 +111,13 @@ def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions)
     assert all(one.between is not None for one in dated.model.repeated)
 
 
-def test_a_recording_that_cannot_be_calibrated_is_left_out_with_its_reason(four_sessions):
+def test_a_recording_that_cannot_be_calibrated_is_left_out_and_dates_that_logs_lack_are_asked_for(four_sessions):
     still = Recording(np.arange(500) / 50.0, np.tile([0.0, 0.0, G], (500, 1)) + 1e-3, None, 50.0, source="still.csv")
     result = trihedron.calibrate_sessions([*four_sessions[:2], still], gravity_m_s2=G)
     assert result.model.left_out[0][0] == "still.csv"
     assert len(result.model.sessions) == 2
     with pytest.raises(ValueError, match="two recordings at least"):
         trihedron.calibrate_sessions([four_sessions[0], still], gravity_m_s2=G)
-
-
-def test_dates_that_are_not_in_the_logs_are_asked_for(four_sessions):
     with pytest.raises(ValueError, match="give labels"):
         trihedron.calibrate_sessions(four_sessions, by="date", gravity_m_s2=G)
 
@@ -176,9 +173,8 @@ def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
             y = 1e-4 * rng.normal(size=21)
             branch = 1 if k % 2 else -1
             y[picked] += 1e-5 * T + size * branch
-            sessions.append(
-                made(y, np.eye(21) * 1e-8, temperature_degc=T, temperature_range_degc=(T, T), branch=branch)
-            )
+            at_T = {"temperature_degc": T, "temperature_range_degc": (T, T), "branch": branch}
+            sessions.append(made(y, np.eye(21) * 1e-8, **at_T))
         found[size] = {term.id: term.hysteresis for term in thermal_model(sessions).terms}
     assert all(value is None for value in found[0.0].values())
     # Twelve sessions of 1e-4: 3e-5; four standard errors.

@@ -209,7 +209,6 @@ def test_hysteresis_leaves_an_offset_with_the_sign_of_the_way_it_came():
     assert np.abs(error[middle[0]]).max() == 0.0
     # x rose from 0 to g: it lags below; z fell: it lags above. Then x falls and z rises by more than twice the play.
     assert np.allclose(error[middle[1]], [-0.02, 0.0, 0.02], atol=1e-12)
-
     assert np.allclose(error[middle[2]], [0.02, 0.0, -0.02], atol=1e-12)
 
 

@@ -106,8 +106,7 @@ def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, 
 
 def test_a_unit_of_a_part_without_tolerances_is_the_part():
     part = profile_by_name("ideal")
-    accelerometer, gyroscope = part.unit(7)
-    for unit, nominal in ((accelerometer, part.accelerometer), (gyroscope, part.gyroscope)):
+    for unit, nominal in zip(part.unit(7), (part.accelerometer, part.gyroscope), strict=True):
         np.testing.assert_array_equal(unit.S, nominal.S)
         np.testing.assert_array_equal(unit.b, nominal.b)
 

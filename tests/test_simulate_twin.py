@@ -52,21 +52,18 @@ def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, a
     poses = segments.poses
     assert np.array_equal(copy.time_s, recording.time_s - recording.time_s[0])
     assert len(truth.poses) == len(poses)
-
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     # Pose means: what the calibration leaves unexplained, plus the slow noise of both.
     apart = (means(recording.accelerometer, poses) - means(copy.accelerometer, poses)) @ accel.S.T
     unexplained = np.linalg.norm(means(correct(recording.accelerometer, accel.S, accel.b), poses), axis=1) - gravity
     slow = 0.02
     assert np.sqrt(np.mean(apart**2)) < 2.0 * np.sqrt(np.mean(unexplained**2)) + slow
-
     # Moves: the same gravity before and after, the same rates on the way.
     moving = np.concatenate([np.arange(move.start + 1, move.stop - 1) for move in segments.moves])
     difference = ((recording.gyroscope - copy.gyroscope) @ gyro.S.T)[moving]
     assert np.sqrt(np.mean(difference**2)) < 0.02 * np.sqrt(np.mean(truth.angular_rate_rad_s[moving] ** 2))
     shaken = ((recording.accelerometer - copy.accelerometer) @ accel.S.T)[moving]
     assert np.sqrt(np.mean(shaken**2)) < 0.02 * gravity
-
     for name, factor in (("accelerometer", accel_factor), ("gyroscope", gyro_factor)):
         original, twin_of_it = getattr(recording, name), getattr(copy, name)
         ratio = spectrum(twin_of_it, poses) / spectrum(original, poses)

@@ -74,9 +74,6 @@ def test_corrected_readings_are_those_of_the_whole_and_a_stopped_run_goes_on(who
     calibration = trihedron.calibrate(whole, gravity_m_s2=G)
     out = tmp_path / "si.npy"
 
-    class Stopped(Exception):
-        pass
-
     def stop(fraction, _text):
         if fraction > 0.5:
             raise Stopped
@@ -169,19 +166,6 @@ class Stopped(Exception):
     pass
 
 
-def stop_after(monkeypatch, times):
-    """The pass ends as if killed right after the checkpoint was written for the ``times``-th time."""
-    keep, left = Checkpoint.keep, [times]
-
-    def counted(self, rows, state):
-        keep(self, rows, state)
-        left[0] -= 1
-        if not left[0]:
-            raise Stopped
-
-    monkeypatch.setattr(Checkpoint, "keep", counted)
-
-
 def test_the_state_of_another_stream_is_refused():
     stream = _core.AllanStream(1, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET)
     stream.extend(np.arange(300.0)[:, None])
@@ -206,8 +190,17 @@ def test_the_noise_of_a_long_log_goes_on(path, tmp_path, monkeypatch):
     monkeypatch.setattr(identifying.open_chunks(path, COLUMNS).__class__.chunks, "__defaults__", (2000, 0))
     kept = tmp_path / "pass"
     wanted = identifying.noise_of_file(path, columns=COLUMNS, rate_hz=100.0)
+    keep, left = Checkpoint.keep, [2]
+
+    def stopped(self, rows, state):
+        """As if killed right after the checkpoint was written for the second time."""
+        keep(self, rows, state)
+        left[0] -= 1
+        if not left[0]:
+            raise Stopped
+
     with monkeypatch.context() as patch:
-        stop_after(patch, 2)
+        patch.setattr(Checkpoint, "keep", stopped)
         with pytest.raises(Stopped):
             identifying.noise_of_file(path, columns=COLUMNS, rate_hz=100.0, checkpoint=kept)
     with pytest.raises(ValueError, match="other columns, units or rate"):

@@ -1,5 +1,7 @@
 """A table that turns at known speeds, the unit on it anyhow: an own generator, with an arm and a table out of level."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -12,10 +14,11 @@ from trihedron.records import Recording
 G, RATE_HZ, DEG = 9.81, 100.0, np.pi / 180.0
 
 
-def on_a_table(seed, speeds, *, rest_s=4.0, spin_s=8.0, tilt_deg=0.5, arm_m=0.03, wobble=0.0):
-    """A recording in counts and its truth: rest, a turn about the table's axis, rest, by hand to any other pose."""
+@cache
+def segmented(seed):
+    """A recording in counts, its segments and truth: rest, a turn about the table's axis, rest, by hand to any pose."""
     rng = np.random.default_rng(seed)
-    axis = Rotation.from_euler("x", tilt_deg, degrees=True).apply([0.0, 0.0, 1.0])
+    axis = Rotation.from_euler("x", 0.5, degrees=True).apply([0.0, 0.0, 1.0])
     now = Rotation.random(random_state=seed)
     attitudes, pulls = [], []
 
@@ -23,15 +26,14 @@ def on_a_table(seed, speeds, *, rest_s=4.0, spin_s=8.0, tilt_deg=0.5, arm_m=0.03
         attitudes.append(turned.as_quat())
         pulls.append(np.zeros((len(turned), 3)) if pull is None else pull)
 
-    still = int(rest_s * RATE_HZ)
-    for k, speed in enumerate(speeds):
+    still = int(4.0 * RATE_HZ)
+    for k, speed in enumerate([45.0, 90.0, -180.0] * 4):
         add(Rotation.concatenate([now] * still))
         ramp = np.linspace(0.0, 1.0, int(RATE_HZ))
-        rate = np.concatenate([ramp, np.ones(int(spin_s * RATE_HZ)), ramp[::-1]]) * speed * DEG
-        rate = rate * (1.0 + wobble * rng.normal())
+        rate = np.concatenate([ramp, np.ones(int(8.0 * RATE_HZ)), ramp[::-1]]) * speed * DEG
         turned = Rotation.from_rotvec(axis * (np.cumsum(rate) / RATE_HZ)[:, None]) * now
         w = axis * rate[:, None]
-        add(turned, np.cross(w, np.cross(w, turned.apply(arm_m * rng.normal(size=3)))))
+        add(turned, np.cross(w, np.cross(w, turned.apply(0.03 * rng.normal(size=3)))))
         now = turned[-1]
         add(Rotation.concatenate([now] * still))
         after = Rotation.random(random_state=1000 * seed + k)
@@ -51,22 +53,13 @@ def on_a_table(seed, speeds, *, rest_s=4.0, spin_s=8.0, tilt_deg=0.5, arm_m=0.03
     inverse_w, inverse_f = np.linalg.inv(own_w), np.linalg.inv(own_f)
     truth = ConfidenceTruth(inverse_f * lsb_f, -inverse_f @ b_f, inverse_w * lsb_w, -inverse_w @ b_w)
     units = {"accelerometer_unit": "counts", "gyroscope_unit": "counts"}
-    return Recording(np.arange(len(raw_w)) / RATE_HZ, raw_f, raw_w, RATE_HZ, **units), lower(truth)
+    recording = Recording(np.arange(len(raw_w)) / RATE_HZ, raw_f, raw_w, RATE_HZ, **units)
+    return recording, segment(recording), lower(truth)
 
 
-def segmented(seed):
-    recording, truth = on_a_table(seed, [45.0, 90.0, -180.0] * 4)
-    return recording, segment(recording), truth
-
-
-@pytest.fixture(scope="module")
-def table():
-    return segmented(0)
-
-
-def test_known_speeds_in_unknown_orientations_make_a_gyro_three_times_as_certain(table):
+def test_known_speeds_in_unknown_orientations_make_a_gyro_three_times_as_certain():
     scores = []
-    for recording, segments, truth in (table, segmented(1)):
+    for recording, segments, truth in (segmented(0), segmented(1)):
         plain = calibrate(recording, segments=segments, gravity_m_s2=G).gyroscope
         result = calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0] * 4)
         gyro = result.gyroscope
@@ -79,27 +72,26 @@ def test_known_speeds_in_unknown_orientations_make_a_gyro_three_times_as_certain
     assert np.abs(scores).max() < 4.0
 
 
-def test_the_uncertainty_of_the_speed_is_in_every_scale(table):
-    recording, segments, truth = table
+def test_the_uncertainty_of_the_speed_is_in_every_scale():
+    recording, segments, truth = segmented(0)
     said = [45.09, 90.18, -180.36] * 4
-    gyro = calibrate(
-        recording, segments=segments, gravity_m_s2=G, turntable_deg_s=said, turntable_sigma=0.002
-    ).gyroscope
+    stated = {"turntable_deg_s": said, "turntable_sigma": 0.002}
+    gyro = calibrate(recording, segments=segments, gravity_m_s2=G, **stated).gyroscope
     assert np.abs((gyro.S - truth.S_w) / gyro.sigma_S).max() < 4.0
     # Two parts in a thousand beside one in ten thousand from the moves: the table shows what axes have to each other.
     assert np.diag(gyro.sigma_S / gyro.S).min() > 5e-5
 
 
-def test_speeds_that_the_rest_of_the_log_contradicts_are_said_and_do_no_harm(table):
-    recording, segments, truth = table
+def test_speeds_that_the_rest_of_the_log_contradicts_are_said_and_do_no_harm():
+    recording, segments, truth = segmented(0)
     result = calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[47.0, 94.0, 188.0] * 4)
     said = next(one for one in result.findings if one.code.value == "turntable")
     assert "+4.3 % on average" in said.seen
     assert np.abs((result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S).max() < 4.0
 
 
-def test_another_number_of_speeds_is_refused_with_the_turns_that_were_found(table):
-    recording, segments, _ = table
+def test_another_number_of_speeds_is_refused_with_the_turns_that_were_found():
+    recording, segments, _ = segmented(0)
     with pytest.raises(ValueError, match=r"3 speeds were given and 12 steady turns were found \(seconds 5\.3-"):
         calibrate(recording, segments=segments, gravity_m_s2=G, turntable_deg_s=[45.0, 90.0, 180.0])
     with pytest.raises(ValueError, match="leave them, or the reference, out"):

@@ -25,15 +25,8 @@ from trihedron.simulate.device.faults import Sent
 from trihedron.simulate.device.serving import Device
 
 mpl.use("Agg")
-
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
-
-
-def shown_to_run(path):
-    """(language, status of the last command, text); a block of a real board or a real log says ``not-run``."""
-    for block in blocks(path):
-        if block.language in ("sh", "python") and block.said != "not-run":
-            yield block.language, int(next(iter(re.findall(r"exit=(\d)", block.said)), 0)), block.text
+PAGE = DOCS / "worked-example.md"
 
 
 def commands(body):
@@ -49,7 +42,9 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     names = {}
     n_run = 0
-    for language, status, body in shown_to_run(path):
+    for said_of_it, language, body in blocks(path):
+        if language not in ("sh", "python") or said_of_it == "not-run":
+            continue  # a block of a real board or a real log
         if language == "python":
             exec(compile(body, path.name, "exec"), names)
             # What a comment promises is what is printed.
@@ -61,7 +56,8 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
         for i, words in enumerate(shown):
             got = main(words)
             said = capsys.readouterr()
-            expected = status if i == len(shown) - 1 else 0
+            # A block says the status of its last command.
+            expected = int(next(iter(re.findall(r"exit=(\d)", said_of_it)), 0)) if i == len(shown) - 1 else 0
             assert got == expected, f"trihedron {shlex.join(words)}\n{said.out}\n{said.err}"
             n_run += 1
     assert n_run >= 3
@@ -87,9 +83,8 @@ def test_the_notebook_runs_and_was_run(tmp_path, monkeypatch):
             else:
                 exec(compile(ast.Module([*body, last], []), "cell", "exec"), names)
         kept = {kind: "".join(one) for given in cell["outputs"] for kind, one in given.get("data", {}).items()}
-        assert words_of("".join("".join(given.get("text", ())) for given in cell["outputs"])) == words_of(
-            printed.getvalue()
-        )
+        said = "".join("".join(given.get("text", ())) for given in cell["outputs"])
+        assert words_of(said) == words_of(printed.getvalue())
         if shown is not None:
             assert words_of(kept["text/plain"]) == words_of(repr(shown))
         if "text/html" in kept:
@@ -150,9 +145,6 @@ def test_capture_in_python_runs_as_shown(tmp_path, monkeypatch, capsys):
     assert trihedron.read("log.csv").n_samples == 300
 
 
-PAGE = DOCS / "worked-example.md"
-
-
 def shown(language):
     return [block for block in blocks(PAGE) if block.language == language]
 
@@ -180,16 +172,13 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert Path("extended.json").is_file()
 
 
-SHORTER = "n_poses = 12\\npose_s = 4\\n"
-
-
 @pytest.fixture(scope="module")
 def names(tmp_path_factory, without_corners):  # noqa: ARG001
     """What the script leaves, its sessions shorter than they are printed."""
     script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
     session = 'kind = "hand"\\n'
     assert script.count(session) == 2
-    script = script.replace(session, session + SHORTER)
+    script = script.replace(session, session + "n_poses = 12\\npose_s = 4\\n")
     left = {}
     with (
         contextlib.chdir(tmp_path_factory.mktemp("tutorial")),

@@ -46,7 +46,8 @@ def segments_from_truth(recording, truth, trim_s=0.05):
 
 
 def codes(findings):
-    return {finding.code for finding in findings}
+    """Codes of findings, or of those of a result."""
+    return {finding.code for finding in getattr(findings, "findings", findings)}
 
 
 def z_scores(found, truth):

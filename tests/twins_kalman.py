@@ -13,7 +13,6 @@ ARTICLE_CONSTANTS = np.array(
     ]
 ) / [GRAVITY, GRAVITY, GRAVITY, 1.0]
 """Published constants of the article, V/(m/s²) and V, rows X, Y, Z."""
-
 DIVIDING_HEAD_ANGLES_DEG = np.array([(p, r) for r in range(0, 90, 10) for p in range(0, 360, 10)], dtype=float)
 """(324, 2) pitch and roll: a full circle of pitch by 10° at each roll of 0, 10 … 80°."""
 

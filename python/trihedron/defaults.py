@@ -5,7 +5,7 @@ from trihedron.errors import InputError
 ACCURACY = "accel 0.1 %, gyro 0.2 %"
 """Standard uncertainties of the worst scale at which the guide asks for no more poses."""
 FALSE_ALARM = 0.01
-"""Probability that a diagnosis calls a healthy recording anything but consistent."""
+"""Probability that a healthy recording, unit or fleet is called anything but consistent."""
 
 
 def check_alpha(alpha: float) -> None:

@@ -10,6 +10,9 @@ LEAST_P = 1e-300
 NORMAL_95 = 1.96
 """Half-width of a 95 % interval of a normal variate, in standard deviations."""
 
+FALSE_ALARM = 1e-3
+"""Probability that any one test of a fit, or of what is held against it, rejects what is sound."""
+
 
 def chdtrc(dof: float, value: float) -> float:
     """Probability that a chi-square variate exceeds ``value``."""

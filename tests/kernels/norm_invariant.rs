@@ -24,11 +24,6 @@ fn of<'a>(values: &'a [Vector3<f64>], noise: &'a [Matrix3<f64>]) -> Readings<'a>
     }
 }
 
-/// One count per axis.
-fn quiet() -> [Matrix3<f64>; 1] {
-    [Matrix3::identity() * 1e-6]
-}
-
 proptest! {
     #[test]
     fn the_jacobian_is_the_derivative(e in nine(), u in prop::array::uniform3(-1.0..1.0f64), symmetric: bool) {
@@ -60,7 +55,7 @@ proptest! {
         let frame = if symmetric { Frame::Symmetric } else { Frame::Lower };
         let truth = in_frame(&triad(e), frame).expect("regular");
         let values = readings(&truth, &cube_poses());
-        let noise = quiet();
+        let noise = [Matrix3::identity() * 1e-6];
         let found = fit(of(&values, &noise), &settings(frame), None).expect("fits");
         prop_assert!(found.stop.is_converged());
         prop_assert_eq!(found.certainty.rank, 9);

@@ -1,11 +1,11 @@
 //! Poisson integration: every instruction set against single steps. Order, derivatives, input: `tests/test_attitude.py`.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
-use trihedron::poisson::{
-    MoveRange, PreparedMove, RateModel, RateNoise, Turn, prepare, step_weights,
-};
+use trihedron::poisson::{MoveRange, RateModel, RateNoise, Turn, prepare, step_weights};
 use trihedron::rotation::{exp, exp_and_left_jacobian, skew};
 use trihedron::simd::Instructions;
+
+use super::made_session::Uniform;
 
 const MODELS: [RateModel; 3] = [RateModel::Constant, RateModel::Linear, RateModel::Coning];
 const QUIET: RateNoise = RateNoise {
@@ -14,18 +14,12 @@ const QUIET: RateNoise = RateNoise {
     nominal_step_s: f64::INFINITY,
 };
 
-/// Deterministic numbers in (−1, 1).
-fn noise(k: usize) -> f64 {
-    let x = (k as f64 * 12.9898 + 4.1).sin() * 43758.5453;
-    2.0 * (x - x.floor()) - 1.0
-}
-
 fn timestamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
-    let h = span / (n - 1) as f64;
+    let (h, mut random) = (span / (n - 1) as f64, Uniform(3));
     (0..n)
         .map(|k| {
             let inner = k > 0 && k < n - 1;
-            h * (k as f64 + if inner { jitter * noise(k) } else { 0.0 })
+            h * (k as f64 + if inner { jitter * random.next() } else { 0.0 })
         })
         .collect()
 }
@@ -39,10 +33,6 @@ fn range(time: &[f64]) -> MoveRange {
     }
 }
 
-fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMove {
-    prepare(time, raw, &range(time), model).expect("a valid move")
-}
-
 /// A rate whose direction wanders, so that the commutator matters.
 fn wandering(t: f64) -> Vector3<f64> {
     Vector3::new(
@@ -50,10 +40,6 @@ fn wandering(t: f64) -> Vector3<f64> {
         1.5 * (1.3 * t + 0.4).cos(),
         0.7 * (2.9 * t).sin(),
     )
-}
-
-fn sampled(time: &[f64], magnitude: f64) -> Vec<Vector3<f64>> {
-    time.iter().map(|&t| wandering(t) * magnitude).collect()
 }
 
 fn scale() -> Matrix3<f64> {
@@ -131,9 +117,9 @@ fn every_instruction_set_gives_the_sums_of_single_steps() {
     for n in [2, 4, 9, 60, 331] {
         for magnitude in [0.0, 1e-7, 1.0, 60.0] {
             let time = timestamps(n, 0.01 * n as f64, 0.3);
-            let raw = sampled(&time, magnitude);
+            let raw: Vec<_> = time.iter().map(|&t| wandering(t) * magnitude).collect();
             for model in MODELS {
-                let p = prepared(&time, &raw, model);
+                let p = prepare(&time, &raw, &range(&time), model).expect("a valid move");
                 for noise in &noises {
                     let truth = slowly(&time, &raw, model, &scale(), b, noise);
                     for &set in Instructions::offered() {

@@ -19,6 +19,7 @@ EPOCH_S = 1709294400.0
 SI = ("m/s^2", "rad/s")
 COUNTS = ("counts", "counts")
 SIZES = {"m/s^2": 1.0, "g": G, "mg": 1e-3 * G, "rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3}
+LAYOUTS: dict[str, Callable[[], Layout]] = {}
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,6 @@ class Session:
     @property
     def n(self) -> int:
         return len(self.time_s)
-
-
-LAYOUTS: dict[str, Callable[[], Layout]] = {}
 
 
 def layout(make: Callable[[], Layout]) -> Callable[[], Layout]:

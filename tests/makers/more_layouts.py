@@ -10,6 +10,8 @@ import numpy as np
 from hand_made_sessions import G
 from makers.layout import EPOCH_S, Layout, dates, layout, nanoseconds, session, text, written
 
+VNIMU = {"rate_hz": 100, "columns": "ax=5,ay=6,az=7,gx=8,gy=9,gz=10"}
+
 
 @layout
 def gcdc_x16() -> Layout:
@@ -105,9 +107,6 @@ def microstrain_mip(s, a, w):
     names += "X Gyro [x8005],Y Gyro [x8005],Z Gyro [x8005]\n"
     head = "Session Name,test\nDevice,3DM-GX5-25\n\nDATA_START\n" + names
     return head + written(np.full(s.n, 7), np.full(s.n, 2303), np.round(475200 + s.time_s, 4), *a.T, *w.T)
-
-
-VNIMU = {"rate_hz": 100, "columns": "ax=5,ay=6,az=7,gx=8,gy=9,gz=10"}
 
 
 @text("VectorNav $VNIMU", "vn100.txt", 100, digits=(3, 6), options=VNIMU)

@@ -13,7 +13,8 @@ import numpy as np
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.sessions_combined import ALPHA, amount_of, combine
+from trihedron.api.sessions_combined import amount_of, combine
+from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
@@ -48,7 +49,7 @@ def calibrate_sessions(
     latitude_deg: float | None = None,
     height_m: float | None = None,
     frame: Frame = "lower",
-    alpha: float = ALPHA,
+    alpha: float = FALSE_ALARM,
     progress: Progress | None = None,
 ) -> SessionsResult:
     """Calibrate many recordings of one unit, with the repeatability of each parameter.
@@ -173,7 +174,7 @@ def of_several_units(results: Sequence[CalibrationResult]) -> tuple[Finding, ...
     alike = [one for k, one in enumerate(results) if _unfit(one, results[:k]) is None]
     if len(alike) < 2:
         return ()
-    return several_devices(changes_among([sessions_of(alike, [""] * len(alike))], alpha=ALPHA))
+    return several_devices(changes_among([sessions_of(alike, [""] * len(alike))], alpha=FALSE_ALARM))
 
 
 def several_devices(changes: Sequence[Change], case: Literal["", "calibrated"] = "") -> tuple[Finding, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_of_next
 from trihedron.estimate.sessions.thermal import thermal_model
@@ -21,9 +22,6 @@ from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
-ALPHA = 0.01
-"""Probability that any parameter of a unit that did not change is called changed."""
-
 
 def combine(
     sessions: Sequence[Session],
@@ -31,7 +29,7 @@ def combine(
     reference: Calibration,
     *,
     frame: Frame = "lower",
-    alpha: float = ALPHA,
+    alpha: float = FALSE_ALARM,
     left_out: tuple[tuple[str, str], ...] = (),
 ) -> SessionsModel:
     """One model of all sessions; ``reference`` is the first one's calibration: units, gravity and axes."""

@@ -97,7 +97,7 @@ class _Joint:
 
 def may_be_shared(effect: Effect) -> bool:
     """Whether an effect belongs to the instrument and has columns, so that several recordings can share its size."""
-    is_own = effect.is_of_session or effect.is_of_motion or effect.is_local or effect.is_spread
+    is_own = effect.of_session is None or effect.is_of_motion or effect.is_local or effect.is_spread
     return not (is_own or isinstance(effect, BiasProcess | DirectEffect))
 
 

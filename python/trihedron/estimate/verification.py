@@ -25,8 +25,6 @@ from trihedron.records import (
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import norms
 
-FALSE_ALARM = 1e-3
-"""Probability that errors of a valid calibration are found to exceed noise and uncertainty."""
 FAR_BEYOND = 10.0
 """Ratio of an error to noise and stated uncertainty above which the calibration is not, or no longer, this sensor's.
 Other sessions of one unit reach 0.5 to 3 in poses and 2 to 9 after moves (kim, mimu4444, phone), another unit 8 to 60.
@@ -206,7 +204,7 @@ def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
     n = len(more)
     if n < 3:
         return False
-    limit = float(probability.stdtrit(n - 1, 1.0 - FALSE_ALARM))
+    limit = float(probability.stdtrit(n - 1, 1.0 - probability.FALSE_ALARM))
     return bool(more.mean() > limit * more.std(ddof=1) / np.sqrt(n))
 
 
@@ -256,7 +254,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
         is_few=changed.is_few,
         shifted=changed.shifted,
         # Sign test: the errors of single poses have either sign.
-        is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < FALSE_ALARM,
+        is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < probability.FALSE_ALARM,
         n_same=n_same,
         n_poses=len(error),
         mean_m_s2=mean,
@@ -282,11 +280,11 @@ class _Beyond(NamedTuple):
 
 def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
     """Squared errors (n,) of ``n_components`` each, in their expected size; ``None`` where they are as expected."""
-    if probability.chdtrc(n_components * len(z2), float(z2.sum())) > FALSE_ALARM:
+    if probability.chdtrc(n_components * len(z2), float(z2.sum())) > probability.FALSE_ALARM:
         return None
     times = float(np.sqrt(np.mean(z2) / n_components))
     others = probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max()))
-    return _Beyond(times, times > FAR_BEYOND, others > FALSE_ALARM)
+    return _Beyond(times, times > FAR_BEYOND, others > probability.FALSE_ALARM)
 
 
 def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> Iterator[Finding]:

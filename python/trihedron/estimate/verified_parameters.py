@@ -16,8 +16,6 @@ from trihedron.sensor_model import in_frame
 from trihedron.session.noise import DRIFT_DOF, NOISE_DOF, bias_drift
 from trihedron.units import acceleration_to_si, rate_to_si
 
-FALSE_ALARM = 1e-3
-"""Probability that any parameter of a valid calibration is reported as shifted."""
 TOO_VAGUE = 10.0
 """A parameter is not judged where the log's uncertainty of it exceeds this many times the stated one."""
 LISTED = 8
@@ -68,7 +66,7 @@ def shifted_parameters(parameters: tuple[JudgedParameter, ...]) -> list[JudgedPa
     judged = [one for one in parameters if one.is_judged]
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
         return []
-    chance = 1.0 - 0.5 * FALSE_ALARM / len(judged)
+    chance = 1.0 - 0.5 * probability.FALSE_ALARM / len(judged)
     limits = [probability.stdtrit(DRIFT_DOF if one.id.endswith("bias") else NOISE_DOF, chance) for one in judged]
     beyond = [one for one, limit in zip(judged, limits, strict=True) if abs(one.times_sigma) > limit]
     return sorted(beyond, key=lambda one: -abs(one.times_sigma))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
@@ -17,8 +18,6 @@ from trihedron.probability import betaincinv, fdtrc, ndtr
 from trihedron.records.fleet import EffectCount, FleetLog, FleetSummary, MixedLogs, Outlier
 from trihedron.records.sessions import PARAMETERS, Session
 
-ALPHA = 0.01
-"""Probability that a healthy fleet is reported with any outlier, or any device that changed."""
 FEWEST = 4
 """Fewest devices for outliers: with three, the spread of the others would be from two."""
 ONE_UNIT = 0.01
@@ -67,7 +66,7 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
         more = f"{sum(one.n_logs for one in mixed)} of which it is not known which device they are of"
         passed_over = f"{passed_over} and {more}" if passed_over else more
     repeated = repeated_parameters(sessions) if len(sessions) > 1 else ()
-    changes = changes_among(list(by_device.values()), alpha=ALPHA)
+    changes = changes_among(list(by_device.values()), alpha=FALSE_ALARM)
     outliers, farthest = _outliers(by_device)
     diagnosed = [row for row in rows if row.get("diagnosis")]
     summary = FleetSummary(
@@ -179,7 +178,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...],
             p = min(1.0, fdtrc(1, prior_dof + dof, sigmas**2) * n_tests)
             away = float(column[worst] - np.median(others))
             one = Outlier(names[kept[worst]], PARAMETERS[k], float(column[worst]), away, sigmas, p)
-            if p >= ALPHA:
+            if p >= FALSE_ALARM:
                 within.append(one)
                 break
             found.append(one)
@@ -230,7 +229,7 @@ def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
                     continue
                 away = float(abs(a.numbers[k] - b.numbers[k]))
                 sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], 1e-300)))
-                if ndtr(-(away - ONE_UNIT) / sigma) * n_tests < ALPHA and away > worst[0]:
+                if ndtr(-(away - ONE_UNIT) / sigma) * n_tests < FALSE_ALARM and away > worst[0]:
                     worst = away, k
         if worst[0] > 0.0:
             found.append(MixedLogs(serial, len(sessions), PARAMETERS[worst[1]], worst[0]))

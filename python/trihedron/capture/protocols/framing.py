@@ -12,6 +12,8 @@ from typing import NamedTuple
 from trihedron.errors import InputError
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 
+DAY_MS = 86_400_000
+
 Checksum = Callable[[bytes], int]
 
 

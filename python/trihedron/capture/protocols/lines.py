@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers
+from trihedron.capture.protocols.framing import DAY_MS, Frame, LineFedDecoder, printed_numbers
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""
@@ -17,7 +17,6 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN"
 _LABELLED = re.compile(rf"([A-Za-zµ°_][^:=,;|\t]*?)\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)")
 # The timestamp that the Arduino serial monitor writes before a line, or a terminal program writes in brackets.
 _MONITOR = re.compile(r"^\s*\[?(\d{1,2}):(\d{2}):(\d{2})[.,](\d{1,6})\]?\s*(?:->)?\s*")
-_DAY_MS = 86_400_000
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ class LinesDecoder(LineFedDecoder):
             self.tick_s = unit / self._per_unit
             self.clock_modulus = 1 << 32 if digits == 0 and unit < 1.0 else 0
         elif self._monitor:
-            self.tick_s, self.clock_modulus = 1e-3, _DAY_MS
+            self.tick_s, self.clock_modulus = 1e-3, DAY_MS
 
     def _split(self, line: str) -> list[str]:
         return [field.strip() for field in line.rstrip(" ,;\t").split(self._separator)]

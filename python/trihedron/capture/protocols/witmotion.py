@@ -7,12 +7,11 @@ if the sensor sends it, precedes them.
 
 import struct
 
-from trihedron.capture.protocols.framing import Frame, FramedDecoder, triad
+from trihedron.capture.protocols.framing import DAY_MS, Frame, FramedDecoder, triad
 
 _CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
 _LAST_KIND = 0x5F
 _G, _DEGREES = 16.0 / 32768, 2000.0 / 32768
-_DAY_MS = 86_400_000
 
 
 class WitMotionDecoder(FramedDecoder):
@@ -44,7 +43,7 @@ class WitMotionDecoder(FramedDecoder):
         if kind == _CLOCK:
             self._drop()
             self._has_clock, self._held = True, None
-            self.tick_s, self.clock_modulus = 1e-3, _DAY_MS
+            self.tick_s, self.clock_modulus = 1e-3, DAY_MS
             parts[kind] = (_milliseconds(frame),)
         elif kind == _ACCELERATION:
             if _ACCELERATION in parts or (parts and not self._has_clock):
@@ -90,7 +89,7 @@ class WitMotionDecoder(FramedDecoder):
 def _milliseconds(frame: bytes) -> int:
     """Milliseconds of the day from a clock packet: year, month, day, hour, minute, second, milliseconds."""
     hour, minute, second, milliseconds = frame[5], frame[6], frame[7], frame[8] | frame[9] << 8
-    return (3_600_000 * hour + 60_000 * minute + 1000 * second + milliseconds) % _DAY_MS
+    return (3_600_000 * hour + 60_000 * minute + 1000 * second + milliseconds) % DAY_MS
 
 
 SPOKEN = {WitMotionDecoder: "WitMotion packets 0x55 0x51, 0x52 (clock 0x50 where it is sent)"}

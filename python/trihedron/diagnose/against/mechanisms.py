@@ -106,7 +106,7 @@ def compare_effects(
     ``tried_on_model``: candidates of the simulation's own diagnosis. An effect of the recording is not missing if the
     simulation's own test calls it likely and no other effect there could be mistaken for it.
     """
-    of_session = {effect.id for effect in catalogue() if effect.is_of_session or effect.is_of_motion}
+    of_session = {effect.id for effect in catalogue() if effect.of_session is None or effect.is_of_motion}
     misses = {test.domain: test.rms for test in found.domains}
     # An effect that the recording's own test calls likely, corrected for multiple testing, is not called surplus,
     # even where it was not accepted.
@@ -217,7 +217,7 @@ def _parameters(
     effect_id: str, model: Iterable[EffectParameter], recording: Iterable[EffectParameter], alpha: float
 ) -> list[ParameterDifference]:
     sensor = SENSORS.get(effect_id.partition("-")[0], "both")
-    given = {p.name: p for p in model if p.name not in by_id()[effect_id].of_session}
+    given = {p.name: p for p in model if p.name not in (by_id()[effect_id].of_session or ())}
     shared = [(given[p.name], p) for p in recording if p.name in given and p.unit == given[p.name].unit]
     # A parameter without uncertainty on either side counts events of its session, or is an ADC code. Where the codes
     # beneath a parameter are equal, its difference in SI is that of the scales, which are compared by themselves.

@@ -80,10 +80,9 @@ class Effect:
 
     is_spread: ClassVar[bool] = False
     """Whether it is only the size of a scatter, without a cause: mechanisms are named before it."""
-    is_of_session: ClassVar[bool] = False
-    """Whether it belongs to one experiment (a disturbed pose, a tilted table) and not to the instrument."""
-    of_session: ClassVar[tuple[str, ...]] = ()
-    """Parameters that a session sets anew, as the heading in which it began."""
+    of_session: ClassVar[tuple[str, ...] | None] = ()
+    """Parameters that a session sets anew, as the heading in which it began; None are all, where it belongs to one
+    experiment (a disturbed pose, a tilted table) and not to the instrument."""
     is_of_motion: ClassVar[bool] = False
     """Whether it belongs to the motion of one session (the arm to the centre of rotation)."""
     is_of_samples: ClassVar[bool] = False

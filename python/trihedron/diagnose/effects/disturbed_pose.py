@@ -139,7 +139,7 @@ class DisturbedPose(DirectEffect):
     id = "disturbed-pose"
     size = 0.05
     """m/s²: a push too weak to be noticed by hand."""
-    is_of_session = True
+    of_session = None
     is_local = True
 
     def find(self, context: Context) -> Evidence | None:

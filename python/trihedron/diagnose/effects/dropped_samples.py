@@ -255,7 +255,7 @@ class DroppedSamples(DirectEffect):
     id = "dropped-samples"
     needs_moves = True
     is_sought_again = True
-    is_of_session = True
+    of_session = None
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)

@@ -59,7 +59,7 @@ def table_turns(context: Context) -> list[TableTurn]:
 class TableEffect(DirectEffect):
     """An effect of an experiment on a table."""
 
-    is_of_session = True
+    of_session = None
 
     def unavailable(self, context: Context) -> str | None:
         """Unless at least four rotations, nearly all of them close to a multiple of 90°, are meant as such."""

@@ -7,13 +7,14 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
-from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution
+from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import chdtrc, fdtrc
+from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
 from trihedron.records.calibration import PARAMETER_NAMES, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import Words, words
+from trihedron.sensor_model import exchanged_and_reversed
 from trihedron.session.noise import NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
@@ -74,22 +75,16 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
     both sensors share, two reversed axes are the third one of the accelerometer, and a negative exchange of two axes
     is one of the accelerometer's columns.
     """
-    axes = np.linalg.solve(S_accelerometer, S)
-    order = np.argmax(np.abs(axes), axis=0)
-    if len(set(order.tolist())) < 3:
-        return
-    is_against = axes[order, np.arange(3)] < 0.0
-    moved = [int(i) + 1 for i in np.flatnonzero(order != np.arange(3))]
-    reversed_axes = np.flatnonzero(is_against)
-    match len(moved), len(reversed_axes):
+    exchanged, against = exchanged_and_reversed(np.asarray(np.linalg.solve(S_accelerometer, S), dtype=np.float64))
+    moved, others = [i + 1 for i in exchanged], [i + 1 for i in against]
+    match len(moved), len(others):
         case 0, 0:
             return
         case 0, 1:
-            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-reversed", axis=int(reversed_axes[0]) + 1)
+            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-reversed", axis=others[0])
         case 0, 2:
-            right = int(np.flatnonzero(~is_against)[0])
+            (right,) = {0, 1, 2} - set(against)
             signs = "".join("-" if (S_accelerometer[i, i] < 0.0) != (i == right) else "+" for i in range(3))
-            others = [int(i) + 1 for i in reversed_axes]
             yield Finding.of(
                 FindingCode.LEFT_HANDED, "accelerometer-reversed", axis=right + 1, axes=others, signs=signs
             )

@@ -14,8 +14,8 @@ from trihedron.estimate.gyroscope.turn_angles import (
     resting_spans,
     stated,
 )
-from trihedron.estimate.gyroscope.turntable import FALSE_ALARM, Predicted, StatedRates
-from trihedron.probability import MEDIAN_CHI2, chdtri
+from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates
+from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording

@@ -12,8 +12,6 @@ from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 from trihedron.estimate.gyroscope.turntable import Predicted
 from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
 
-FALSE_ALARM = 1e-3
-"""False alarm rate of each kind of statistical finding on turns."""
 LARGEST_SIGMA_TURN = math.radians(20.0)
 UNKNOWN = 0.3
 """Relative standard error of a scale that only the turns determine: a wrong turn is off by as much at most."""

@@ -21,9 +21,9 @@ from trihedron.estimate.gyroscope.turn_angles import (
     nominal_matrix,
     spans_three_axes,
 )
-from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, TurnSystem
+from trihedron.estimate.gyroscope.turn_system import TurnSystem
 from trihedron.estimate.known_vectors import KnownFit
-from trihedron.probability import chdtrc
+from trihedron.probability import FALSE_ALARM, chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording

@@ -17,7 +17,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by, move_quality
-from trihedron.probability import fdtrc
+from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
 from trihedron.records.checked import number_of
@@ -28,8 +28,6 @@ from trihedron.sensor_model import norms
 from trihedron.session.rounding import undithered_axes
 
 ITERATIONS = 20
-FALSE_ALARM = 1e-3
-"""Probability that accurate rates are found to scatter."""
 NOISE_DOF = 100.0
 """Degrees of freedom of the noise that χ² is relative to."""
 

@@ -14,7 +14,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.observed import Observed
-from trihedron.probability import MEDIAN_CHI2, chdtri, fdtrc
+from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
@@ -98,8 +98,6 @@ def _columns(curve: FloatArray, sensor: int) -> tuple[FloatArray | None, FloatAr
     return (own, None, sigma) if sensor == 0 else (None, own, sigma)
 
 
-FALSE_ALARM = 1e-3
-"""Probability that moves of a sound session are found to exceed the noise of their samples."""
 NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
 LOOSE = 100.0

@@ -18,10 +18,10 @@ from trihedron.estimate.gyroscope.lost_samples import (
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
-from trihedron.estimate.session.fit import FALSE_ALARM, SessionSolution, far_moves, refitted, solve_session
+from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
-from trihedron.probability import chdtri
+from trihedron.probability import FALSE_ALARM, chdtri
 from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
