@@ -101,7 +101,8 @@ def _diagnosed(
     answer = _run(obs, start_state(obs, begin), prior, alpha, notify)
     model = answer.found.model
     relations = records(answer.found.related)
-    is_determined = prior is None or not prior.is_weak
+    seen = calibration.accelerometer.observability
+    is_determined = calibration_is_given or seen is None or seen.rank >= seen.n_parameters
     verdict = verdict_of(answer, has_relations=bool(relations), is_determined=is_determined)
     # Without missing effects S and b are those of a calibration of this recording.
     base = answer.bare.fitted
