@@ -80,7 +80,11 @@ class Answer:
     def says_why(self) -> bool:
         """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and an effect that is not minor: a
         faint line, or one of the samples that changes nothing in the fit; and relations explain less than the
-        instrument's mechanisms do."""
+        instrument's mechanisms do, and no more disagrees still than is explained."""
+        left = {d.domain: d.excess for d in self.remaining}
+        explained = sum(max(d.excess - left[d.domain], 0.0) for d in self.domains if d.domain in left)
+        if sum(left[d.domain] for d in self.remaining if d.disagrees) > explained:
+            return False
         of_instrument = sum(gain for effect, gain, _ in self.gains if not effect.is_of_motion)
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False

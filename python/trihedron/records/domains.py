@@ -44,6 +44,11 @@ class DomainTest(Plain):
     unit: str = ""
     limit: float | None = None
 
+    @property
+    def excess(self) -> float:
+        """Chi-square beyond the degrees of freedom; 0 where it is less."""
+        return max(self.chi2_per_dof - 1.0, 0.0) * self.dof
+
 
 @dataclass(frozen=True, eq=False)
 class DomainResiduals(Frozen, Plain):
