@@ -221,24 +221,22 @@ class Prediction:
         return self.chi2 / np.maximum(self.n_rows, TINY)
 
 
-def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
-    """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
+def _folds(fitted: Fit) -> npt.NDArray[np.bool_]:
+    """(folds, rows) blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.obs
     direct = system.walk == 0
     out = []
     for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
-        for block in np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1))):
-            held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
-            if held.any():
-                out.append(held)
-    return out
+        rows = np.isin(system.domain, labels) & direct
+        blocks = np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1)))
+        out += [held for block in blocks if (held := rows & np.isin(system.segment, block)).any()]
+    return np.array(out, dtype=bool).reshape(len(out), len(direct))
 
 
-def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]]) -> Prediction:
-    """Predict every fold's rows from the others (blocked cross-validation, eq. 11.15).
+def predict_held_out(fitted: Fit) -> Prediction:
+    """Predict every block of poses or moves from all others (blocked cross-validation, eq. 11.15).
 
     The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale) makes
     them finite; it is the same for every model that is compared.
     """
-    flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
-    return Prediction(*fitted.core.held_out(np.ascontiguousarray(flags)))
+    return Prediction(*fitted.core.held_out(_folds(fitted)))
