@@ -23,6 +23,7 @@ pub mod joints;
 pub mod kalman;
 pub mod levels;
 pub mod lever_arm;
+pub mod lines;
 pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;

@@ -307,6 +307,16 @@ def common_time_variance(
     moves: npt.NDArray[np.int64],
 ) -> tuple[float, float, int]: ...
 
+# spectral lines inside poses
+Three = tuple[float, float, float]
+
+def pose_beside_lines(
+    readings: FloatArray, sigma: FloatArray
+) -> tuple[Three, Three, Three, tuple[bool, bool, bool]] | None: ...
+def session_lines(
+    times: Sequence[FloatArray], readings: Sequence[FloatArray], rate_hz: float, p_limit: float
+) -> list[tuple[int, Three, tuple[float, float], float, float, tuple[float, float]]]: ...
+
 # random telegraph signals
 def telegraph_inside(readings: FloatArray, counts: Sequence[int]) -> tuple[BoolArray, FloatArray, float]: ...
 def telegraph_levels(

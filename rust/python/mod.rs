@@ -22,6 +22,7 @@ mod joints;
 mod kalman;
 mod kalman_norm;
 mod lever_arm;
+mod lines;
 mod mean_noise;
 mod move_signals;
 mod noise_floor;
@@ -56,6 +57,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     first_look::register(module)?;
     joints::register(module)?;
     lever_arm::register(module)?;
+    lines::register(module)?;
     mean_noise::register(module)?;
     move_signals::register(module)?;
     noise_floor::register(module)?;

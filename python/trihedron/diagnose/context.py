@@ -42,18 +42,15 @@ class Context:
 
     @property
     def obs(self) -> Observations:
-        """Poses and moves of the session."""
         return self.fitted.obs
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
     def n_points(self) -> int:
-        """Number of points."""
         return len(self.fitted.path.force)
 
     @property
     def moves(self) -> tuple[slice, ...]:
-        """Points of each move."""
         return self.fitted.path.move_slices
 
     @cached_property

@@ -92,7 +92,6 @@ class Hypothesis:
 
     @property
     def obs(self) -> Observations:
-        """Poses and moves of the session."""
         return self.fitted.obs
 
     @property
@@ -191,7 +190,6 @@ def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
-    """The hypothesis without each of its terms."""
     terms = known.terms
     return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
 

@@ -46,7 +46,6 @@ class Observed:
 
     @property
     def obs(self) -> Observations:
-        """The observations as corrected."""
         return self.fitted.obs
 
 

@@ -58,7 +58,6 @@ class Observations(SessionReadings):
 
     @property
     def n_moves(self) -> int:
-        """Number of moves between neighbouring poses."""
         return len(self.move_ranges)
 
     def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
@@ -71,7 +70,6 @@ class Observations(SessionReadings):
         return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
 
     def without_moves(self, bad: Collection[int]) -> Observations:
-        """The same without the moves ``bad``."""
         keep = [m for m in range(self.n_moves) if m not in bad]
         return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.session.model import (
     DYNAMICS,
@@ -41,7 +41,6 @@ class Distortion:
 
     @property
     def n_parameters(self) -> int:
-        """Number of effect parameters."""
         given = self.force if self.force is not None else self.rate
         return 0 if given is None else int(given.shape[2])
 
@@ -92,10 +91,10 @@ class System:
     """
 
     residual: FloatArray
-    domain: npt.NDArray[np.int8]
-    segment: npt.NDArray[np.intp]
-    channel: npt.NDArray[np.int8]
-    walk: npt.NDArray[np.int8]
+    domain: IntArray
+    segment: IntArray
+    channel: IntArray
+    walk: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +111,7 @@ class Fit:
     @cached_property
     def system(self) -> System:
         """Residual rows with their labels."""
-        domain, segment, channel, walk = self.core.labels.T
-        return System(
-            self.core.residual, domain.astype(np.int8), segment, channel.astype(np.int8), walk.astype(np.int8)
-        )
+        return System(self.core.residual, *self.core.labels.T)
 
     @cached_property
     def leverage(self) -> FloatArray:
