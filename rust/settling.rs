@@ -1,7 +1,7 @@
 //! Static rates caused by motion: a soft support rotates the sensor, and gravity shows it (docs/diagnosis-method.md,
 //! 8.7d).
 
-use nalgebra::{Matrix3, RowVector3, SVector, Vector3};
+use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -15,9 +15,8 @@ const SETTLES_S: [f64; 4] = [0.7, 1.4, 2.8, 5.6];
 const N_SIZES: usize = 31;
 const SMALLEST: f64 = 0.1;
 const LARGEST: f64 = 1e4;
-
-/// Readings of the six parts, then five contrasts of the tilt.
-type Row = SVector<f64, { 2 * N_BLOCKS - 1 }>;
+/// Variance of a tilt about the vertical, of the largest, that is rounding.
+const LEVEL: f64 = 1e-9;
 
 /// Static poses of a session: readings about their means, and the noise of the means, raw.
 #[derive(Debug, Clone, Copy)]
@@ -49,13 +48,21 @@ pub struct Settling {
     pub tau: f64,
 }
 
-/// One direction of a pose, the vertical or a level one.
-struct Direction {
-    axis: Vector3<f64>,
-    y: Row,
-    /// Noise of a part's rate, and of a contrast of the tilt: infinite about the vertical.
-    error: f64,
-    tilt: f64,
+/// One pose at one time constant: information on scatter and settling, each a vector `(6)`, what the readings say of
+/// them, and their square.
+struct Sums {
+    information: Matrix6<f64>,
+    said: Vector6<f64>,
+    square: f64,
+}
+
+/// Rates of the six parts of a pose, contrasts of its tilt, and the information on one of either: the inverse covariance
+/// of their noise, of the tilt across the vertical only.
+struct Parts {
+    rates: [Vector3<f64>; N_BLOCKS],
+    tilts: [Vector3<f64>; N_BLOCKS - 1],
+    of_rate: Matrix3<f64>,
+    of_tilt: Matrix3<f64>,
     /// Duration of a part, s.
     lasts: f64,
 }
@@ -73,14 +80,17 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     if poses.up.len() != n || poses.noise.iter().any(|one| one.len() != n) {
         return Err(Error::bad_input("every pose has a vertical and noise"));
     }
-    let which =
-        (0..poses.spans.len()).filter(|&i| poses.spans[i][1] - poses.spans[i][0] >= 2 * N_BLOCKS);
-    let all: Vec<Direction> = which.flat_map(|i| directions(poses, i)).collect();
-    if all.len() < 3 * fewest {
+    let is_long = |&i: &usize| poses.spans[i][1] - poses.spans[i][0] >= 2 * N_BLOCKS;
+    let all: Vec<Parts> = (0..n)
+        .filter(is_long)
+        .filter_map(|i| parts(poses, i))
+        .collect();
+    if all.len() < fewest {
         return Ok(None);
     }
-    let mut errors: Vec<f64> = all.iter().map(|one| one.error).collect();
-    let unit = median(&mut errors) / (N_BLOCKS as f64).sqrt();
+    // Of a mean over a pose.
+    let error = |one: &Parts| (3.0 / one.of_rate.trace() / N_BLOCKS as f64).sqrt();
+    let unit = median(&mut all.iter().map(error).collect::<Vec<f64>>());
     let size =
         |k: usize| SMALLEST * (LARGEST / SMALLEST).powf((k - 1) as f64 / (N_SIZES - 1) as f64);
     let variance = |k: usize| {
@@ -90,20 +100,21 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
             (unit * size(k)).powi(2)
         }
     };
-    let tables: Vec<(f64, Vec<Sums>)> = SETTLES_S
-        .iter()
-        .map(|&tau| (tau, all.iter().map(|one| Sums::of(one, tau)).collect()))
-        .collect();
-    let of_scatter = |a: usize| log_likelihood(&tables[0].1, &all, variance(a), 0.0);
+    let tables = SETTLES_S.map(|tau| {
+        all.iter()
+            .map(|one| Sums::of(one, tau))
+            .collect::<Vec<Sums>>()
+    });
+    let of_scatter = |a: usize| log_likelihood(&tables[0], variance(a), 0.0);
     let scatter = (0..=N_SIZES)
         .map(of_scatter)
         .fold(f64::NEG_INFINITY, f64::max);
-    let pairs: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
+    let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
         .flat_map(|t| (0..=N_SIZES).flat_map(move |a| (0..=N_SIZES).map(move |b| (t, a, b))))
         .collect();
-    let found = pairs.par_iter().map(|&(t, a, b)| {
-        let value = log_likelihood(&tables[t].1, &all, variance(a), variance(b));
-        (value, variance(b).sqrt(), tables[t].0)
+    let found = tried.par_iter().map(|&(t, a, b)| {
+        let value = log_likelihood(&tables[t], variance(a), variance(b));
+        (value, variance(b).sqrt(), SETTLES_S[t])
     });
     let best = found.reduce_with(|one, other| if other.0 > one.0 { other } else { one });
     Ok(best.map(|(most, rate, tau)| {
@@ -112,125 +123,119 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     }))
 }
 
-fn directions(poses: &Poses<'_>, i: usize) -> [Direction; 3] {
+/// `None` where readings are missing, or have no noise.
+fn parts(poses: &Poses<'_>, i: usize) -> Option<Parts> {
     let [first, last] = poses.spans[i];
     let n = (last - first) / N_BLOCKS;
-    let part = |sensor: usize, block: usize| -> Vector3<f64> {
-        let start = first + block * n;
-        poses.scale[sensor] * mean(&poses.readings[sensor][start..start + n])
+    let means = |sensor: usize| -> [Vector3<f64>; N_BLOCKS] {
+        std::array::from_fn(|block| {
+            let start = first + block * n;
+            poses.scale[sensor] * mean(&poses.readings[sensor][start..start + n])
+        })
+    };
+    // Covariance of the mean of a part.
+    let spread = |sensor: usize| {
+        let noise = Vector3::from(poses.noise[sensor][i]);
+        let own = poses.scale[sensor] * Matrix3::from_diagonal(&noise);
+        own * own.transpose() * N_BLOCKS as f64
     };
     let up = Vector3::from(poses.up[i]);
-    let level = up.cross(&Vector3::ith(up.iamin(), 1.0)).normalize();
-    let axes = [up, level, up.cross(&level)];
-    let middle = (0..N_BLOCKS)
-        .map(|block| part(1, block))
-        .sum::<Vector3<f64>>()
-        / N_BLOCKS as f64;
-    // Rotation of the vertical since the mean of the pose, across it.
-    let turned: [Vector3<f64>; N_BLOCKS] =
-        std::array::from_fn(|block| (part(1, block) - middle).cross(&up) / poses.gravity);
-    let spread = |row: RowVector3<f64>, sensor: usize| {
-        let of = row
-            .transpose()
-            .component_mul(&Vector3::from(poses.noise[sensor][i]));
-        (of.norm_squared() * N_BLOCKS as f64).sqrt()
-    };
-    std::array::from_fn(|k| {
-        let axis = axes[k];
-        let error = spread(axis.transpose() * poses.scale[0], 0);
-        // A tilt changes the force along the other level axis; its white noise is that of the quiet floor.
-        let across = axis.cross(&up).transpose() * poses.scale[1];
-        let tilt = if k == 0 {
-            f64::INFINITY
-        } else {
-            spread(across, 1) / poses.gravity
-        };
-        let contrast = contrasts(std::array::from_fn(|block| turned[block].dot(&axis)));
-        let y = Row::from_fn(|j, _| match j.checked_sub(N_BLOCKS) {
-            None => part(0, j).dot(&axis) / error,
-            Some(contrasted) => contrast[contrasted] / tilt,
-        });
-        let lasts = n as f64 * poses.step;
-        Direction {
-            axis,
-            y,
-            error,
-            tilt,
-            lasts,
-        }
+    // A change of the force turns the vertical across it; its white noise is that of the quiet floor.
+    let turning = -up.cross_matrix() / poses.gravity;
+    let of_tilt = turning * spread(1) * turning.transpose();
+    let (rates, forces) = (means(0), means(1));
+    let is_known = rates
+        .iter()
+        .chain(&forces)
+        .flatten()
+        .all(|value| value.is_finite());
+    let tilts = contrasts(&forces).map(|force| turning * force);
+    let least = LEVEL * of_tilt.norm();
+    let of_tilt = of_tilt.pseudo_inverse(least).ok()?;
+    let of_rate = spread(0).try_inverse()?;
+    let lasts = n as f64 * poses.step;
+    is_known.then_some(Parts {
+        rates,
+        tilts,
+        of_rate,
+        of_tilt,
+        lasts,
     })
 }
 
 /// Mean of the finite readings of every axis.
 fn mean(readings: &[[f64; 3]]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
-        let known: Vec<f64> = readings
+        let known = readings
             .iter()
             .map(|row| row[axis])
-            .filter(|value| value.is_finite())
-            .collect();
-        known.iter().sum::<f64>() / known.len() as f64
+            .filter(|value| value.is_finite());
+        let (sum, n) = known.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
+        sum / n
     })
 }
 
-/// Orthonormal contrasts of the means of the parts (Helmert).
-fn contrasts(of: [f64; N_BLOCKS]) -> [f64; N_BLOCKS - 1] {
+/// Orthonormal contrasts of the parts, zero for a constant (Helmert).
+fn contrasts(of: &[Vector3<f64>; N_BLOCKS]) -> [Vector3<f64>; N_BLOCKS - 1] {
     std::array::from_fn(|row| {
         let k = (row + 1) as f64;
-        let before: f64 = of[..=row].iter().sum();
+        let before: Vector3<f64> = of[..=row].iter().sum();
         (before - k * of[row + 1]) / (k * (k + 1.0)).sqrt()
     })
 }
 
-/// Products of the columns of scatter `a` and settling `b` with one another and with the readings `y`.
-struct Sums {
-    aa: f64,
-    ab: f64,
-    bb: f64,
-    ay: f64,
-    by: f64,
-    yy: f64,
-}
-
 impl Sums {
-    fn of(one: &Direction, tau: f64) -> Self {
+    fn of(one: &Parts, tau: f64) -> Self {
         let fades: [f64; N_BLOCKS] = std::array::from_fn(|block| {
             let begins = block as f64 * one.lasts;
             tau * ((-begins / tau).exp() - (-(begins + one.lasts) / tau).exp()) / one.lasts
         });
-        let tilted = contrasts(fades.map(|fade| tau * (1.0 - fade)));
-        let a = Row::from_fn(|j, _| if j < N_BLOCKS { 1.0 / one.error } else { 0.0 });
-        let b = Row::from_fn(|j, _| match j.checked_sub(N_BLOCKS) {
-            None => fades[j] / one.error,
-            Some(contrasted) => tilted[contrasted] / one.tilt,
-        });
-        let (y, by) = (&one.y, b.dot(&one.y));
-        Self {
-            aa: a.dot(&a),
-            ab: a.dot(&b),
-            bb: b.dot(&b),
-            ay: a.dot(y),
-            by,
-            yy: y.dot(y),
+        let tilted = contrasts(&fades.map(|fade| Vector3::repeat(tau * (1.0 - fade))));
+        let mut out = Self {
+            information: Matrix6::zeros(),
+            said: Vector6::zeros(),
+            square: 0.0,
+        };
+        for (rate, fade) in one.rates.iter().zip(fades) {
+            out.add(rate, &one.of_rate, [1.0, fade]);
+        }
+        for (tilt, share) in one.tilts.iter().zip(tilted) {
+            out.add(tilt, &one.of_tilt, [0.0, share.x]);
+        }
+        out
+    }
+
+    /// A reading that consists of `shares` of scatter and settling, with the information on it.
+    fn add(&mut self, reading: &Vector3<f64>, of_reading: &Matrix3<f64>, shares: [f64; 2]) {
+        let said = of_reading * reading;
+        self.square += reading.dot(&said);
+        for i in 0..2 {
+            let mut part = self.said.fixed_rows_mut::<3>(3 * i);
+            part += shares[i] * said;
+            for j in 0..2 {
+                let mut block = self.information.fixed_view_mut::<3, 3>(3 * i, 3 * j);
+                block += shares[i] * shares[j] * of_reading;
+            }
         }
     }
 }
 
-/// Restricted log-likelihood of variances `p` of scatter and `q` of settling; the bias has a flat prior.
-fn log_likelihood(sums: &[Sums], directions: &[Direction], p: f64, q: f64) -> f64 {
-    let (mut normal, mut side) = (Matrix3::zeros(), Vector3::zeros());
-    let mut total = 0.0;
-    for (s, one) in sums.iter().zip(directions) {
-        // (I + V G)⁻¹ V of two columns, in closed form.
-        let det = (1.0 + p * s.aa) * (1.0 + q * s.bb) - p * q * s.ab * s.ab;
-        let (m00, m11) = (p * (1.0 + q * s.bb) / det, q * (1.0 + p * s.aa) / det);
-        let m01 = -p * q * s.ab / det;
-        let aa = s.aa - (m00 * s.aa * s.aa + 2.0 * m01 * s.aa * s.ab + m11 * s.ab * s.ab);
-        let ay = s.ay - (m00 * s.aa * s.ay + m01 * (s.aa * s.by + s.ab * s.ay) + m11 * s.ab * s.by);
-        let yy = s.yy - (m00 * s.ay * s.ay + 2.0 * m01 * s.ay * s.by + m11 * s.by * s.by);
-        normal += aa * one.axis * one.axis.transpose();
-        side += ay * one.axis;
-        total += det.ln() + yy;
+/// Restricted log-likelihood of variances `p` of scatter and `q` of settling; the bias, which acts as scatter does, has a
+/// flat prior.
+fn log_likelihood(sums: &[Sums], p: f64, q: f64) -> f64 {
+    let prior = Matrix6::from_diagonal(&Vector6::new(p, p, p, q, q, q));
+    let (mut normal, mut side, mut total) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    for one in sums {
+        let wider = (Matrix6::identity() + one.information * prior).lu();
+        let Some(inverse) = wider.try_inverse() else {
+            return f64::NEG_INFINITY;
+        };
+        // Covariance of what the poses draw, given the readings.
+        let drawn = prior * inverse;
+        let of_bias: Matrix6x3<f64> = one.information.fixed_columns::<3>(0).into();
+        normal += of_bias.fixed_rows::<3>(0) - of_bias.transpose() * drawn * of_bias;
+        side += one.said.fixed_rows::<3>(0) - of_bias.transpose() * drawn * one.said;
+        total += wider.determinant().ln() + one.square - one.said.dot(&(drawn * one.said));
     }
     let fitted = normal
         .try_inverse()
