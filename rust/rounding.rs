@@ -1,5 +1,7 @@
 //! Rate hidden inside one LSB of a coarse ADC, in poses and in moves (docs/model-session.md).
 
+use std::cmp::Ordering;
+
 use crate::running::running_median;
 
 /// Variance of an error that is uniform over one step, in squares of the step.
@@ -137,7 +139,9 @@ impl Coarse<'_> {
     /// Variance of every reading of an axis, of that of rounding, by the runs of one code.
     fn of_runs(&self, axis: usize) -> Vec<f64> {
         let codes = self.codes(axis);
-        let runs: Vec<&[f64]> = codes.chunk_by(|a, b| a == b).collect();
+        let runs: Vec<&[f64]> = codes
+            .chunk_by(|a, b| a.partial_cmp(b).is_some_and(Ordering::is_eq))
+            .collect();
         let mut out = Vec::with_capacity(codes.len());
         for k in 0..runs.len() {
             let n = runs[k].len() as f64;

@@ -1,5 +1,6 @@
 //! Sampling instants that scatter about their timestamps, seen by two sensors at once (docs/diagnosis-method.md, 8.3).
 
+use crate::chi_square::MEDIAN_SQUARE;
 use crate::order_statistics::median;
 
 /// Weights of the quintic through the six samples around one, at that one: by distance.
@@ -14,8 +15,6 @@ const OF_A_BLOCK: usize = 12;
 const CLIPPED: f64 = 5.0;
 /// Noise, in sample intervals, below which a sample has no more weight.
 const LEAST_NOISE: f64 = 0.05;
-/// Median of a squared standard normal.
-const MEDIAN_SQUARE: f64 = 0.454_936_423_119_572_75;
 
 /// Readings of a sensor in units of its noise.
 type Readings<'a> = &'a [[f64; 3]];

@@ -108,8 +108,10 @@ fn averaged(stretches: &[Stretch], n: usize) -> (Vec<f64>, Vec<f64>, f64) {
             };
         }
     }
-    whole.iter_mut().for_each(|sum| *sum /= parts);
-    relative.iter_mut().for_each(|sum| *sum /= live.max(1.0));
+    for (sum, share) in whole.iter_mut().zip(&mut relative) {
+        *sum /= parts;
+        *share /= live.max(1.0);
+    }
     (whole, relative, live)
 }
 
@@ -123,7 +125,7 @@ fn strongest(
     if relative[1..].iter().any(|&one| one <= 0.0) {
         return None;
     }
-    let width = (n / 32 | 1).max(15);
+    let width = ((n / 32) | 1).max(15);
     let level = smooth(&relative, width);
     let ratio = |k: usize| relative[k] / level[k] * (1.0 - 1.0 / (3.0 * count));
     let tapered: f64 = window(n).iter().map(|weight| weight * weight).sum();

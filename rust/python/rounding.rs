@@ -1,5 +1,10 @@
 //! Bindings of rounding errors.
 
+#![expect(
+    clippy::redundant_closure_for_method_calls,
+    reason = "the methods are of one lifetime"
+)]
+
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

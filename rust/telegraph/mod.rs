@@ -10,6 +10,7 @@ use std::sync::LazyLock;
 use nalgebra::{DMatrix, DVector, RowDVector};
 use rayon::prelude::*;
 
+use crate::chi_square::MEDIAN_SQUARE;
 use crate::order_statistics::median;
 pub use levels::{Means, levels};
 
@@ -32,8 +33,6 @@ const RATES: [f64; 3] = [0.1, 0.4, 1.0];
 const SHARES: [f64; 2] = [0.03, 0.1];
 /// Share of the largest direction below which a direction is none.
 const ROUNDING: f64 = 1e-9;
-/// Median of a squared standard normal.
-const MEDIAN_SQUARE: f64 = 0.454_936_423_119_572_75;
 
 /// What the readings inside the poses show of one axis.
 #[derive(Debug, Clone, Default)]
@@ -67,7 +66,9 @@ static PATHS: LazyLock<Paths> = LazyLock::new(|| {
         }
     }
     let mut counts = [0.0; 3];
-    switches.iter().for_each(|&n| counts[n] += 1.0);
+    for &n in &switches {
+        counts[n] += 1.0;
+    }
     let levels = DMatrix::from_rows(&rows);
     Paths {
         levels,
