@@ -4,6 +4,7 @@
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the body frame (instrument frame).
 
 pub mod adc_grid;
+pub mod aliasing;
 pub mod allan;
 pub mod attitude;
 pub mod audit;
@@ -21,6 +22,8 @@ pub mod interrupt;
 pub mod joints;
 pub mod kalman;
 pub mod levels;
+pub mod lever_arm;
+pub mod lines;
 pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;
@@ -32,15 +35,19 @@ pub mod poisson;
 pub mod ranges;
 pub mod reference_motion;
 pub mod rotation;
+pub mod rounding;
 pub mod running;
 pub mod screening;
 pub mod sensor_model;
 pub mod session_model;
+pub mod settling;
 pub mod simd;
 pub mod simulate;
 pub mod sinusoid;
 pub mod spectral_likelihood;
 pub mod stillness;
+pub mod telegraph;
+pub mod time_errors;
 pub mod timestamps;
 
 #[cfg(feature = "python")]

@@ -11,7 +11,7 @@ from small_session import G
 from small_session import simulated as of_motion
 from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import folds_of, predict_held_out, tune_noise
+from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.read import read_recording
 from trihedron.records import FindingCode
@@ -136,8 +136,8 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     # Two factorisations of one matrix of condition 1e6: ten digits are left, the ridge takes the rest.
     np.testing.assert_allclose(fitted.covariance(), covariance[:18, :18], rtol=1e-6, atol=0)
     np.testing.assert_allclose(fitted.leverage, np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
-    folds = folds_of(fitted)
-    found = predict_held_out(fitted, folds)
+    folds = _folds(fitted)
+    found = predict_held_out(fitted)
     for k, held in enumerate(folds):
         train = scaled[~held]
         cov = np.linalg.inv(train.T @ train + 1e-9 * eye)

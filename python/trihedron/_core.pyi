@@ -218,7 +218,12 @@ def ends_to_trim(
     is_live: BoolArray,
     limit: float,
 ) -> tuple[int, int, bool]: ...
-def band_power(readings: FloatArray, taps: list[float], ranges: npt.NDArray[np.int64]) -> FloatArray: ...
+def unresolved_power(
+    readings: FloatArray,
+    ranges: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
+    gaps: list[int],
+    rounding: FloatArray,
+) -> FloatArray: ...
 def share_of_gyroscope(change: FloatArray, mean: FloatArray, rate: FloatArray, scale: list[float]) -> list[float]: ...
 
 # the noise floor of a log
@@ -264,6 +269,61 @@ def halves_of(
 def mean_noise_terms(
     design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]
 ) -> tuple[float, list[float]]: ...
+
+# rounding
+Adc = tuple[FloatArray, FloatArray, BoolArray]
+
+def rounding_variance(readings: FloatArray, adc: Adc, steady: tuple[float, int]) -> FloatArray: ...
+def resting_axes(readings: FloatArray, adc: Adc, steady: tuple[float, int]) -> BoolArray: ...
+def shared_errors(readings: FloatArray, adc: Adc, steady: tuple[float, int]) -> list[tuple[int, FloatArray]]: ...
+
+# the arm from the centre of rotation
+def lever_arm_of_moves(
+    motion: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    attitude: FloatArray,
+    moves: npt.NDArray[np.int64],
+    *,
+    smoothed: int,
+    fewest: int,
+) -> tuple[FloatArray, FloatArray, float, tuple[float, float], int] | None: ...
+
+# supports that settle, sampling instants that scatter
+def settling_of_poses(
+    readings: tuple[FloatArray, ...],
+    scale: tuple[FloatArray, ...],
+    noise: tuple[FloatArray, ...],
+    up: FloatArray,
+    spans: npt.NDArray[np.int64],
+    *,
+    gravity_m_s2: float,
+    step_s: float,
+    fewest: int,
+) -> tuple[float, float, float] | None: ...
+def common_time_variance(
+    time_s: FloatArray,
+    step_s: float,
+    readings: tuple[FloatArray, ...],
+    is_clipped: BoolArray,
+    moves: npt.NDArray[np.int64],
+) -> tuple[float, float, int]: ...
+
+# spectral lines inside poses
+Three = tuple[float, float, float]
+
+def pose_beside_lines(
+    readings: FloatArray, sigma: FloatArray
+) -> tuple[Three, Three, Three, tuple[bool, bool, bool]] | None: ...
+def session_lines(
+    times: Sequence[FloatArray], readings: Sequence[FloatArray], rate_hz: float, p_limit: float
+) -> list[tuple[int, Three, tuple[float, float], float, float, tuple[float, float]]]: ...
+
+# random telegraph signals
+def telegraph_inside(readings: FloatArray, counts: Sequence[int]) -> tuple[BoolArray, FloatArray, float]: ...
+def telegraph_levels(
+    inside: tuple[BoolArray, FloatArray, float],
+    known: FloatArray,
+    means: tuple[FloatArray, FloatArray, FloatArray, float],
+) -> tuple[FloatArray, float] | None: ...
 
 # timestamps
 def phase_power(windows: Sequence[FloatArray], cell: float, least: int) -> tuple[FloatArray, int]: ...

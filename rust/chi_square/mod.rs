@@ -32,6 +32,9 @@ pub fn ln_gamma(x: f64) -> f64 {
     0.5 * (2.0 * std::f64::consts::PI).ln() + (x + 0.5) * t.ln() - t + series.ln()
 }
 
+/// Median of a squared standard normal.
+pub const MEDIAN_SQUARE: f64 = 0.454_936_423_119_572_7;
+
 /// Probabilities that a chi-square variate of `dof` degrees of freedom stays below `value`, and above it.
 ///
 /// The smaller one is computed directly: neither loses precision.

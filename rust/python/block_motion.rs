@@ -1,17 +1,17 @@
 //! Bindings of motion in block means.
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat2, flat3};
+use super::arrays::{as_rows, flat1, flat2, flat3, rows, vector3};
+use super::ranges::ranges_within;
+use crate::aliasing;
 use crate::block_motion::{self, Edges, UNKNOWNS, Windows};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(ends_to_trim, module)?)?;
-    module.add_function(wrap_pyfunction!(band_power, module)?)?;
+    module.add_function(wrap_pyfunction!(unresolved_power, module)?)?;
     module.add_function(wrap_pyfunction!(share_of_gyroscope, module)?)
 }
 
@@ -62,37 +62,25 @@ fn ends_to_trim(
     })
 }
 
-/// Sums `(r, 3)` of the squared output of five taps over ranges `(r, 2)` of rows, without two rows at either end.
+/// Variance `(m, 3)` of the sums of `readings` `(n, 3)` over moves by motion faster than the samples; `ranges` of moves
+/// and of poses, the first samples behind `gaps`, the variance of `rounding` `(3,)`.
 #[pyfunction]
-fn band_power<'py>(
+fn unresolved_power<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
-    taps: [f64; 5],
-    ranges: PyReadonlyArray2<'py, i64>,
+    ranges: (PyReadonlyArray2<'py, i64>, PyReadonlyArray2<'py, i64>),
+    gaps: Vec<usize>,
+    rounding: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let n = readings.shape()[0];
-    let outside = || {
-        wrong(&format!(
-            "ranges must be start, stop within {n} rows, (r, 2)"
-        ))
-    };
-    if ranges.shape()[1] != 2 {
-        return Err(outside());
-    }
-    let mut inside = Vec::with_capacity(ranges.shape()[0]);
-    for row in ranges.as_array().rows() {
-        let start = usize::try_from(row[0]).map_err(|_| outside())?;
-        let stop = usize::try_from(row[1]).map_err(|_| outside())?;
-        if start > stop || stop > n {
-            return Err(outside());
-        }
-        inside.push([start, stop]);
-    }
     let flat = flat3("readings", &readings)?;
+    let within = |one| ranges_within(one, flat.len() / 3);
+    let (moves, poses) = (within(&ranges.0)?, within(&ranges.1)?);
+    let rounding = vector3("rounding", &rounding)?.into();
     let found = super::run(py, || {
-        Ok(block_motion::band_power(as_rows(&flat), taps, &inside))
+        let spans = (moves.as_slice(), poses.as_slice());
+        Ok(aliasing::unresolved(as_rows(&flat), spans, &gaps, rounding))
     })?;
-    PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(found)).reshape([inside.len(), 3])
+    rows(py, found.as_flattened(), 3)
 }
 
 /// Coefficients `(12,)` by which the gyro best predicts the changes of windows, in units of `scale`.

@@ -54,7 +54,6 @@ class Answer:
 
     @property
     def ids(self) -> set[str]:
-        """Ids of everything accepted."""
         terms = {term.effect.id for term in self.found.model.terms}
         return terms | {one.effect.id for one in self.biases} | {one.effect.id for one in self.seen}
 

@@ -42,18 +42,15 @@ class Context:
 
     @property
     def obs(self) -> Observations:
-        """Poses and moves of the session."""
         return self.fitted.obs
 
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
     def n_points(self) -> int:
-        """Number of points."""
         return len(self.fitted.path.force)
 
     @property
     def moves(self) -> tuple[slice, ...]:
-        """Points of each move."""
         return self.fitted.path.move_slices
 
     @cached_property
@@ -205,11 +202,8 @@ class Context:
     @cached_property
     def pose_power(self) -> FloatArray:
         """(poses, 3) variance of the accelerometer inside each pose, SI², along the body axes."""
-        obs, S = self.obs, self.fitted.state.accel_S
-        out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.pose_scatter, S)
-        for i in np.flatnonzero(np.isnan(out).any(axis=1)):
-            out[i] = np.nanvar(obs.raw_force[obs.segments.poses[i].samples()] @ S.T, axis=0)
-        return out
+        force, poses = self.obs.raw_force @ self.fitted.state.accel_S.T, self.obs.segments.poses
+        return np.array([np.nanvar(force[pose.samples()], axis=0) for pose in poses])
 
     def si_per_raw(self, sensor: int) -> FloatArray:
         """(3,) SI size of one raw unit along each axis of sensor 0 (accelerometer) or 1 (gyro)."""

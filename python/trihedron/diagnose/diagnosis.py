@@ -15,7 +15,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.timing_jitter import ERROR_FACTOR, TimingJitter, common_time_error
+from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.relations.search import Related
@@ -187,7 +187,7 @@ def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> Fit:
     """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
     context = Context(predicted)
     found = settling(context)
-    if found.score < threshold(alpha):
+    if found is None or found.score < threshold(alpha):
         return predicted
     return tune_noise(with_settling(context, found), start, predicted.prior)
 
@@ -214,7 +214,7 @@ def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, floa
 
 def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests."""
-    value, spread, n = common_time_error(context)
+    value, spread, n = common_time_variance(context.obs)
     if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
     looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in rejected]
@@ -225,7 +225,7 @@ def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> 
         (), tuple(s for e in found for s in e.where.segments), tuple(t for e in found for t in e.where.times_s)
     )
     chi2_per_dof = 1.0 + max(z, 0.0) ** 2 / n + sum(e.strength for e in found if e.reweigh is not None) / n
-    rms = float(np.sqrt(max(value, 0.0) / ERROR_FACTOR))
+    rms = float(np.sqrt(max(value, 0.0)))
     return DomainTest("timing", chi2_per_dof, float(n), p, p < alpha / N_DOMAINS_TESTED, where, rms, "s")
 
 

@@ -13,7 +13,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Distortion, Fit, Prediction, folds_of, predict_held_out, solved, stacked
+from trihedron.diagnose.session.solve import Distortion, Fit, Prediction, predict_held_out, solved, stacked
 from trihedron.records.domains import HeldOut
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
@@ -92,7 +92,6 @@ class Hypothesis:
 
     @property
     def obs(self) -> Observations:
-        """Poses and moves of the session."""
         return self.fitted.obs
 
     @property
@@ -113,7 +112,7 @@ class Hypothesis:
     @cached_property
     def prediction(self) -> Prediction:
         """Blocks of poses and moves, each predicted from all others."""
-        return predict_held_out(self.fitted, folds_of(self.fitted))
+        return predict_held_out(self.fitted)
 
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
@@ -191,7 +190,6 @@ def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
-    """The hypothesis without each of its terms."""
     terms = known.terms
     return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
 

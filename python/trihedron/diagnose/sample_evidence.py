@@ -9,7 +9,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
+from trihedron.diagnose.session.solve import Fit, Prediction, predict_held_out, tune_noise
 from trihedron.probability import chdtri
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import DYNAMICS, MOVES, SessionState, misfits
@@ -46,7 +46,6 @@ class Observed:
 
     @property
     def obs(self) -> Observations:
-        """The observations as corrected."""
         return self.fitted.obs
 
 
@@ -111,7 +110,7 @@ def _mends(before: Fit, after: Fit, begins: frozenset[int] | None) -> bool:
     Where only the moves that begin at some poses were changed, the misfit of gravity and velocity after these must
     fall, in units of the dispersion of the other moves: after a jolt that looks like a loss it does not.
     """
-    was, now = (predict_held_out(fitted, folds_of(fitted)) for fitted in (before, after))
+    was, now = predict_held_out(before), predict_held_out(after)
     stays = np.maximum(now.per_row, 1.0)
     gain = float(((was.per_row - now.per_row) * now.n_rows / stays).sum())
     if gain <= 0.0 or not (now.per_row < VISIBLE * was.per_row).any():

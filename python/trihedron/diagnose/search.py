@@ -169,7 +169,9 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
         return judged, best
     alone = best.score - sum(one.score for one in best.relations)
     for k, fewer in enumerate(judged.without):
-        beside = _gain_beside(k, best)
+        terms = best.model.terms
+        without = again(best.model, [*terms[:k], *terms[k + 1 :]])
+        beside = 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost
         if beside > limit and not best.has_own_likelihood:
             continue
         other = related(fewer, limit)
@@ -178,13 +180,6 @@ def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
         if other.relations and other.score > alone + NEAR and beside <= limit:
             return _beside_relations(_pruned(fewer, limit), limit)
     return judged, best
-
-
-def _gain_beside(k: int, best: Related) -> float:
-    """Score of term ``k`` by the evidence beside the relations."""
-    terms = best.model.terms
-    without = again(best.model, [*terms[:k], *terms[k + 1 :]])
-    return 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,6 @@ class _Held:
     n_added: int
 
     def without(self, k: int) -> _Held:
-        """Without the shared effect ``k``."""
         fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
         return _Held(fewer, self.n_added - 1)
 

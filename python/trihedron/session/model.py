@@ -70,7 +70,6 @@ class SessionReadings(SessionNoise):
 
     @property
     def n_poses(self) -> int:
-        """Number of poses."""
         return len(self.pose_force)
 
     def core_poses(self) -> _core.SessionPoses:

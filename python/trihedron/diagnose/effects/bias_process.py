@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -64,10 +63,10 @@ class BiasDrift(BiasProcess):
 
     def variants(self, context: Context) -> list[Variant]:
         """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
-        out = [self._along(context, [lambda x: x], per_axis("drift"), "line")]
+        out = [self._along(context, lambda x: x[:, None], per_axis("drift"), "line")]
         out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
         names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
-        out.append(self._along(context, [partial(_cosine, k) for k in COSINES], names, "curve"))
+        out.append(self._along(context, lambda x: np.cos(np.pi * np.outer(x, COSINES)), names, "curve"))
         return out
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
@@ -75,19 +74,21 @@ class BiasDrift(BiasProcess):
         of a warm sensor."""
         lasts_s = _duration_s(context)
         tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * lasts_s)
-        fades = partial(_fading, tau_s / lasts_s)
-        return self._along(context, [fades], per_axis("warm_up"), "warm-up", {"time_constant": (tau_s, "s")})
+        shape = {"time_constant": (tau_s, "s")}
+        return self._along(
+            context, lambda x: np.exp(-x[:, None] * lasts_s / tau_s), per_axis("warm_up"), "warm-up", shape
+        )
 
     def _along(
-        self, context: Context, curves: list[Callable[[FloatArray], FloatArray]], names: tuple[str, ...], label: str,
+        self, context: Context, curves: Callable[[FloatArray], FloatArray], names: tuple[str, ...], label: str,
         shape: dict[str, tuple[float, str]] | None = None,
     ) -> Variant:  # fmt: skip
-        """``curves`` of the elapsed share of the session, zero on average over the poses, as the session's bias is."""
+        """``curves`` (n, k) of the elapsed share of the session (n,), zero on average over the poses, as the session's
+        bias is."""
         poses = context.obs.segments
         x = (poses.time_mid_s - context.obs.time_s[0]) / _duration_s(context)
-        means = [np.average(curve(x), weights=poses.duration_s) for curve in curves]
-        centred = [(curve(context.elapsed) - mean)[:, None] for curve, mean in zip(curves, means, strict=True)]
-        columns = on_axes(context, self.sensor, *centred)
+        centred = curves(context.elapsed) - np.average(curves(x), axis=0, weights=poses.duration_s)
+        columns = on_axes(context, self.sensor, *centred.T[:, :, None])
         return Variant(columns, names, (self.unit,) * len(names), shape or {}, label)
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
@@ -124,14 +125,6 @@ class GyroBiasDrift(BiasDrift):
     id, sensor = "gyro-bias-drift", GYRO
     confounded_with = ("gyro-bias",)
     typical = TYPICAL[1]
-
-
-def _cosine(k: int, x: FloatArray) -> FloatArray:
-    return np.asarray(np.cos(np.pi * k * x))
-
-
-def _fading(fraction: float, x: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(-x / fraction))
 
 
 def _duration_s(context: Context) -> float:

@@ -64,8 +64,6 @@ class Variant:
 
 
 class Effect:
-    """One physical mechanism."""
-
     id: ClassVar[str]
     mechanism: ClassVar[str] = ""
     """Name of an effect from a user's own file; the texts of the built-in effects are in ``report/effects``."""
@@ -161,7 +159,6 @@ class Effect:
         )  # fmt: skip
 
     def separating_experiment(self) -> str:
-        """What to record to separate it from other effects."""
         return experiment_for(self.id) or self.experiment
 
 
@@ -221,12 +218,10 @@ def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: st
 
 
 def force_only(columns: FloatArray) -> Distortion:
-    """A distortion of the accelerometer alone."""
     return Distortion(columns, None)
 
 
 def rate_only(columns: FloatArray) -> Distortion:
-    """A distortion of the gyro alone."""
     return Distortion(None, columns)
 
 

@@ -16,9 +16,9 @@ from trihedron.diagnose.effects.contract import (
     per_axis,
 )
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
-from trihedron.diagnose.residuals.within_poses import LOUD, pose_scatter
+from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
 from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit, folds_of, predict_held_out
+from trihedron.diagnose.session.solve import fit, predict_held_out
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
@@ -82,7 +82,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     start = whole.at_means(state.gravity, state.accel_S, state.accel_b, state.gyro_S)
     start = replace(start, strengths=state.strengths)
     fits = (fit(whole, start, context.fitted.prior), context.fitted)
-    before, after = (predict_held_out(one, folds_of(one)) for one in fits)
+    before, after = (predict_held_out(one) for one in fits)
     gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
     if gain.max() < MIN_FALL or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
         return ()
@@ -97,8 +97,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that vibrate throughout, and how the level of one half predicts the other half, against the usual level."""
     scatter = pose_scatter(obs)
-    own = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
+    loud = loud_poses(obs) < SHAKES_P
     x = obs.readings
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):

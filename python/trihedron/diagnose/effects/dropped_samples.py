@@ -57,11 +57,6 @@ def find_losses(obs: Observations) -> tuple[Loss, ...]:
     return tuple(sorted(losses, key=lambda loss: loss.sample))
 
 
-def residual_after(obs: Observations, state: SessionState, m: int, losses: dict[int, int]) -> FloatArray:
-    """(5,) residuals of gravity and velocity after one move with ``losses`` inserted, in standard errors."""
-    return np.asarray(move_residuals(with_inserted(obs, m, losses), state)[0])
-
-
 def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observations:
     """One move alone, with ``losses`` (counts after samples) inserted."""
     a, b = obs.move_ranges[m]
@@ -201,8 +196,8 @@ class _Move:
 
     def misfit(self, losses: Sequence[Loss]) -> float:
         """Chi-square of gravity and velocity after the move with the lost samples inserted."""
-        residual = residual_after(self.obs, self.state, self.m, {one.sample: one.count for one in losses})
-        return float(residual @ residual)
+        whole = with_inserted(self.obs, self.m, {one.sample: one.count for one in losses})
+        return float((move_residuals(whole, self.state) ** 2).sum())
 
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
         """Losses with the counts that gravity determines, the clearest first; those that do not reduce the misfit are

@@ -47,7 +47,6 @@ class Plateau:
 
     @property
     def axis(self) -> int:
-        """Axis of its channel."""
         return self.limit.axis
 
     @property
@@ -172,12 +171,8 @@ def _n_samples(runs: list[Plateau]) -> int:
 
 
 class GyroSaturation(_Saturation):
-    """Rates beyond the gyro's range."""
-
     id, sensor = "gyro-saturation", GYRO
 
 
 class AccelSaturation(_Saturation):
-    """Specific force beyond the accelerometer's range."""
-
     id, sensor = "accel-saturation", ACCELEROMETER

@@ -42,16 +42,12 @@ class ThermalScale(Thermal):
 
 
 class AccelThermalScale(ThermalScale):
-    """Accelerometer scale."""
-
     id, sensor = "accel-thermal-scale", ACCELEROMETER
     confounded_with = ("accel-bias", "accel-scale")
     drifts_as = "accel-bias-drift"
 
 
 class GyroThermalScale(ThermalScale):
-    """Gyro scale."""
-
     id, sensor = "gyro-thermal-scale", GYRO
     confounded_with = ("gyro-bias", "gyro-scale")
     drifts_as = "gyro-bias-drift"
@@ -93,16 +89,12 @@ def _varies(speed: FloatArray) -> bool:
 
 
 class AccelThermalBias(ThermalBias):
-    """Accelerometer bias."""
-
     id, sensor = "accel-thermal-bias", ACCELEROMETER
     confounded_with = ("accel-bias",)
     drifts_as = "accel-bias-drift"
 
 
 class GyroThermalBias(ThermalBias):
-    """Gyro bias."""
-
     id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
     drifts_as = "gyro-bias-drift"

@@ -52,7 +52,6 @@ class Follows:
 
     @property
     def name(self) -> Name:
-        """Its sensor and variables."""
         return self.signal.sensor, self.signal.names
 
     @property
@@ -83,7 +82,6 @@ class Related:
 
     @property
     def names(self) -> set[Name]:
-        """Sensor and variables of every relation."""
         return {one.name for one in self.relations}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -58,7 +58,6 @@ class Observations(SessionReadings):
 
     @property
     def n_moves(self) -> int:
-        """Number of moves between neighbouring poses."""
         return len(self.move_ranges)
 
     def pose_names(self, which: Iterable[int]) -> tuple[str, ...]:
@@ -71,7 +70,6 @@ class Observations(SessionReadings):
         return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
 
     def without_moves(self, bad: Collection[int]) -> Observations:
-        """The same without the moves ``bad``."""
         keep = [m for m in range(self.n_moves) if m not in bad]
         return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
 
@@ -102,44 +100,28 @@ class Observations(SessionReadings):
         """(h,) standard errors of the norm of gravity, SI, whose gradient by the raw means is ``gradient`` (h, 3)."""
         return along_gradient(self.pose_force_sigma, self.force_up, gradient)
 
-    @cached_property
-    def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
-        """Samples of all poses concatenated, the first index of each pose, and the number of its samples."""
-        samples = [pose.samples() for pose in self.segments.poses]
-        lengths = np.array([len(one) for one in samples])
-        return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
-
     def pose_means(self, samples: FloatArray) -> FloatArray:
         """(poses, ...) means over each pose of a whole-recording signal (n, ...), without missing readings."""
-        index, first, n = self._still
-        values = samples[index]
-        sums = np.add.reduceat(values, first, axis=0)
-        if np.isnan(sums).any():
-            missing = np.isnan(values)
-            present = np.add.reduceat(~missing, first, axis=0, dtype=np.float64)
-            with np.errstate(invalid="ignore"):
-                return np.asarray(np.add.reduceat(np.where(missing, 0.0, values), first, axis=0) / present)
-        return np.asarray(sums / n.reshape(-1, *[1] * (values.ndim - 1)))
+        poses = self.segments.poses
+        ranges = [span for pose in poses for span in pose.undisturbed()]
+        owner = [i for i, pose in enumerate(poses) for _ in pose.undisturbed()]
+        return self._means(samples, ranges, owner, len(poses)).reshape(-1, *samples.shape[1:])
 
     @cached_property
     def half_means(self) -> tuple[FloatArray, FloatArray | None]:
         """(poses, 2, 3) raw means over the first and the second half of every pose, accelerometer and gyro."""
+        middles = [(pose.start, (pose.start + pose.stop + 1) // 2, pose.stop) for pose in self.segments.poses]
+        halves = [span for a, b, c in middles for span in ((a, b), (b, c))]
 
         def of(raw: FloatArray) -> FloatArray:
-            every = [np.array_split(raw[pose.start : pose.stop], 2) for pose in self.segments.poses]
-            return np.array([[np.nanmean(part, axis=0) for part in of_pose] for of_pose in every])
+            return self._means(raw, halves, range(len(halves)), len(halves)).reshape(-1, 2, 3)
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
 
-    @cached_property
-    def pose_scatter(self) -> FloatArray:
-        """(poses, 3, 3) covariance of raw accelerometer readings inside every pose; NaN where some are missing."""
-        out = np.empty((self.n_poses, 3, 3))
-        for i, pose in enumerate(self.segments.poses):
-            away = self.raw_force[pose.start : pose.stop]
-            away = away - away.mean(axis=0)
-            out[i] = away.T @ away / len(away)
-        return out
+    @staticmethod
+    def _means(values: FloatArray, ranges: Sequence[tuple[int, int]], owner: Sequence[int], n: int) -> FloatArray:
+        flat = np.ascontiguousarray(values.reshape(len(values), -1))
+        return _core.column_means(flat, np.array(ranges), np.array(owner), n)
 
     def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
         """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.session.model import (
     DYNAMICS,
@@ -41,7 +41,6 @@ class Distortion:
 
     @property
     def n_parameters(self) -> int:
-        """Number of effect parameters."""
         given = self.force if self.force is not None else self.rate
         return 0 if given is None else int(given.shape[2])
 
@@ -92,10 +91,10 @@ class System:
     """
 
     residual: FloatArray
-    domain: npt.NDArray[np.int8]
-    segment: npt.NDArray[np.intp]
-    channel: npt.NDArray[np.int8]
-    walk: npt.NDArray[np.int8]
+    domain: IntArray
+    segment: IntArray
+    channel: IntArray
+    walk: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +111,7 @@ class Fit:
     @cached_property
     def system(self) -> System:
         """Residual rows with their labels."""
-        domain, segment, channel, walk = self.core.labels.T
-        return System(
-            self.core.residual, domain.astype(np.int8), segment, channel.astype(np.int8), walk.astype(np.int8)
-        )
+        return System(self.core.residual, *self.core.labels.T)
 
     @cached_property
     def leverage(self) -> FloatArray:
@@ -221,24 +217,22 @@ class Prediction:
         return self.chi2 / np.maximum(self.n_rows, TINY)
 
 
-def folds_of(fitted: Fit) -> list[npt.NDArray[np.bool_]]:
-    """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
+def _folds(fitted: Fit) -> npt.NDArray[np.bool_]:
+    """(folds, rows) blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.obs
     direct = system.walk == 0
     out = []
     for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_poses), ((MOVES, DYNAMICS), obs.n_moves)):
-        for block in np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1))):
-            held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
-            if held.any():
-                out.append(held)
-    return out
+        rows = np.isin(system.domain, labels) & direct
+        blocks = np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1)))
+        out += [held for block in blocks if (held := rows & np.isin(system.segment, block)).any()]
+    return np.array(out, dtype=bool).reshape(len(out), len(direct))
 
 
-def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]]) -> Prediction:
-    """Predict every fold's rows from the others (blocked cross-validation, eq. 11.15).
+def predict_held_out(fitted: Fit) -> Prediction:
+    """Predict every block of poses or moves from all others (blocked cross-validation, eq. 11.15).
 
     The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale) makes
     them finite; it is the same for every model that is compared.
     """
-    flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
-    return Prediction(*fitted.core.held_out(np.ascontiguousarray(flags)))
+    return Prediction(*fitted.core.held_out(_folds(fitted)))

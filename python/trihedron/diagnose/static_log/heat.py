@@ -36,7 +36,6 @@ class SlowChange:
 
     @property
     def is_slow(self) -> bool:
-        """Whether anything changes slowly."""
         return self.p_value < SLOW
 
     @property

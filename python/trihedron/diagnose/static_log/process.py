@@ -97,7 +97,6 @@ class BiasProcess:
 
     @cached_property
     def span_s(self) -> float:
-        """Time from the first to the last reading."""
         return float(np.ptp(self.readings.time_s))
 
     @cached_property
@@ -111,7 +110,6 @@ class BiasProcess:
 
     @cached_property
     def grid(self) -> Grams:
-        """The whole grid."""
         return self.grams([np.concatenate([[0.0], self.readings.levels])] * 3 + [np.array(NOISE_LEVELS)])
 
     def grams(self, levels: Sequence[FloatArray]) -> Grams:

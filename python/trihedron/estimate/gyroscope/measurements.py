@@ -210,8 +210,7 @@ def _rounded(
         return None, np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
     is_static = resting_ends(*coarse, in_log) | resting_axes(*coarse)
     variance = np.maximum(variance, unseen_rotation(is_static, quantum, in_log))
-    shared = [np.zeros((len(rows), 3, 0)), *(error[rows][:, :, None] for error in shared_errors(*coarse))]
-    return variance[rows], is_static[rows].astype(np.float64), np.concatenate(shared, axis=2)
+    return variance[rows], is_static[rows].astype(np.float64), shared_errors(*coarse)[rows]
 
 
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:

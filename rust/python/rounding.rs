@@ -1,0 +1,84 @@
+//! Bindings of rounding errors.
+
+#![expect(
+    clippy::redundant_closure_for_method_calls,
+    reason = "the methods are of one lifetime"
+)]
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{as_rows, flat1, flat3, rows};
+use crate::rounding::Coarse;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(rounding_variance, module)?)?;
+    module.add_function(wrap_pyfunction!(resting_axes, module)?)?;
+    module.add_function(wrap_pyfunction!(shared_errors, module)?)
+}
+
+/// LSB, reading of the bias, and whether noise does not dither, of three axes each.
+type Adc<'py> = (
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, bool>,
+);
+
+/// A kernel's answer about `readings` `(n, 3)` of an `adc`; `steady` as [`Coarse`] has them.
+fn asked<T: Send>(
+    py: Python<'_>,
+    readings: &PyReadonlyArray2<'_, f64>,
+    adc: &Adc<'_>,
+    (in_step, chatter): (f64, usize),
+    of: impl FnOnce(&Coarse<'_>) -> T + Send,
+) -> PyResult<T> {
+    let flat = flat3("readings", readings)?;
+    let wrong = |_| PyValueError::new_err("three axes each");
+    let coarse = Coarse {
+        readings: as_rows(&flat),
+        quantum: flat1(&adc.0).as_ref().try_into().map_err(wrong)?,
+        rest: flat1(&adc.1).as_ref().try_into().map_err(wrong)?,
+        axes: flat1(&adc.2).as_ref().try_into().map_err(wrong)?,
+        in_step,
+        chatter,
+    };
+    super::run(py, || Ok(of(&coarse)))
+}
+
+/// Rounding variance `(n, 3)` of readings for sums that treat them as independent.
+#[pyfunction]
+fn rounding_variance<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    adc: Adc<'py>,
+    steady: (f64, usize),
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let out = asked(py, &readings, &adc, steady, |one| one.variance())?;
+    rows(py, out.as_flattened(), 3)
+}
+
+/// Whether an axis rests in the LSB of its bias, `(n, 3)`.
+#[pyfunction]
+fn resting_axes<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    adc: Adc<'py>,
+    steady: (f64, usize),
+) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let out = asked(py, &readings, &adc, steady, |one| one.resting())?;
+    out.as_flattened().to_pyarray(py).reshape([out.len(), 3])
+}
+
+/// Axes, and errors `(n,)` of one standard deviation each along them, that all moves share.
+#[pyfunction]
+fn shared_errors<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    adc: Adc<'py>,
+    steady: (f64, usize),
+) -> PyResult<Vec<(usize, Bound<'py, PyArray1<f64>>)>> {
+    let out = asked(py, &readings, &adc, steady, |one| one.shared())?;
+    let array = |(axis, error): (usize, Vec<f64>)| (axis, error.to_pyarray(py));
+    Ok(out.into_iter().map(array).collect())
+}
