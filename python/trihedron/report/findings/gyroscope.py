@@ -9,6 +9,13 @@ _OUTSIDE_THE_MODEL = (
     "that were lost without a trace in the timestamps."
 )
 _BIAS_CHANGES = "warm-up, bias drift, or a bias that depends on attitude (g-sensitivity)."
+_WRONG_TURN = (
+    "turn {turn} ({at_s:.1f} s), taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} "
+    "against the "
+)
+_ANOTHER_TURN = "the case did not touch the wall, or the turn was another one."
+_CORRECT_ITS_VALUE = "Correct value {turn} of --turns (0 leaves the turn out), or repeat the turn."
+_CORRECT_OR_REPEAT = f"{{is_stated:?{_CORRECT_ITS_VALUE}|Repeat this turn.}}"
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
 
 _MOVES = {
@@ -186,16 +193,14 @@ _MOVES = {
 
 _TURNS = {
     (Code.TURN_NOT_A_MULTIPLE, "left-out", WARNING): Words(
-        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; it is excluded.",
-        "the case did not touch the wall, or the turn was another one.",
-        "Repeat this turn.",
+        _WRONG_TURN + "others; it is excluded.",
+        _ANOTHER_TURN,
+        _CORRECT_OR_REPEAT,
     ),
     (Code.TURN_NOT_A_MULTIPLE, "contradicted", SERIOUS): Words(
-        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; no third turn shows which of them is wrong.",
-        "the case did not touch the wall, or the turn was another one.",
-        "Repeat this turn.",
+        _WRONG_TURN + "others; no third turn shows which of them is wrong.",
+        _ANOTHER_TURN,
+        _CORRECT_OR_REPEAT,
     ),
     (Code.TURN_NOT_A_MULTIPLE, "scatter", WARNING): Words(
         "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
@@ -204,12 +209,20 @@ _TURNS = {
     ),
     **{
         (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(
-            f"turn {{turn}} about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} {{wanted_rad:.0f deg}}; it is "
-            "excluded.",
-            "turned without a wall, or the nominal scale is far off.",
-            "Repeat it against a wall, or give its angle.",
+            f"turn {{turn}} ({{at_s:.1f}} s) about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} "
+            "{wanted_rad:.0f deg}; it is excluded.",
+            cause,
+            action,
         )
-        for case, what in (("not-the-stated", "the stated"), ("no-multiple", "any multiple of"))
+        for case, what, cause, action in (
+            ("not-the-stated", "the stated", "another angle or sign than stated.", _CORRECT_ITS_VALUE),
+            (
+                "no-multiple",
+                "any multiple of",
+                "turned without a wall, or the nominal scale is far off.",
+                "Repeat it against a wall, or give its angle.",
+            ),
+        )
     },
     (Code.TURN_UNCHECKED, "", WARNING): Words(
         "only one turn about {axes:axes and}: a wrong angle would not show.",
