@@ -315,4 +315,4 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert main([*counted, "0.0573 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err
     assert main([*counted, "0.0305 deg/s"]) == 1, "a size of another range would scale what the file corrects"
-    assert "0.53 times" in capsys.readouterr().err
+    assert "0.531 times" in capsys.readouterr().err

@@ -14,7 +14,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
     resting_spans,
     stated,
 )
-from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates
+from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_fitted
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -53,11 +53,11 @@ def on_stated_turns(
     wrong, either = contradicted(rates.on(calibration), rates.unit)
     is_used = ~np.isin(np.arange(len(angles)), wrong)
     updated = rates.of(is_used).scattered_on(calibration)
+    if not updated.is_fitted:
+        return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=True)))
     missed = (rates.predicted(updated.values)[0] - rates.speeds) / rates.unit
     said = [
-        wrong_turn(
-            at[k], angles[k], int(np.argmax(np.abs(axes[k]))), missed[k], is_excluded=k in wrong, is_stated=True
-        )
+        wrong_turn(at[k], angles[k], int(np.argmax(np.abs(axes[k]))), missed[k], is_excluded=k in wrong, is_stated=True)
         for k in (*wrong, *either)
     ]
     said += loose_turns(updated.scatter)

@@ -82,7 +82,9 @@ def calibrate_turns(
         observability=_observability(fit),
     )
     deviation = system.residual(fit) @ S.T
-    return calibration, tuple(turn_findings(known, screened, deviation, calibration.S, inflation, fit.dof, recording.time_s))
+    return calibration, tuple(
+        turn_findings(known, screened, deviation, calibration.S, inflation, fit.dof, recording.time_s)
+    )
 
 
 def _inflation(fit: KnownFit) -> float:
@@ -169,7 +171,13 @@ def screen(system: TurnSystem, used: BoolArray) -> Screened:
 
 
 def turn_findings(
-    known: Sequence[KnownTurn], screened: Screened, deviation: FloatArray, S: FloatArray, inflation: float, dof: int, time_s: FloatArray
+    known: Sequence[KnownTurn],
+    screened: Screened,
+    deviation: FloatArray,
+    S: FloatArray,
+    inflation: float,
+    dof: int,
+    time_s: FloatArray,
 ) -> Iterator[Finding]:
     """Findings: turns that are no multiple of 90°, contradicting turns, axes with a single turn, handedness, drift."""
     at = [TurnName(one.turn.number or i + 1, float(time_s[one.turn.start])) for i, one in enumerate(known)]
@@ -177,9 +185,7 @@ def turn_findings(
     for index in screened.suspects:
         one, error = known[index], float(np.linalg.norm(deviation[index]))
         is_excluded, is_stated = index in screened.removed, one.turn.angle_rad is not None
-        yield wrong_turn(
-            at[index], one.angle_rad, one.turn.axis, error, is_excluded=is_excluded, is_stated=is_stated
-        )
+        yield wrong_turn(at[index], one.angle_rad, one.turn.axis, error, is_excluded=is_excluded, is_stated=is_stated)
     yield from loose_turns(screened.system.sigma_turn)
     if screened.unchecked_axes:
         yield Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes])

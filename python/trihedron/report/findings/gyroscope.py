@@ -24,11 +24,17 @@ _MOVES = {
         "what was stated."
     ),
     (Code.TURNTABLE, "contradicting", WARNING): Words(
-        "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
-        "on average, from what moves and poses give: more than noise explains; each was given that "
-        "uncertainty.",
+        "moves and poses give {seen_rad_s:.4g °/s} where {stated_rad_s:.4g °/s} is stated; they differ from the "
+        "speeds of {turns:.0f} steady turns by {common_percent:+.2g} % on average, {rms:.2g %} rms, more than noise "
+        "explains; each was given that uncertainty.",
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
-        "Count the turns in a minute; state --turntable-error.",
+        "Correct --turntable, by the turns in a minute, or state --turntable-error.",
+    ),
+    (Code.TURNTABLE, "not-fitted", SERIOUS): Words(
+        "the fit to {turns:.0f} {is_turned:?turns by stated angles|steady turns at stated speeds} did not converge: it "
+        "is off by {rms:.2g %} rms, more than noise explains; they are left out.",
+        "moves that hardly determine the gyro, or another {is_turned:?angle|speed} than stated.",
+        "Turn the sensor about all three axes between poses of many orientations; check --turn{is_turned:?s|table}.",
     ),
     (Code.TURNTABLE, "turns", NOTE): Words(
         "{turns:.0f} turns by stated angles were fitted beside poses and moves: |∫ω dt| within {rms_rad:.2g deg} rms "
