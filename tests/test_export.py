@@ -311,5 +311,8 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["b_c.c", f"{tmp_path.name}_c.c"]
     assert main(["export", str(file), str(file), "--to", "c", "-o", str(tmp_path / "same")]) == 1
     assert "names that differ" in capsys.readouterr().err
-    assert main(["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb", "0.01 deg/s"]) == 0
+    counted = ["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb"]
+    assert main([*counted, "0.0573 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err
+    assert main([*counted, "0.0305 deg/s"]) == 1, "a size of another range would scale what the file corrects"
+    assert "0.531 times" in capsys.readouterr().err

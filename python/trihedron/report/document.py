@@ -40,6 +40,7 @@ CONSEQUENCE = (
     FindingCode.LOG_TURNED,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
+    FindingCode.TURN_NOT_A_MULTIPLE,
     FindingCode.TABLE_TILT,
     FindingCode.GRAVITY_DEFAULTED,
     FindingCode.EFFECTS_MODELLED,

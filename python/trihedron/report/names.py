@@ -54,6 +54,8 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
+IN_FULL = ("left-handed", "turntable")
+"""Warnings whose first clause says in a few words which axis or value it is."""
 SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)
 
 
@@ -76,7 +78,9 @@ def finding_in_print(code: str) -> str:
 
 def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
     """Warnings of one code by name, with the sensors that their sentences name, or else their number:
-    ``clipping (accelerometer and gyro)``, ``outlier pose (3)``."""
+    ``clipping (accelerometer and gyro)``, ``outlier pose (3)``; one of ``IN_FULL`` by its sentence."""
+    if code in IN_FULL and len(sentences) == 1:
+        return sentences[0]
     name = finding_in_print(code)
     named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
     if named and not SENSOR.search(name):

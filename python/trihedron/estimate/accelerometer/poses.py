@@ -23,6 +23,9 @@ ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 RANK_TOLERANCE = 1e-6
 """Singular value, relative to the largest, below which a combination of parameters is undetermined: only repeated
 readings of one pose agree to 1 ppm."""
+DIRECTION_NOISE = 2.0
+"""Singular value, in standard errors of all poses together, that errors of their directions alone produce: |g| and both
+directions across have the same σ, and the derivative of a square is 2."""
 
 
 @cache
@@ -103,7 +106,8 @@ class PoseDesign:
         padded = np.zeros((max(len(rows), 9), 9))
         padded[: len(rows)] = rows / scale
         _, s, vt = np.linalg.svd(padded, full_matrices=False)
-        rank = int(np.sum(s > RANK_TOLERANCE * s[0]))
+        noise = DIRECTION_NOISE * np.sqrt(len(rows)) * np.linalg.norm(vt / scale, axis=1)
+        rank = int(np.sum(s > np.maximum(RANK_TOLERANCE * s[0], noise)))
         half = (vt[:rank].T / s[:rank]) / scale[:, None]
         return cls(rows, rows.T @ rows, half @ half.T, rank, s, scale, vt)
 

@@ -1,6 +1,7 @@
 """Findings of the fit of moves."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -173,12 +174,23 @@ def loose_turns(sigma_turn_rad: float) -> Iterator[Finding]:
         yield Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma_turn_rad)
 
 
-def wrong_turn(index: int, angle_rad: float, axis: int, deviation_rad: float, *, is_excluded: bool) -> Finding:
+class TurnName(NamedTuple):
+    """A turn's ``number`` among all that were found, from one, and when it begins."""
+
+    number: int
+    at_s: float
+
+
+def wrong_turn(
+    at: TurnName, angle_rad: float, axis: int, deviation_rad: float, *, is_excluded: bool, is_stated: bool
+) -> Finding:
     """Finding on a turn that others contradict; where they do not show which of them is wrong, none is excluded."""
     return Finding.of(
         FindingCode.TURN_NOT_A_MULTIPLE,
         "left-out" if is_excluded else "contradicted",
-        turn=index + 1,
+        turn=at.number,
+        at_s=at.at_s,
+        is_stated=is_stated,
         angle_rad=angle_rad,
         axis=axis + 1,
         deviation_rad=abs(deviation_rad),

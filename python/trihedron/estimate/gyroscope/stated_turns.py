@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.gyroscope.findings import loose_turns, wrong_turn
+from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, wrong_turn
 from trihedron.estimate.gyroscope.turn_angles import (
     MeasuredTurns,
     measure_turns,
@@ -14,7 +14,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
     resting_spans,
     stated,
 )
-from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates
+from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_fitted
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -38,7 +38,7 @@ def on_stated_turns(
     gyro = calibration.gyroscope
     if gyro is None:
         return calibration
-    measured, angles, axes = _turns(recording, segments, calibration.accelerometer, angles_deg)
+    at, measured, angles, axes = _turns(recording, segments, calibration.accelerometer, angles_deg)
     lasts_s = measured.duration_s[:, None]
     rates = StatedRates(
         mean=measured.raw_angle / lasts_s,
@@ -53,9 +53,11 @@ def on_stated_turns(
     wrong, either = contradicted(rates.on(calibration), rates.unit)
     is_used = ~np.isin(np.arange(len(angles)), wrong)
     updated = rates.of(is_used).scattered_on(calibration)
+    if not updated.is_fitted:
+        return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=True)))
     missed = (rates.predicted(updated.values)[0] - rates.speeds) / rates.unit
     said = [
-        wrong_turn(k, angles[k], int(np.argmax(np.abs(axes[k]))), missed[k], is_excluded=k in wrong)
+        wrong_turn(at[k], angles[k], int(np.argmax(np.abs(axes[k]))), missed[k], is_excluded=k in wrong, is_stated=True)
         for k in (*wrong, *either)
     ]
     said += loose_turns(updated.scatter)
@@ -69,15 +71,17 @@ def on_stated_turns(
 
 def _turns(
     recording: Recording, segments: Segments, accelerometer: SensorCalibration, angles_deg: Sequence[float]
-) -> tuple[MeasuredTurns, FloatArray, FloatArray]:
+) -> tuple[list[TurnName], MeasuredTurns, FloatArray, FloatArray]:
     """Moves that do not change gravity's direction, their stated angles (k,) [rad], and the vertical (k, 3) in each."""
     assert segments.accelerometer_mean is not None
     up = correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b)
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     is_level = [np.linalg.norm(up[one.pose_after] - up[one.pose_before]) < SAME_POSE for one in segments.moves]
     known = stated(recording, [one for one, level in zip(segments.moves, is_level, strict=True) if level], angles_deg)
-    measured = measure_turns(recording, [move for move, _ in known], resting_spans(segments))
-    return measured, np.array([angle for _, angle in known]), np.array([up[move.pose_before] for move, _ in known])
+    numbers, moves, angles = zip(*known, strict=True) if known else ((), (), ())
+    at = [TurnName(k, float(recording.time_s[move.start])) for k, move in zip(numbers, moves, strict=True)]
+    measured = measure_turns(recording, moves, resting_spans(segments))
+    return at, measured, np.array(angles), np.array([up[move.pose_before] for move in moves])
 
 
 def contradicted(found: Predicted, unit: FloatArray) -> tuple[list[int], list[int]]:

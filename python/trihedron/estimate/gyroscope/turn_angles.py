@@ -34,13 +34,14 @@ SLACK_RAD = math.radians(10.0)
 class Turn:
     """Samples ``[start, stop)`` of a turn about the axis of the case that points up, ``face`` (±1, ±2, ±3).
 
-    ``angle_rad`` is its signed angle where known.
+    ``angle_rad`` is its signed angle where known; ``number`` its place, from one, among all turns that were found.
     """
 
     start: int
     stop: int
     face: int
     angle_rad: float | None = None
+    number: int = 0
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
@@ -263,12 +264,13 @@ def turns_on_faces(
 ) -> list[Turn]:
     """Turns about the axis of the case that points up; multiples of 90° where the user states no angles."""
     moves = moves_on_faces(segments, up)
-    known = [(move, None) for move in moves] if angles_deg is None else stated(recording, moves, angles_deg)
-    return [Turn(move.start, move.stop, int(up[move.pose_before]), angle) for move, angle in known]
+    every = enumerate(moves, start=1)
+    known = [(k, move, None) for k, move in every] if angles_deg is None else stated(recording, moves, angles_deg)
+    return [Turn(move.start, move.stop, int(up[move.pose_before]), angle, k) for k, move, angle in known]
 
 
-def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]) -> list[tuple[Move, float]]:
-    """Moves with their stated angles [rad], without those of 0.
+def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]) -> list[tuple[int, Move, float]]:
+    """Moves with their numbers, from one, and their stated angles [rad], without those of 0.
 
     Raises ``InputError`` when the numbers of turns and angles differ; the message states when each turn was found.
     """
@@ -279,7 +281,8 @@ def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float])
             f"{len(angles_deg)} turns were stated and {len(moves)} were found between poses of the same tilt{where}: "
             "give one angle in degrees for each, 0 to leave it out."
         )
-    return [(move, math.radians(angle)) for move, angle in zip(moves, angles_deg, strict=True) if angle != 0.0]
+    every = enumerate(zip(moves, angles_deg, strict=True), start=1)
+    return [(k, move, math.radians(angle)) for k, (move, angle) in every if angle != 0.0]
 
 
 def resting_spans(segments: Segments) -> list[tuple[int, int]]:

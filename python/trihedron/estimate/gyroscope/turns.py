@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.gyroscope.findings import drift_findings, loose_turns, wrong_turn
+from trihedron.estimate.gyroscope.findings import TurnName, drift_findings, loose_turns, wrong_turn
 from trihedron.estimate.gyroscope.stated_turns import contradicted
 from trihedron.estimate.gyroscope.turn_angles import (
     QUARTER,
@@ -82,7 +82,9 @@ def calibrate_turns(
         observability=_observability(fit),
     )
     deviation = system.residual(fit) @ S.T
-    return calibration, tuple(turn_findings(known, screened, deviation, calibration.S, inflation, fit.dof))
+    return calibration, tuple(
+        turn_findings(known, screened, deviation, calibration.S, inflation, fit.dof, recording.time_s)
+    )
 
 
 def _inflation(fit: KnownFit) -> float:
@@ -169,13 +171,21 @@ def screen(system: TurnSystem, used: BoolArray) -> Screened:
 
 
 def turn_findings(
-    known: Sequence[KnownTurn], screened: Screened, deviation: FloatArray, S: FloatArray, inflation: float, dof: int
+    known: Sequence[KnownTurn],
+    screened: Screened,
+    deviation: FloatArray,
+    S: FloatArray,
+    inflation: float,
+    dof: int,
+    time_s: FloatArray,
 ) -> Iterator[Finding]:
     """Findings: turns that are no multiple of 90°, contradicting turns, axes with a single turn, handedness, drift."""
-    yield from (_not_a_multiple(i, turn) for i, turn in enumerate(known) if _is_wrong(turn))
+    at = [TurnName(one.turn.number or i + 1, float(time_s[one.turn.start])) for i, one in enumerate(known)]
+    yield from (_not_a_multiple(at[i], turn) for i, turn in enumerate(known) if _is_wrong(turn))
     for index in screened.suspects:
         one, error = known[index], float(np.linalg.norm(deviation[index]))
-        yield wrong_turn(index, one.angle_rad, one.turn.axis, error, is_excluded=index in screened.removed)
+        is_excluded, is_stated = index in screened.removed, one.turn.angle_rad is not None
+        yield wrong_turn(at[index], one.angle_rad, one.turn.axis, error, is_excluded=is_excluded, is_stated=is_stated)
     yield from loose_turns(screened.system.sigma_turn)
     if screened.unchecked_axes:
         yield Finding.of(FindingCode.TURN_UNCHECKED, axes=[axis + 1 for axis in screened.unchecked_axes])
@@ -193,12 +203,13 @@ def _is_wrong(turn: KnownTurn) -> bool:
     return not turn.is_used and is_turn and abs(turn.seen_rad) > 0.2
 
 
-def _not_a_multiple(index: int, turn: KnownTurn) -> Finding:
+def _not_a_multiple(at: TurnName, turn: KnownTurn) -> Finding:
     stated = turn.turn.angle_rad
     return Finding.of(
         FindingCode.TURN_NOT_A_MULTIPLE,
         "no-multiple" if stated is None else "not-the-stated",
-        turn=index,
+        turn=at.number,
+        at_s=at.at_s,
         axis=turn.turn.axis + 1,
         seen_rad=turn.seen_rad,
         wanted_rad=QUARTER if stated is None else stated,

@@ -76,7 +76,12 @@ class StatedRates:
                 break
         posterior = prior - gain @ slope @ prior
         covariance = 0.5 * (posterior + posterior.T)
-        return Updated(misfit, innovation, values=values, covariance=covariance, scatter=scatter)
+        left = self.speeds - self.predicted(values)[0]
+        chi2 = float(left @ np.linalg.solve(noise, left))
+        is_fitted = fdtrc(float(len(left)), NOISE_DOF, chi2 / len(left)) >= FALSE_ALARM
+        return Updated(
+            misfit, innovation, values=values, covariance=covariance, scatter=scatter, left=left, is_fitted=is_fitted
+        )
 
     def scattered_on(self, calibration: Calibration) -> Updated:
         """The calibration updated with these rates, and with the scatter that they show."""
@@ -123,11 +128,14 @@ class Predicted:
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Updated(Predicted):
     """Parameters of both sensors ``values`` (24,) with their ``covariance`` (24, 24), and the ``scatter`` of the rates
-    [rad/s], which the session predicts."""
+    [rad/s], which the session predicts. ``left`` (k,) [rad/s] of the rates differs from these parameters, by no more
+    than their noise where the update ``is_fitted``."""
 
     values: FloatArray
     covariance: FloatArray
     scatter: float
+    left: FloatArray
+    is_fitted: bool
 
     def of(self, calibration: Calibration, recording: Recording, segments: Segments) -> Calibration:
         """The calibration with these parameters, and with residuals of poses and moves at them."""
@@ -279,8 +287,9 @@ def on_turntable(
     unshared = np.zeros((len(speeds), 3, 0))
     rates = StatedRates(found.mean, found.covariance, unshared, speeds, speeds, relative_sigma).of(used)
     updated = rates.scattered_on(calibration)
-    left = float(np.sqrt(np.mean((rates.predicted(updated.values)[0] / rates.speeds - 1.0) ** 2)))
-    said = _said(updated.scatter, updated.misfit / rates.speeds, left, relative_sigma)
+    if not updated.is_fitted:
+        return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=False)))
+    said = _said(rates, updated, rates.predicted(parameters_of(calibration))[0])
     after = updated.of(calibration, recording, segments)
     return replace(after, findings=(*calibration.findings, said))
 
@@ -300,17 +309,26 @@ def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> F
     return np.broadcast_to(given, (n,)).copy()
 
 
-def _said(scatter: float, missed: FloatArray, rms: float, sigma: float) -> Finding:
-    """Finding on the speeds: relative misfits ``missed`` (k,) before the update and their ``rms`` after it."""
-    common = float(np.mean(missed))
-    figures = {"rms": rms, "scatter": scatter, "sigma": sigma, "common": common}
-    if scatter == 0.0:
-        return Finding.of(FindingCode.TURNTABLE, turns=len(missed), rms_percent=100.0 * rms, numbers=figures)
+def not_fitted(rates: StatedRates, updated: Updated, *, is_turned: bool) -> Finding:
+    """Finding on rates that the update leaves off by more than noise: it did not converge."""
+    rms = float(np.sqrt(np.mean((updated.left / rates.speeds) ** 2)))
+    return Finding.of(FindingCode.TURNTABLE, "not-fitted", turns=len(rates.speeds), is_turned=is_turned, rms=rms)
+
+
+def _said(rates: StatedRates, updated: Updated, seen: FloatArray) -> Finding:
+    """Finding on the speeds, of which moves and poses give ``seen`` (k,) [rad/s]."""
+    turns, rms = len(seen), float(np.sqrt(np.mean((updated.left / rates.speeds) ** 2)))
+    if updated.scatter == 0.0:
+        return Finding.of(FindingCode.TURNTABLE, turns=turns, rms_percent=100.0 * rms)
+    off = seen / rates.speeds - 1.0
+    worst = int(np.argmax(np.abs(off)))
     return Finding.of(
         FindingCode.TURNTABLE,
         "contradicting",
-        turns=len(missed),
-        scatter_percent=100.0 * scatter,
-        common_percent=100.0 * common,
-        numbers=figures,
+        turns=turns,
+        seen_rad_s=seen[worst],
+        stated_rad_s=rates.speeds[worst],
+        rms=float(np.sqrt(np.mean(off**2))),
+        common_percent=100.0 * float(np.mean(off)),
+        numbers={"scatter": updated.scatter, "sigma": rates.relative_sigma},
     )

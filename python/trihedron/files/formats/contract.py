@@ -19,10 +19,15 @@ from trihedron.units import (
     acceleration_lsb_to_si,
     acceleration_to_si,
     degrees_from_radians,
+    mg_from_m_s2,
     mm_s2_from_m_s2,
     rate_lsb_to_si,
     rate_to_si,
 )
+
+LARGEST_LSB_RATIO = 1.1
+"""Ratio of nominal and calibrated LSB above which they are of another range or part: parts are within 10 % of data
+sheets, and their scales as a rule within 3 %."""
 
 NO_GYRO = "no gyroscope in this calibration"
 
@@ -92,24 +97,32 @@ class Format:
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
     """The calibration for readings that the target's driver converts to SI.
 
-    Raises ``InputError`` when it is for counts and the LSB is not given.
+    Raises ``InputError`` when it is for counts and the LSB is not given, or is another than the calibrated one.
     """
     made, unsaid = {}, []
     for name, sensor in calibration.sensors:
+        found = float(np.exp(np.mean(np.log(np.linalg.norm(sensor.S, axis=0)))))
         if name == "accelerometer":
             unit, lsb = acceleration_to_si(AccelerationUnit(sensor.raw_unit)), options.accel_lsb
-            lsb_to_si, said = acceleration_lsb_to_si, "--accel-lsb '0.061 mg'"
+            lsb_to_si, option, size = acceleration_lsb_to_si, "--accel-lsb", f"{mg_from_m_s2(found):.3g} mg"
         else:
             unit, lsb = rate_to_si(RateUnit(sensor.raw_unit)), options.gyro_lsb
-            lsb_to_si, said = rate_lsb_to_si, "--gyro-lsb '0.0305 deg/s'"
+            lsb_to_si, option, size = rate_lsb_to_si, "--gyro-lsb", f"{degrees_from_radians(found):.3g} deg/s"
         if unit is None and not lsb:
-            unsaid.append(said)
-        else:
-            made[name] = _rescaled(sensor, lsb_to_si(lsb) if unit is None else unit)
+            unsaid.append(f"{option} '{size}'")
+            continue
+        nominal = lsb_to_si(lsb) if unit is None else unit
+        if unit is None and not 1.0 / LARGEST_LSB_RATIO <= nominal / found <= LARGEST_LSB_RATIO:
+            raise InputError(
+                f"{option} '{lsb}' is {nominal / found:.3g} times the {size} per count that this calibration found: "
+                f"state the size of a count at the range that {target}'s driver sets, the one of this log."
+            )
+        made[name] = _rescaled(sensor, nominal)
     if unsaid:
         raise InputError(
-            f"{target} expects readings in SI and this calibration maps counts: say the size of a count that its "
-            f"driver assumes with {' '.join(unsaid)}, or export to c, rust or python."
+            f"{target} expects readings in SI and this calibration maps counts: state the data sheet's size of a "
+            f"count, as its driver assumes it, near what was calibrated: {' '.join(unsaid)}; or export to c, rust or "
+            "python."
         )
     return replace(calibration, **made)  # type: ignore[arg-type]
 

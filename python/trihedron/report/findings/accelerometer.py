@@ -27,7 +27,8 @@ ENTRIES = {
     ),
     (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
-        "{unseen:&, }, constrained by a prior of {anchor:.0f %} about an ideal triad.",
+        "{is_combined:?{missing:# combination} of |}{unseen:&, }, constrained by a prior of {anchor:.0f %} about an "
+        "ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _FACES_OR_POSES,
     ),

@@ -9,6 +9,13 @@ _OUTSIDE_THE_MODEL = (
     "that were lost without a trace in the timestamps."
 )
 _BIAS_CHANGES = "warm-up, bias drift, or a bias that depends on attitude (g-sensitivity)."
+_WRONG_TURN = (
+    "turn {turn} ({at_s:.1f} s), taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} "
+    "against the "
+)
+_ANOTHER_TURN = "the case did not touch the wall, or the turn was another one."
+_CORRECT_ITS_VALUE = "Correct value {turn} of --turns (0 leaves the turn out), or repeat the turn."
+_CORRECT_OR_REPEAT = f"{{is_stated:?{_CORRECT_ITS_VALUE}|Repeat this turn.}}"
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back."
 
 _MOVES = {
@@ -17,11 +24,17 @@ _MOVES = {
         "what was stated."
     ),
     (Code.TURNTABLE, "contradicting", WARNING): Words(
-        "the stated speeds of {turns:.0f} steady turns are off by {scatter_percent:.2g} % rms, {common_percent:+.2g} % "
-        "on average, from what moves and poses give: more than noise explains; each was given that "
-        "uncertainty.",
+        "moves and poses give {seen_rad_s:.4g °/s} where {stated_rad_s:.4g °/s} is stated; they differ from the "
+        "speeds of {turns:.0f} steady turns by {common_percent:+.2g} % on average, {rms:.2g %} rms, more than noise "
+        "explains; each was given that uncertainty.",
         "another speed than stated, a table that does not keep it, or a sensor that S and b do not describe.",
-        "Count the turns in a minute; state --turntable-error.",
+        "Correct --turntable, by the turns in a minute, or state --turntable-error.",
+    ),
+    (Code.TURNTABLE, "not-fitted", SERIOUS): Words(
+        "the fit to {turns:.0f} {is_turned:?turns by stated angles|steady turns at stated speeds} did not converge: it "
+        "is off by {rms:.2g %} rms, more than noise explains; they are left out.",
+        "moves that hardly determine the gyro, or another {is_turned:?angle|speed} than stated.",
+        "Turn the sensor about all three axes between poses of many orientations; check --turn{is_turned:?s|table}.",
     ),
     (Code.TURNTABLE, "turns", NOTE): Words(
         "{turns:.0f} turns by stated angles were fitted beside poses and moves: |∫ω dt| within {rms_rad:.2g deg} rms "
@@ -186,16 +199,14 @@ _MOVES = {
 
 _TURNS = {
     (Code.TURN_NOT_A_MULTIPLE, "left-out", WARNING): Words(
-        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; it is excluded.",
-        "the case did not touch the wall, or the turn was another one.",
-        "Repeat this turn.",
+        _WRONG_TURN + "others; it is excluded.",
+        _ANOTHER_TURN,
+        _CORRECT_OR_REPEAT,
     ),
     (Code.TURN_NOT_A_MULTIPLE, "contradicted", SERIOUS): Words(
-        "turn {turn}, taken as {angle_rad:.0f deg} about {axis:axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; no third turn shows which of them is wrong.",
-        "the case did not touch the wall, or the turn was another one.",
-        "Repeat this turn.",
+        _WRONG_TURN + "others; no third turn shows which of them is wrong.",
+        _ANOTHER_TURN,
+        _CORRECT_OR_REPEAT,
     ),
     (Code.TURN_NOT_A_MULTIPLE, "scatter", WARNING): Words(
         "the turns scatter by {sigma_turn_rad:.2g deg} about their nominal multiples; the uncertainties include it.",
@@ -204,12 +215,20 @@ _TURNS = {
     ),
     **{
         (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(
-            f"turn {{turn}} about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} {{wanted_rad:.0f deg}}; it is "
-            "excluded.",
-            "turned without a wall, or the nominal scale is far off.",
-            "Repeat it against a wall, or give its angle.",
+            f"turn {{turn}} ({{at_s:.1f}} s) about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} "
+            "{wanted_rad:.0f deg}; it is excluded.",
+            cause,
+            action,
         )
-        for case, what in (("not-the-stated", "the stated"), ("no-multiple", "any multiple of"))
+        for case, what, cause, action in (
+            ("not-the-stated", "the stated", "another angle or sign than stated.", _CORRECT_ITS_VALUE),
+            (
+                "no-multiple",
+                "any multiple of",
+                "turned without a wall, or the nominal scale is far off.",
+                "Repeat it against a wall, or give its angle.",
+            ),
+        )
     },
     (Code.TURN_UNCHECKED, "", WARNING): Words(
         "only one turn about {axes:axes and}: a wrong angle would not show.",
