@@ -18,6 +18,8 @@ from trihedron.sanitise import one_line
 
 FEWEST_READINGS, LEAST_S = 512, 20.0
 """Fewest readings for the separation of noise terms, and least length of a log whose terms are of use."""
+USEFUL_S = 3600.0
+"""Length of a static log from which on B and K that do not show are bounded usefully."""
 NOT_OF_THE_SENSOR = (FindingCode.TEMPERATURE_DRIVEN, FindingCode.LOG_TURNED)
 """Findings of a log whose slow changes are not noise: B, K and R are upper limits of the sensor's own."""
 
@@ -285,6 +287,16 @@ class Noise(Presented):
     def has_slow_noise_only(self) -> bool:
         """Whether slow changes are noise: neither temperature nor a turn of the unit is in B, K and R."""
         return not any(finding.code in NOT_OF_THE_SENSOR for finding in self.findings)
+
+    @property
+    def shows_white_alone(self) -> bool:
+        """Whether the log is shorter than ``USEFUL_S`` and no axis has slow noise: B and K then have limits only."""
+        slow = (TermName.BIAS_INSTABILITY, TermName.RATE_RANDOM_WALK)
+        is_seen = any(
+            any(axis.terms[term].is_present for term in slow) or axis.is_slow_noise_unresolved or axis.gauss_markov
+            for axis in self.axes
+        )
+        return not is_seen and self.curve.n_samples < USEFUL_S * self.curve.rate_hz
 
     @property
     def is_trustworthy(self) -> bool:

@@ -38,6 +38,7 @@ CONSEQUENCE = (
     FindingCode.FILTER_NOISE_BELOW_QUIETEST,
     FindingCode.TEMPERATURE_DRIVEN,
     FindingCode.LOG_TURNED,
+    FindingCode.LOG_DRIFT,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
     FindingCode.TURN_NOT_A_MULTIPLE,

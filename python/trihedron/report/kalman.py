@@ -75,8 +75,8 @@ def _next_step(calibration: Calibration) -> str:
     if not doubted:
         return verified
     widening = plain_number(max(one.numbers["widening"] for one in doubted), 2)
-    return f"`trihedron diagnose LOG` shows what the readings have beside noise; until it is modelled, every ± is \
-{widening} times too small. {verified}"
+    return f"`trihedron diagnose LOG` shows what the readings have beside noise; until it is modelled, the \
+uncertainties are multiplied by {widening} for it. {verified}"
 
 
 def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:
@@ -106,7 +106,7 @@ def _meaning(seen: Consistency) -> str:
     if seen.nis_mean < seen.nis_low:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:
-        return "the noise given is too small, the uncertainties too narrow"
+        return "the noise given is too small; the uncertainties are multiplied by the root of it"
     return "as predicted"
 
 

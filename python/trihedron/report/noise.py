@@ -21,7 +21,7 @@ _NO_UNIT = (
 )
 LINES = "(section Kalibr, in `... --full` and in --report)"
 NEXT = f"Take N, B, K into a filter {LINES}; average for no longer than the best averaging time."
-N_ALONE = f"Take N alone into a filter {LINES}."
+LONGER = "Record a static log of an hour or more for B and K; of this one take N alone."
 IN_SLOW_NOISE = {FindingCode.TEMPERATURE_DRIVEN: "the temperature", FindingCode.LOG_TURNED: "a turn of the unit"}
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
@@ -51,17 +51,16 @@ def noise_report(
     return Document(
         title="Noise of a static log",
         subtitle=noise.source,
-        verdict=verdict_of(
-            findings, "OK: a sum of noise terms fits the whole spectrum.", _usable(noise), "NOT TO BE TRUSTED"
-        ),
+        verdict=verdict_of(findings, _good(noise), _usable(noise), "NOT TO BE TRUSTED"),
         is_trustworthy=noise.is_trustworthy,
+        stated_level="usable" if noise.shows_white_alone else None,
         headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
         next_step=_next(noise) if noise.is_trustworthy else "",
         sections=(
             Section("Result", (Facts(tuple(facts)), *tables)),
-            Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
             Section("Findings", (findings_block(findings),)),
+            Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
             *((Section("Figures", tuple(_picture(noise, *group) for group in groups)),) if groups else ()),
             *_intervals(groups),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
@@ -70,23 +69,35 @@ def noise_report(
     )
 
 
+def _good(noise: Noise) -> str:
+    """The verdict without warnings."""
+    if noise.shows_white_alone:
+        return f"{_usable(noise)}: B and K do not show in {duration(noise.curve.n_samples / noise.curve.rate_hz)}."
+    return "OK: a sum of noise terms fits the whole spectrum."
+
+
 def _usable(noise: Noise) -> str:
     """The verdict with warnings: how far white noise is determined, on the worst axis."""
     white = [axis.terms[TermName.WHITE] for axis in noise.axes]
     sigma = max((one.sigma / one.value for one in white if one.is_present), default=0.0)
     causes = " and ".join(words for code, words in IN_SLOW_NOISE.items() if any(f.code is code for f in noise.findings))
-    said = f"white noise N{' alone,' if causes else ''} to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)"
+    alone = " alone," if causes or noise.shows_white_alone else ""
+    said = f"white noise N{alone} to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)"
     return "Usable" + (f": {said}" if sigma else "") + (f": B, K and R contain {causes}" if causes else "")
 
 
 def _next(noise: Noise) -> str:
     """Use of the terms; what is missing for terms in SI, or for those of slow noise."""
+    longer = [LONGER] if noise.shows_white_alone else []
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
-        return SAY_UNITS if any(f.code is FindingCode.CURVE_ALONE for f in noise.findings) else SAY_COUNTS
+        said = SAY_UNITS if any(f.code is FindingCode.CURVE_ALONE for f in noise.findings) else SAY_COUNTS
+        return " ".join([*longer, said])
     actions = [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]
-    if not actions and not any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes):
-        actions = ["K is below what this log shows: its upper limit is the cautious value; a longer log measures it."]
-    return " ".join([N_ALONE, *actions]) if actions else NEXT
+    if actions or longer:
+        return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
+    if any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes):
+        return NEXT
+    return f"Take N and B into a filter {LINES}, and for K its upper limit: a longer log measures it."
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:

@@ -13,6 +13,7 @@ from trihedron.estimate.accelerometer.poses import ENTRIES
 from trihedron.estimate.kalman.per_axis import (
     check_innovations,
     consistency_findings,
+    covariance_scale,
     is_settled,
     noise_per_axis,
     pose_arrays,
@@ -158,7 +159,9 @@ def calibrate_without_references(
     if not converged:
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
-    accelerometer = SensorCalibration(S, b, covariance, raw_unit, "m/s^2", "kalman, norm of gravity")
+    accelerometer = SensorCalibration(
+        S, b, covariance_scale(seen) * covariance, raw_unit, "m/s^2", "kalman, norm of gravity"
+    )
     residual = np.linalg.norm(a @ S.T + b, axis=1) - gravity_m_s2
     return NormKalmanCalibration(
         accelerometer=accelerometer,

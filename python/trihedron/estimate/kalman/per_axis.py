@@ -1,6 +1,7 @@
 """Calibration in known attitudes, axis by axis: noise model, Kalman filter with its tests, and least squares."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -88,8 +89,16 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
     return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
 
 
+def covariance_scale(seen: Consistency) -> float:
+    """Factor of a covariance whose innovations are larger than predicted: their mean square; else 1."""
+    return seen.nis_mean if seen.n and seen.nis_mean > seen.nis_high else 1.0
+
+
 def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Finding]:
-    """Findings where innovations contradict the noise model; ``axis`` None for the norm of all three."""
+    """Findings where innovations contradict the noise model; ``axis`` None for the norm of all three.
+
+    Where they are too large the covariance has the factor ``covariance_scale``.
+    """
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
     mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high
     if seen.n and mean > high:
@@ -100,7 +109,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
             nis_mean=mean,
             nis_low=low,
             nis_high=high,
-            widening=np.sqrt(mean),
+            widening=np.sqrt(covariance_scale(seen)),
         )
     elif seen.n and mean < low:
         yield Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
@@ -162,7 +171,7 @@ def calibrate_with_references(
     findings: list[Finding] = []
     for axis in range(3):
         result = _one_axis(axis, noises[axis], models[axis], z[:, axis].copy(), f, start, pose, extra[:, axis].copy())
-        axes.append(result)
+        axes.append(replace(result, covariance=covariance_scale(result.consistency) * result.covariance))
         findings += consistency_findings(axis, result.consistency)
     observability, seen = _observability(f)
     findings += seen

@@ -135,11 +135,17 @@ TOLERANCE = 0.02
 
 
 def identify_axis(
-    bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int, tails: float = 0.0
+    bands: Sequence[Ordinates],
+    blank: NoiseAxis,
+    curve: AllanCurve,
+    channel: int,
+    tails: float = 0.0,
+    range_degc: tuple[float, float] = remarks.UNLOGGED,
 ) -> NoiseAxis:
     """``blank`` with the terms of its spectrum, its lines, and findings.
 
-    ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show.
+    ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show;
+    ``range_degc`` is that of the logged temperature.
     """
     # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
@@ -177,7 +183,7 @@ def identify_axis(
         longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
         covariance_scale=scale,
     )
-    return replace(axis, findings=(*blank.findings, *findings, *remarks.about_terms(axis)))
+    return replace(axis, findings=(*blank.findings, *findings, *remarks.about_terms(axis, range_degc)))
 
 
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:

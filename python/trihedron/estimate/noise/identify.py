@@ -104,6 +104,8 @@ def identify_noise(
     heat = None if temperature_degc is None else as_readings(temperature_degc)
     if heat is not None and heat.shape != (n, 1):
         raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, heat.shape))}")
+    logged = () if heat is None else heat[np.isfinite(heat)]
+    range_degc = (float(np.min(logged)), float(np.max(logged))) if len(logged) else remarks.UNLOGGED
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
@@ -111,7 +113,7 @@ def identify_noise(
         findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
 
     def screened(c: int) -> _Screened:
-        return _screen(readings[:, c], rate_hz, excluded, names[c], units[c], automatic=automatic)
+        return _screen(readings[:, c], rate_hz, excluded, (names[c], units[c]), range_degc, automatic=automatic)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         seen = list(pool.map(screened, range(channels)))
@@ -130,7 +132,7 @@ def identify_noise(
         if heat is not None:
             findings += _heated(seen, heat[:, 0])
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
-        axes = list(pool.map(lambda c: _identified(seen[c], rate_hz, curve, c), range(channels)))
+        axes = list(pool.map(lambda c: _identified(seen[c], range_degc, curve, c), range(channels)))
     return Noise(
         axes=tuple(axes),
         curve=curve,
@@ -152,8 +154,16 @@ class _Screened:
 
 
 def _screen(
-    readings: FloatArray, rate_hz: float, excluded: Sequence[tuple[int, int]], name: str, unit: str, *, automatic: bool
+    readings: FloatArray,
+    rate_hz: float,
+    excluded: Sequence[tuple[int, int]],
+    named: tuple[str, str],
+    range_degc: tuple[float, float],
+    *,
+    automatic: bool,
 ) -> _Screened:
+    """A channel, ``named`` by its name and unit, beside the range of the logged temperature."""
+    name, unit = named
     column = np.array(readings, dtype=np.float64)
     for start, stop in excluded:
         column[start:stop] = np.nan
@@ -181,8 +191,7 @@ def _screen(
             column[start:stop] = np.nan
         warm = None if steps else warm_up(column, rate_hz)
         if warm is not None:
-            drift, time_s = abs(warm.size), warm.time_s
-            findings.append(Finding.of(FindingCode.LOG_DRIFT, "warm-up", drift=drift, time_s=time_s, unit=unit))
+            findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
             column -= warm.at(np.arange(len(column)) / rate_hz)
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
@@ -228,11 +237,11 @@ def _heated(seen: Sequence[_Screened], temperature: FloatArray) -> list[Finding]
     return [said]
 
 
-def _identified(seen: _Screened, rate_hz: float, curve: AllanCurve, channel: int) -> NoiseAxis:
+def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
-    bands = ordinates(seen.column, rate_hz, stretches_between(len(seen.column), seen.steps))
-    return identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column))
+    bands = ordinates(seen.column, seen.blank.rate_hz, stretches_between(len(seen.column), seen.steps))
+    return identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column), range_degc)
 
 
 def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

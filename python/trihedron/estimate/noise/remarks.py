@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 NAMED = 4
 """Most spectral lines that a finding lists one by one."""
+UNLOGGED = (math.nan, math.nan)
+"""Range of a temperature that was not logged."""
 
 
 def events(
@@ -75,7 +77,21 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
     )
 
 
-def about_terms(axis: NoiseAxis) -> Iterator[Finding]:
+def warm_up(drift: float, time_s: float, unit: str, range_degc: tuple[float, float]) -> Finding:
+    """Finding for a warm-up that was subtracted, beside the range of the temperature, ``UNLOGGED`` without one."""
+    return Finding.of(
+        FindingCode.LOG_DRIFT,
+        "warm-up",
+        drift=drift,
+        time_s=time_s,
+        unit=unit,
+        has_temperature=math.isfinite(range_degc[0]),
+        low_degc=range_degc[0],
+        high_degc=range_degc[1],
+    )
+
+
+def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> Iterator[Finding]:
     """Findings for drift, inseparable slow noise, and a log too short for a minimum of the Allan deviation."""
     terms = axis.terms
     ramp, flicker, walk = terms[TermName.RATE_RAMP], terms[TermName.BIAS_INSTABILITY], terms[TermName.RATE_RANDOM_WALK]
@@ -86,6 +102,9 @@ def about_terms(axis: NoiseAxis) -> Iterator[Finding]:
             slope=ramp.value,
             sigma_slope=ramp.sigma,
             unit=axis.unit,
+            has_temperature=math.isfinite(range_degc[0]),
+            low_degc=range_degc[0],
+            high_degc=range_degc[1],
         )
     if axis.is_slow_noise_unresolved:
         yield Finding.of(

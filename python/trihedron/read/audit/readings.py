@@ -92,6 +92,10 @@ def _per_unit(step_si: float, sensor: str) -> float:
 
 
 Place = Callable[[int], str]
+LAGS = 8
+"""Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
+LAGS = 8
+"""Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
 MANY, LONG, HALF = 0.05, 0.1, 0.5
 """Shares of a log that are not finite, stuck, or repeated, from which on the finding is serious."""
 
@@ -104,7 +108,7 @@ def audit_readings(
     findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
         return findings
-    findings += _repeated(sensor, repeats, place)
+    findings += _repeated(sensor, readings, repeats, place)
     limits = facts.limits
     findings += audit_clipping(sensor, limits, place)
     for k in range(3):
@@ -132,15 +136,15 @@ def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
     ]
 
 
-def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
-    """A finding where complete triads repeat more often than three independent axes would."""
+def _repeated(sensor: str, readings: FloatArray, repeats: Repeats, place: Place) -> list[Finding]:
+    """A finding where complete triads repeat more often than by chance."""
     n = repeats.n - 1
     expected = float(np.prod(repeats.rates[:, :3], axis=1).mean())
     seen = repeats.count[3] / n
-    # Six standard deviations above the chance of three independent axes, and at least twice the odds of that chance:
-    # where three of four rows are repeated, each axis repeats as often, and twice that chance is out of reach.
-    limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
-    if seen <= max(limit, 2.0 * expected / (1.0 + expected)) or repeats.count[3] < 5:
+    if _is_repeated(seen, expected, repeats):
+        # Axes of corrected readings are mixed and not independent: rows equal apart as often as next to each other.
+        expected = max(expected, _equal_apart(readings, int(repeats.longest[3])))
+    if not _is_repeated(seen, expected, repeats):
         return []
     longest = int(repeats.longest[3])
     return [
@@ -156,6 +160,21 @@ def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
             sample=repeats.longest_start[3],
         )
     ]
+
+
+def _is_repeated(seen: float, expected: float, repeats: Repeats) -> bool:
+    """Whether the share ``seen`` of repeated rows is more than chance."""
+    n = repeats.n - 1
+    # Six standard deviations above the chance, and at least twice its odds: where three of four rows are repeated,
+    # each axis repeats as often, and twice that chance is out of reach.
+    limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
+    return bool(seen > max(limit, 2.0 * expected / (1.0 + expected)) and repeats.count[3] >= 5)
+
+
+def _equal_apart(readings: FloatArray, longest: int) -> float:
+    """Share of rows (n, 3) equal to one further back than the ``longest`` run of repeated rows reaches."""
+    lags = [lag for lag in range(longest + 1, longest + 1 + LAGS) if lag < len(readings)]
+    return float(np.mean([np.mean(np.all(readings[lag:] == readings[:-lag], axis=1)) for lag in lags] or [0.0]))
 
 
 def _stuck(

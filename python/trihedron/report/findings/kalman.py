@@ -13,7 +13,7 @@ _OF_AXES = {
             f"{name}: squared innovations are {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_high:.2f}).",
             f"The noise is larger than the model says, or {error}.",
-            "Multiply the uncertainties by {widening:.2f}, or identify the noise anew.",
+            "The uncertainties were multiplied by {widening:.2f} for it; identify the noise anew.",
             numbers=("axis", "nis_low"),
         ),
         (Code.INNOVATIONS_TOO_SMALL, case, NOTE): Words(

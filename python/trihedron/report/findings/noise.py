@@ -3,6 +3,8 @@
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _WIDENED = "Intervals were widened to allow for it."
+_HEATED = "{has_temperature:? while the temperature runs from {low_degc:.1f} to {high_degc:.1f} °C|}"
+_OR_LOGGED = "{has_temperature:?; `trihedron diagnose LOG` fits the temperature|, or log the temperature}"
 
 _LOG = {
     (Code.REPEATED_ROWS, "static", WARNING): Words(
@@ -133,14 +135,16 @@ _TERMS = {
         numbers=("evidence",),
     ),
     (Code.LOG_DRIFT, "", WARNING): Words(
-        "The level drifts by {drift:.3g} {unit:unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit:unit}/s).",
+        "The level drifts by {drift:.3g} {unit:unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit:unit}/s)"
+        f"{_HEATED}.",
         "warming up, or a change of the room's temperature.",
-        "R describes this log, not the sensor; let it warm up, or log the temperature.",
+        f"R describes this log, not the sensor; let it warm up{_OR_LOGGED}.",
     ),
     (Code.LOG_DRIFT, "warm-up", WARNING): Words(
-        "The level changes by {drift:.3g} {unit:unit} with a time constant of {time_s:.3g} s; that was subtracted.",
+        "The level changes by {drift:.3g} {unit:unit} with a time constant of {time_s:.3g} s"
+        f"{_HEATED}; that was subtracted.",
         "warming up.",
-        "The terms are those of the sensor once warm; leave off the first minutes, or log the temperature.",
+        f"The terms are those of the sensor once warm; leave off the first minutes{_OR_LOGGED}.",
     ),
     (Code.LOG_TOO_SHORT, "", NOTE): Words(
         "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",
