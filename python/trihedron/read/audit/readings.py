@@ -174,7 +174,8 @@ def _is_repeated(seen: float, expected: float, repeats: Repeats) -> bool:
 def _equal_apart(readings: FloatArray, longest: int) -> float:
     """Share of rows (n, 3) equal to one further back than the ``longest`` run of repeated rows reaches."""
     lags = [lag for lag in range(longest + 1, longest + 1 + LAGS) if lag < len(readings)]
-    return float(np.mean([np.mean(np.all(readings[lag:] == readings[:-lag], axis=1)) for lag in lags] or [0.0]))
+    shares = [float(np.mean(np.all(readings[lag:] == readings[:-lag], axis=1))) for lag in lags]
+    return sum(shares) / max(len(shares), 1)
 
 
 def _stuck(
