@@ -15,18 +15,16 @@ from trihedron.report.noise_units import TERM_WORDS, customary, term_in_words, u
 from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
-_NO_UNIT = (
-    "The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with "
-    "--gyro-lsb and --accel-lsb."
-)
+_NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with \
+--gyro-lsb and --accel-lsb."""
 LINES = "(section Kalibr, in `... --full` and in --report)"
 NEXT = f"Take N, B, K into a filter {LINES}; average for no longer than the best averaging time."
 LONGER = "Record a static log of an hour or more for B and K; of this one take N alone."
 IN_SLOW_NOISE = {FindingCode.TEMPERATURE_DRIVEN: "the temperature", FindingCode.LOG_TURNED: "a turn of the unit"}
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
+# For a curve, which has no counts.
 SAY_UNITS = "State the unit of the deviations, for terms in SI: `... --gyro-unit UNIT --accel-unit UNIT`."
-"""For a curve, which has no counts."""
 BEYOND = "beyond the log"
 """An averaging time at which the fitted sum still falls."""
 MOST_ROWS = 12
@@ -71,9 +69,9 @@ def noise_report(
 
 def _good(noise: Noise) -> str:
     """The verdict without warnings."""
-    if noise.shows_white_alone:
-        return f"{_usable(noise)}: B and K do not show in {duration(noise.curve.n_samples / noise.curve.rate_hz)}."
-    return "OK: a sum of noise terms fits the whole spectrum."
+    if not noise.shows_white_alone:
+        return "OK: a sum of noise terms fits the whole spectrum."
+    return f"{_usable(noise)}: B and K do not show in {duration(noise.curve.n_samples / noise.curve.rate_hz)}."
 
 
 def _usable(noise: Noise) -> str:
@@ -90,14 +88,12 @@ def _next(noise: Noise) -> str:
     """Use of the terms; what is missing for terms in SI, or for those of slow noise."""
     longer = [LONGER] if noise.shows_white_alone else []
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
-        said = SAY_UNITS if any(f.code is FindingCode.CURVE_ALONE for f in noise.findings) else SAY_COUNTS
-        return " ".join([*longer, said])
-    actions = [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]
-    if actions or longer:
+        codes = {f.code for f in noise.findings}
+        return " ".join([*longer, SAY_UNITS if FindingCode.CURVE_ALONE in codes else SAY_COUNTS])
+    if (actions := [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]) or longer:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
-    if any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes):
-        return NEXT
-    return f"Take N and B into a filter {LINES}, and for K its upper limit: a longer log measures it."
+    has_walk = any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes)
+    return NEXT if has_walk else f"Take N and B into a filter {LINES}, for K its upper limit: a longer log measures it."
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
