@@ -4,7 +4,9 @@
 //! frequency and is integrated as velocity or angle. It is extrapolated by a power law. With power c ν^-p on either side
 //! of zero, the powers at f/4, at f/2 and folded onto zero are sums over all foldings,
 //!
-//!     D₁ = c (f/4)^-p Z,   D₂ = 2 c (f/2)^-p Z,   A = 2 c f^-p Z / (1 - 2^-p),   Z = 1 + 3^-p + 5^-p + ...
+//! ```text
+//! D₁ = c (f/4)^-p Z,   D₂ = 2 c (f/2)^-p Z,   A = 2 c f^-p Z / (1 - 2^-p),   Z = 1 + 3^-p + 5^-p + ...
+//! ```
 //!
 //! so that D₁/D₂ = 2^p/2 and A = D₂/(2 D₁/D₂ - 1): all of D₂ where the samples are white (D₁ = D₂), no more, and a
 //! third of it for a rate that steps (p = 2). D₁ contains slower motion too, which makes the slope look steep: up to the
