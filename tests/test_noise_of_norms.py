@@ -123,7 +123,7 @@ def of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, im
         parts += [x, 5.0 * rng.standard_normal(int(rate))]
         windows.append((at, at + n))
         at += n + int(rate)
-    return noise_of_poses(np.concatenate(parts), rate, windows)[0]
+    return noise_of_poses(np.concatenate(parts)[:, None], rate, windows)[0]
 
 
 @pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "impacts": 2}], ids=str)
@@ -174,7 +174,7 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
         n, poses = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
         clean = rng.normal(size=(n, 1))
         wave = 0.3 * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
-        plain, lined = (noise_of_poses(x, 100.0, poses)[0] for x in (clean, clean + wave))
+        plain, lined = (noise_of_poses(x[:, None], 100.0, poses)[0] for x in (clean, clean + wave))
         assert (len(plain.lines), len(lined.lines)) == (0, 1)
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)

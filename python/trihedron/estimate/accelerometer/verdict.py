@@ -7,8 +7,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
-from trihedron.records.calibration import FitQuality
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records import Finding, FindingCode, FitQuality
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 SIGNIFICANCE = 0.01

@@ -14,9 +14,7 @@ from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rota
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median
 from trihedron.ranges import rows_beside
-from trihedron.records import Recording
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.segments import Move, Segments
+from trihedron.records import Move, Recording, Segments, SensorCalibration
 from trihedron.session.rounding import (
     before_adc,
     density_without_rounding,

@@ -16,12 +16,9 @@ from trihedron.estimate.kalman.per_axis import (
     covariance_scale,
     is_settled,
     noise_per_axis,
-    pose_arrays,
     shaping_model,
 )
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
+from trihedron.records import AxisNoise, Finding, FindingCode, NormKalmanCalibration, SensorCalibration
 
 START_RELATIVE, START_BIAS_M_S2 = 0.3, 3.0
 """Standard uncertainty of the initial S, relative to its size, and of the bias, by the range of the readings."""
@@ -50,11 +47,11 @@ def calibrate_without_references(
     readings: npt.ArrayLike,
     noise: AxisNoise | Sequence[AxisNoise],
     *,
-    start_s: npt.ArrayLike,
-    pose_s: npt.ArrayLike,
+    start_s: FloatArray,
+    pose_s: FloatArray,
     gravity_m_s2: float,
     frame: NormFrame = "lower",
-    extra_variance: npt.ArrayLike = 0.0,
+    extra_variance: FloatArray | float = 0.0,
     raw_unit: str = "counts",
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
@@ -63,8 +60,8 @@ def calibrate_without_references(
     finite, poses are out of order, or there are fewer than nine.
     """
     a = _mean_readings(readings)
-    begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)
-    session_s, usual_s = float(begin[-1] + pose[-1] - begin[0]), float(np.median(pose))
+    extra = np.broadcast_to(extra_variance, a.shape)
+    session_s, usual_s = float(start_s[-1] + pose_s[-1] - start_s[0]), float(np.median(pose_s))
     x, y, z = (shaping_model(one, session_s=session_s, pose_s=usual_s) for one in noise_per_axis(noise))
     scale, middle = start_from_range(a, gravity_m_s2)
     mean = np.array([scale[i] if i == j else 0.0 for i, j in ENTRIES] + [0.0] * 3)
@@ -74,10 +71,10 @@ def calibrate_without_references(
         return _core.NormKalman(x, y, z, frame == "symmetric", gravity_m_s2, mean, sigma)
 
     wrt = _wrt_parameters(frame, middle)
-    parameters, sigmas = _track(fresh(), wrt, (a - middle, begin, pose, extra))
+    parameters, sigmas = _track(fresh(), wrt, (a - middle, start_s, pose_s, extra))
     # A run over all poses from the start: the result does not depend on the linearisation at the first poses.
     one = fresh()
-    one.load(a - middle, begin, pose, np.ascontiguousarray(extra))
+    one.load(a - middle, start_s, pose_s, np.ascontiguousarray(extra))
     n_runs = one.relinearise(MOST_RUNS)
     parameters[-1], covariance = wrt @ one.parameters, wrt @ one.covariance @ wrt.T
     sigmas[-1] = _sigma(covariance)

@@ -16,9 +16,7 @@ from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
-from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
 STEP = 1.9
@@ -40,21 +38,10 @@ def identify_curve(
     units: Sequence[str] = (),
     source: str = "curve",
 ) -> Noise:
-    """Noise terms of overlapping Allan deviations without their log.
+    """Noise terms of overlapping Allan deviations (k,) or (k, channels), in any unit and NaN where there is none, at
+    averaging times ``tau_s`` (k,), without their log, whose rate and length determine the uncertainty of the points.
 
-    Parameters
-    ----------
-    tau_s : (k,)
-        Averaging times, s.
-    deviation : (k,) or (k, channels)
-        Overlapping Allan deviations in any unit; NaN where there is none.
-    rate_hz, n_samples
-        Of the log of the curve: they determine the uncertainty of its points.
-
-    Raises
-    ------
-    ValueError
-        With fewer than six usable points, or times that are no whole numbers of readings.
+    Raises ``InputError`` with fewer than six usable points, or times that are no whole numbers of readings.
 
     Examples
     --------
@@ -67,8 +54,6 @@ def identify_curve(
     check_question(rate_hz, "overlapping", 0.95)
     tau, sigma = np.asarray(tau_s, dtype=np.float64), np.asarray(deviation, dtype=np.float64)
     sigma = sigma[:, np.newaxis] if sigma.ndim == 1 else sigma
-    if tau.ndim != 1 or sigma.ndim != 2 or len(tau) != len(sigma):
-        raise InputError(f"tau_s (k,) and deviation (k, channels) must fit, got {tau.shape} and {sigma.shape}")
     order = np.argsort(tau)
     tau, sigma = tau[order], sigma[order]
     clusters = np.round(tau * rate_hz).astype(np.int64)

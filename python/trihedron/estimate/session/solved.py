@@ -22,10 +22,7 @@ from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted,
 from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
-from trihedron.records.calibration import Calibration, SensorCalibration
-from trihedron.records.finding import Finding
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 
 
 def calibrate_moves(

@@ -13,9 +13,7 @@ from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Recording, Segments, SensorCalibration
 from trihedron.sensor_model import reframing
 from trihedron.transforms import cross_matrix
 from trihedron.units import rate_to_si
