@@ -174,7 +174,7 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
         n, poses = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
         clean = rng.normal(size=(n, 1))
         wave = 0.3 * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
-        plain, lined = (noise_of_poses(x[:, None], 100.0, poses)[0] for x in (clean, clean + wave))
+        plain, lined = (noise_of_poses(x, 100.0, poses)[0] for x in (clean, clean + wave))
         assert (len(plain.lines), len(lined.lines)) == (0, 1)
         ratios.append(lined.white.value / plain.white.value)
         corners.append(lined.corner_hz)
