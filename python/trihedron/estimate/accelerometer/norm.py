@@ -11,7 +11,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
-from trihedron.records import Finding, FitQuality, Frame, SensorCalibration
+from trihedron.records import Finding, FindingCode, FitQuality, Frame, SensorCalibration
 from trihedron.records.words import words
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
@@ -112,11 +112,13 @@ def _assemble(
             anchor=_core.ANCHOR,
             are_faces=are_six_faces(values),
         ),
-        *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit),
         *verdict.residual_findings(chi2, quality),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
+    if not fit.is_converged:
+        why = words(fit.stopped_because)
+        findings.append(Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=why))
     sensor = SensorCalibration(
         S=S,
         b=fit.b,

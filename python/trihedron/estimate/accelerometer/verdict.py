@@ -147,9 +147,3 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Findin
             yield Finding.of(
                 FindingCode.SCALE_NOT_NOMINAL, "accelerometer", axis=worst + 1, scale_ratio=scale, unit=unit
             )
-
-
-def convergence_findings(is_converged: bool, stopped_because: str) -> Iterator[Finding]:
-    """Finding where the solver stopped without convergence."""
-    if not is_converged:
-        yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)
