@@ -53,10 +53,6 @@ class Log:
         """Tilt errors of the moves by S and b of the accelerometer and S of the gyro."""
         return carried(measured, self.anchors_s(measured), *near)
 
-    def usual_deg(self, measured: MoveMeasurements, near: Near) -> float:
-        """Median of these tilt errors as of :func:`usual_deg`."""
-        return usual_deg(self.carried(measured, near).angle_deg, measured, *near[:2])
-
 
 def lower(S: FloatArray, b: FloatArray) -> Near:
     """S and b of an accelerometer in the lower-triangular frame, and the rotation (3, 3) into it."""
