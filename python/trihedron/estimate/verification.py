@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -250,6 +250,9 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
         FindingCode.RESIDUAL_ABOVE_NOISE,
         "verify-static",
         norm_rms_m_s2=rms_of(error),
+        is_bias=changed.is_bias,
+        is_few=changed.is_few,
+        shifted=changed.shifted,
         # Sign test: the errors of single poses have either sign.
         is_offset=2.0 * probability.bdtrc(n_same - 1, len(error), 0.5) < probability.FALSE_ALARM,
         n_same=n_same,
@@ -259,7 +262,11 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
         worst_pose=worst + 1,
         is_first=worst == 0,
         worst_m_s2=error[worst],
-        **_said(beyond, changed),
+        severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
+        times=beyond.times,
+        is_far=beyond.is_far,
+        is_single=beyond.is_single,
+        chi2_per_dof=beyond.times**2,
     )
 
 
@@ -280,12 +287,6 @@ def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
     return _Beyond(times, times > FAR_BEYOND, others > probability.FALSE_ALARM)
 
 
-def _said(beyond: _Beyond, changed: _Changed) -> dict[str, Any]:
-    """What the findings of poses and moves share."""
-    severity = Severity.SERIOUS if beyond.is_far else Severity.WARNING
-    return {**beyond._asdict(), **changed._asdict(), "severity": severity, "chi2_per_dof": beyond.times**2}
-
-
 def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> Iterator[Finding]:
     angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
@@ -301,9 +302,16 @@ def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> I
         FindingCode.HELD_OUT_WORSE,
         "verify-moves",
         angle_rms_deg=rms_of(angle_deg),
+        is_bias=changed.is_bias,
+        is_few=changed.is_few,
+        shifted=changed.shifted,
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
         is_beside=bool(unsteady),
         unsteady=unsteady,
-        **_said(beyond, changed),
+        severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,
+        times=beyond.times,
+        is_far=beyond.is_far,
+        is_single=beyond.is_single,
+        chi2_per_dof=beyond.times**2,
     )
