@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.channel_facts import ChannelFacts
@@ -165,9 +165,6 @@ def _filled(raw: FloatArray) -> FloatArray:
 
 # Motion beyond a sensor's range, extrapolated from the readings before and after it.
 
-SLOPE_OVER = 2
-"""Samples over which the slope beside a clipped peak is taken: fewer add noise, more include other motion."""
-
 
 def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     """(n, 3) readings with the peaks clipped at a range limit restored, raw units.
@@ -179,32 +176,15 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     if not facts.limits:
         return readings
     out = readings.copy()
-    last = len(readings) - 1
-    at_limits = facts.at_limits(len(readings))
     for limit in facts.limits:
         column = readings[:, limit.axis]
-        at_limit = at_limits[:, limit.axis]
-        away = abs(limit.value - float(np.nanmedian(column)))
-        sign = 1.0 if limit.is_high else -1.0
+        away, sign = abs(limit.value - float(np.nanmedian(column))), 1.0 if limit.is_high else -1.0
         for first, stop in limit.runs.tolist():
-            a, b = first - 1, stop
-            if a < 0 or b > last or at_limit[a] or at_limit[b]:
+            if first < 2 or stop > len(column) - 2:
                 continue
-            rise = _slope(column, at_limit, a, -1)
-            fall = _slope(column, at_limit, b, 1)
-            # Towards the limit before the run and away from it after; a slope of the wrong sign is set to 0.
-            slopes = [max(sign * rise, 0.0) * sign, min(sign * fall, 0.0) * sign]
-            curve = CubicHermiteSpline([a, b], [column[a], column[b]], slopes)
+            before, after = column[first - 2 : first], column[stop : stop + 2]
+            slopes = np.concatenate([np.diff(before), np.diff(after)])
+            curve = CubicHermiteSpline([first - 1, stop], [before[1], after[0]], slopes)
             beyond = sign * (curve(np.arange(first, stop)) - limit.value)
             out[first:stop, limit.axis] = limit.value + sign * np.clip(beyond, 0.0, away)
     return out
-
-
-def _slope(column: FloatArray, at_limit: BoolArray, place: int, step: int) -> float:
-    """Slope [raw/sample] at ``place``, from readings in direction ``step`` that are not at a limit."""
-    other = place
-    for _ in range(SLOPE_OVER):
-        if not 0 <= other + step < len(column) or at_limit[other + step]:
-            break
-        other += step
-    return 0.0 if other == place else float((column[other] - column[place]) / (other - place))
