@@ -33,7 +33,7 @@ after the effects that explain poses and moves."""
 class Answer:
     """Everything accepted: effects with columns, bias processes, effects found by tests on the samples.
 
-    ``predicted`` and ``bare`` are the session without effects, in the part's noise and in noise of free strength.
+    ``predicted`` and ``bare`` are the session without effects, noise bounded to the part's and of free strength.
     ``numbers`` is the hypothesis that parameters and uncertainties come from; its shape parameters are unknowns too.
     ``asked`` are all bias processes tested, ``tested`` the results of the samples' own tests; ``domains`` are those of
     the session without effects, ``remaining`` with them.

@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
+from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.session.model import STATIC_ACCEL
@@ -68,7 +69,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
         both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
         if len(both) == 2 and not any(one in named for one in both):
             # Drift and scatter can absorb each other: bound both; where that is unlikely the likelier one is named.
-            bounds = _bounded(model, model.within, {(sensor, True), (sensor, False)})
+            bounds = _bounded(model.obs, model.within, {(sensor, True), (sensor, False)})
             without = again(model, model.terms, bounds)
             gain = 2.0 * (model.log_evidence - without.log_evidence)
             if gain > limit:
@@ -84,28 +85,28 @@ def that_poses_bear(model: Hypothesis) -> Hypothesis:
     Biases that differ from pose to pose explain any error of rotations, more cheaply than a larger noise of these; but
     then S and b are fitted to the rotations, at the cost of the poses.
     """
-    bounded = again(model, model.terms, _bounded(model, model.within, {(0, True), (0, False)}))
+    bounded = again(model, model.terms, _bounded(model.obs, model.within, {(0, True), (0, False)}))
     plain, free = (
         physical_rms(one.fitted, one.prediction.innovation).get(STATIC_ACCEL, 0.0) for one in (bounded, model)
     )
     return bounded if free > plain * (1.0 + 1.0 / np.sqrt(2.0 * max(model.obs.n_poses, 1))) else model
 
 
-def noise_bounds(model: Hypothesis, but: Collection[BiasProcess] = ()) -> Bounds:
+def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds:
     """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
-    return _bounded(model, ANYTHING, {(s, walks) for s in range(2) for walks in (True, False)} - free)
+    return _bounded(obs, ANYTHING, {(s, walks) for s in range(2) for walks in (True, False)} - free)
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
     """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains."""
-    return _bounded(model, model.within, {(effect.sensor, effect.walks)})
+    return _bounded(model.obs, model.within, {(effect.sensor, effect.walks)})
 
 
-def _bounded(model: Hypothesis, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:
+def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:
     """Bounds, those of some processes (sensor, whether it walks) replaced by what the part's own noise explains."""
     corner, scatter, excess = within
-    expected = _flicker(model)
+    expected = _flicker(obs)
     corners = [NOISE_CORNER_S if (s, True) in which else corner[s] for s in range(2)]
     scatters = [float(expected[s]) if (s, False) in which else scatter[s] for s in range(2)]
     return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
@@ -125,9 +126,8 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, price, is_large)
 
 
-def _flicker(model: Hypothesis) -> FloatArray:
+def _flicker(obs: Observations) -> FloatArray:
     """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
-    obs = model.obs
     expected = np.array([obs.force_scatter, obs.rate_scatter])
     return np.maximum(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0], UNSEEN)
 

@@ -145,7 +145,9 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     context = Context(predicted)
     notify(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
-    domains = _all_domains(context, alpha, settles, observed.rejected)
+    # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
+    plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
+    domains = _all_domains(plain.context, alpha, settles, observed.rejected)
     notify(0.3, "letting effects compete")
     bare, found = _searched(observed, alpha)
     # Effects hidden by another effect, or mistaken for it, are tested once more.
@@ -159,10 +161,10 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     related = that_poses_bear(found.related.model)
     biases, asked = bias_strengths(related, alpha)
     notify(0.9, "checking the unexplained part")
-    judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
+    judged = again(found.model, found.model.terms, noise_bounds(found.model.obs, tuple(one.effect for one in biases)))
     numbers = with_shapes(renewed(again(found.model, found.model.terms, related.within)))
     answer = Answer(
-        predicted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
+        plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
