@@ -30,6 +30,7 @@ CONSEQUENCE = (
     FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,
     FindingCode.WORSE_THAN_UNCALIBRATED,
+    FindingCode.SESSION_LEFT_OUT,
     FindingCode.CALIBRATION_DOUBTED,
     FindingCode.EFFECT_NOT_APPLIED,
     FindingCode.FILTER_NOISE_FOLLOWED,

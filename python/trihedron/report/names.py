@@ -10,6 +10,8 @@ LETTERS = 2
 QUANTITIES = {"w": "angular rate", "u": "specific force", "f": "specific force"}
 """Symbols of the variables of empirical relations."""
 MEANING = {
+    "accel-common-scale": "common scale of all accelerometer axes",
+    "gyro-common-scale": "common scale of all gyro axes",
     "static-accel": "gravity error in static poses",
     "static-gyro": "gyro rate in static poses",
     "moves": "tilt error after a rotation",
@@ -20,7 +22,7 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
-"""Domains of residuals in words."""
+"""Parameters and domains of residuals in words."""
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
     "calibration-doubted": "warnings of single calibrations",

@@ -2,8 +2,9 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "
-_MANY += "after the change."
+_MANY = "{is_other:?Check the unit, range and rate of that recording, and calibrate the others without it|The common "
+_MANY += "parameters are the mean of different ones: use the spread below as their error, or recalibrate after the "
+_MANY += "change}."
 
 _CALIBRATE = {
     (Code.GRAVITY_DEFAULTED, "", WARNING): Words(
@@ -25,6 +26,12 @@ _CALIBRATE = {
         "The gyro was not calibrated: {why}.",
         "The recording does not contain what the gyro needs.",
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
+    ),
+    (Code.GYROSCOPE_LEFT_OUT, "clipped", WARNING): Words(
+        "The gyro was not calibrated: it clipped in {n_lost} of {n_moves} moves, and the others do not determine its "
+        "scale.",
+        "The sensor was turned faster than its range limit.",
+        "Record again with rates below about half the range limit, or set a wider range.",
     ),
     (Code.GYROSCOPE_LEFT_OUT, "no-known-turns", WARNING): Words(
         "The gyro was not calibrated: {why}.",
@@ -237,10 +244,11 @@ _CHANGED_CAUSE = {
     "scale": "Temperature, stress or the gravity that was given.",
     "misalignment": "Stress in the package or the board, or another unit.",
     "alignment": "One of two parts was remounted, or another unit.",
-    "other": "Gravity was another, or all three scales changed alike.",
+    "accel-common-scale": "{is_other:?Another unit or measuring range|Another gravity than given, or temperature}.",
+    "gyro-common-scale": "{is_other:?Another unit, measuring range or sampling rate|Another clock, or temperature}.",
 }
 _CHANGED_SEEN = {
-    "differs": "differs between the two recordings by {amount}",
+    "differs": "in {where} differs from that in the other recording, by {amount}",
     "apart": "in {where} differs from all other recordings, by {amount}",
     "step": "changed before {where}, by {amount}",
     "trend": "changes from recording to recording, by {amount} each",
@@ -290,6 +298,7 @@ _MANY_RECORDINGS = {
             cause,
             _MANY,
             numbers=("p_adjusted", "where"),
+            or_severity=SERIOUS,
         )
         for parameter, cause in _CHANGED_CAUSE.items()
         for kind, seen in _CHANGED_SEEN.items()

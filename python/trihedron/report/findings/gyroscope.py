@@ -51,7 +51,7 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
-        "The gyro scale is {scale_ratio:.4g} although the log is in {unit:unit}.",
+        "The common scale of all gyro axes is {scale_ratio:.4g} although the log is in {unit:unit}.",
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
@@ -171,7 +171,7 @@ _MOVES = {
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
         "interpolated with less weight: {bridged}, excluded: {left_out}.",
         "the sensor was turned faster than its range limit.",
-        "Turn more slowly, or set a wider range.",
+        "Turn with rates below about half the range limit, or set a wider range.",
     ),
     (Code.TIME_GAP, "moves", WARNING): Words(
         "samples are missing inside {moves} of {n_moves} moves (move {which:first 8}); their rotation is uncertain and "
