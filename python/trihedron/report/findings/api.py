@@ -111,6 +111,7 @@ _VERIFIED = {
     ),
 }
 
+_FORCE = "In quiet stretches the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
         "The gyro was excluded: the calibration contains no gyro.",
@@ -133,12 +134,21 @@ _USE = {
         "Log both sensors.",
     ),
     (Code.STATIC_FORCE, "", NOTE): Words(
-        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s²; gravity is {gravity_m_s2:.4g} m/s².",
+        f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²); gravity is {{gravity_m_s2:.5g}} m/s².",
+        numbers=("share",),
+    ),
+    (Code.STATIC_FORCE, "off", WARNING): Words(
+        f"{_FORCE}, {{share:.2g %}} off gravity ({{gravity_m_s2:.5g}} m/s²); its scatter and the calibration's "
+        "uncertainty explain {sigma_m_s2:.2g} m/s² (1 σ).",
+        "The scale or bias has changed since the calibration (temperature, shock, another range), or the unit is "
+        "another one.",
+        "Check it on this log: `trihedron verify FILE LOG`.",
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
-        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s², but gravity {gravity_m_s2:.4g} m/s².",
+        f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",
         "The calibration is of another device, or the log in another unit or range than it was made for.",
-        "Check that calibration and log belong together: `trihedron verify CALIBRATION LOG`.",
+        "Check that calibration and log belong together: `trihedron verify FILE LOG`.",
+        numbers=("share", "sigma_m_s2"),
     ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
