@@ -149,6 +149,7 @@ class FindingCode(str, Enum):
     LOG_MOTION = "log-motion"
     LOG_TOO_SHORT = "log-too-short"
     LOG_TURNED = "log-turned"
+    TWO_LEVELS = "two-levels"
     TEMPERATURE_DRIVEN = "temperature-driven"
     SPECTRAL_LINE = "spectral-line"
     SPECTRUM_LOW_PASS = "spectrum-low-pass"

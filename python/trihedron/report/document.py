@@ -39,6 +39,7 @@ CONSEQUENCE = (
     FindingCode.FILTER_NOISE_BELOW_QUIETEST,
     FindingCode.TEMPERATURE_DRIVEN,
     FindingCode.LOG_TURNED,
+    FindingCode.TWO_LEVELS,
     FindingCode.LOG_DRIFT,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
@@ -202,7 +203,7 @@ class Document:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
         ``next_step``."""
         first, then = self.foremost, self.next_step
-        if first is None or not first.action or begins_with(then, first.action):
+        if first is None or not first.action or begins_with(then, first.action) or first.action in then:
             return then
         action = action_in_words(first)
         if action.startswith("If ") and then and "; else " not in action:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -27,8 +27,9 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
-from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up
+from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up, wave
 from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
@@ -131,6 +132,7 @@ def identify_noise(
         findings += _motion(seen, rate_hz)
         if heat is not None:
             findings += _heated(seen, heat[:, 0])
+        findings += _switching(seen, pool.map(lambda one: two_levels(one.column, rate_hz), seen))
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], range_degc, curve, c), range(channels)))
     return Noise(
@@ -193,6 +195,12 @@ def _screen(
         if warm is not None:
             findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
             column -= warm.at(np.arange(len(column)) / rate_hz)
+        waved = None if steps else wave(column, rate_hz)
+        if waved is not None:
+            findings.append(
+                Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=waved.period_s, amplitude=waved.amplitude, unit=unit)
+            )
+            column -= waved.at(np.arange(len(column)) / rate_hz)
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
@@ -235,6 +243,16 @@ def _heated(seen: Sequence[_Screened], temperature: FloatArray) -> list[Finding]
         FindingCode.TEMPERATURE_DRIVEN, "noise", low_degc=used.min(), high_degc=used.max(), share=max(share), axes=axes
     )
     return [said]
+
+
+def _switching(seen: Sequence[_Screened], found: Iterable[TwoLevels | None]) -> list[Finding]:
+    """Finding for axes whose level switches between two values."""
+    axes = [
+        (one.blank.name, levels.size, one.blank.unit, levels.n_switches, levels.held_s)
+        for one, levels in zip(seen, found, strict=True)
+        if levels is not None
+    ]
+    return [Finding.of(FindingCode.TWO_LEVELS, axes=axes)] if axes else []
 
 
 def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
