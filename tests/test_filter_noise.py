@@ -13,7 +13,7 @@ import yaml
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
-from trihedron.api.filter_noising import noticed
+from trihedron.api.filter_noise_findings import noticed
 from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of

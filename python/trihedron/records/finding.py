@@ -116,6 +116,7 @@ class FindingCode(str, Enum):
     # noise for a filter
     FILTER_NOISE_STATIC = "filter-noise-static"
     FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
+    FILTER_NOISE_OTHER_STATIC = "filter-noise-other-static"
     FILTER_NOISE_BELOW_QUIETEST = "filter-noise-below-quietest"
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"

@@ -33,6 +33,7 @@ CONSEQUENCE = (
     FindingCode.SESSION_LEFT_OUT,
     FindingCode.CALIBRATION_DOUBTED,
     FindingCode.EFFECT_NOT_APPLIED,
+    FindingCode.FILTER_NOISE_OTHER_STATIC,
     FindingCode.FILTER_NOISE_FOLLOWED,
     FindingCode.FILTER_NOISE_INCONSISTENT,
     FindingCode.FILTER_NOISE_UNCERTAIN,
@@ -69,7 +70,7 @@ THEN_RUN = {
     **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
-    "calibration.json LOG -o corrected.csv`.",
+    "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
 }
 """The command of an action in the next step."""
 

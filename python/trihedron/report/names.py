@@ -32,6 +32,7 @@ FINDINGS = {
     "filter-noise-below-quietest": "N below the noise of the quietest second",
     "filter-noise-followed": "reference follows the sensor's noise",
     "filter-noise-inconsistent": "NEES inconsistent",
+    "filter-noise-other-static": "static log unlike this log",
     "filter-noise-static": "no reference",
     "filter-noise-uncalibrated": "errors that a calibration removes",
     "filter-noise-uncertain": "N uncertain",
