@@ -87,14 +87,14 @@ _VERIFIED = {
         "{rms_without:.3g mm/s²} without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few rotations}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
     (Code.NOT_TESTED, "", WARNING): Words(
         "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
@@ -105,9 +105,9 @@ _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
-        "A bias with the wrong sign or unit, of another device, or of another temperature.",
-        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that file, unit and device "
-        "belong together; if they do, calibrate again}.",
+        "A bias with the wrong sign or unit, of another sensor, or of another temperature.",
+        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that the file is of this "
+        "sensor, in the units of the log; if it is, calibrate again}.",
     ),
 }
 
@@ -146,7 +146,7 @@ _USE = {
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
         f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",
-        "The calibration is of another device, or the log in another unit or range than it was made for.",
+        "The calibration is of another sensor, or the log in another unit or range than it was made for.",
         "Check that calibration and log belong together: `trihedron verify FILE LOG`.",
         numbers=("share", "sigma_m_s2"),
     ),
