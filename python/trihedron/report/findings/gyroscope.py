@@ -186,15 +186,16 @@ _MOVES = {
         "uncertainty.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
         "{is_common:?All gyro scales differ by one factor ({common:+.2g %}): the clock or the rate of one of the two "
-        "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|{is_bias:?Biases "
-        "have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
+        "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|"
+        "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
+        "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
         "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
         "since; else samples were lost or the gyro clipped}}}}.",
         "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check --rate "
-        "and the timestamps against a clock; if they are right, calibrate|{is_bias:?Let the sensor "
-        "warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that "
-        "file, sensor and unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG "
-        "--calibration FILE`; or calibrate}}}}} again near the conditions of use.",
+        "and the timestamps against a clock; if they are right, calibrate|{is_bias:?Let the sensor warm up, then "
+        "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that file, sensor and "
+        "unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG --calibration FILE`; or "
+        "calibrate}}}}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }
