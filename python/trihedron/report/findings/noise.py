@@ -55,7 +55,7 @@ _LOG = {
     (Code.TWO_LEVELS, "", WARNING): Words(
         "The level switches between two values: {axes:each; }. B, K and R describe the switching, no noise of theirs.",
         "telegraph noise of the sensor, a heater or a supply that switches.",
-        "Of that axis take N alone; a filter needs a bias that jumps, or another unit of the sensor.",
+        "Of that axis take N alone; a filter needs a bias that jumps, or replace the sensor.",
         lines={"axes": "{v0:axis} by {v1:.3g} {v2:unit}, {v3} times, every {v4:.2g} s"},
     ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
