@@ -13,7 +13,7 @@ import yaml
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
-from trihedron.api.filter_noising import noticed
+from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
@@ -21,8 +21,8 @@ from trihedron.estimate.filter_noise.strengths import Prior, _slope, fit, height
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
 from trihedron.estimate.filter_noise.stretches import bias_steps, velocity_stretches
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
-from trihedron.records import FindingCode, Recording
-from trihedron.records.filter_noise import Bounded, Share, StaticNoise
+from trihedron.records import FindingCode, Recording, Severity
+from trihedron.records.filter_noise import Bounded, Share, StaticNoise, TiltCheck
 from trihedron.records.reference import ReferenceMotion
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -319,3 +319,19 @@ def test_a_path_without_noise_leaves_nothing_of_the_velocity():
     free = stretch.columns[:, 9:18]
     left = stretch.observed - free @ np.linalg.lstsq(free, stretch.observed, rcond=None)[0]
     assert np.abs(left).max() < 5e-5
+
+
+def of_rest(n):
+    return StaticNoise(Bounded(n, 0.97 * n, 1.03 * n), Bounded(0.0, 0.0, 1e-6, True))
+
+
+@pytest.mark.parametrize(("times", "is_unlike"), [(1.0, False), (1.2, False), (8.0, True), (0.3, True)])
+def test_a_static_log_whose_noise_is_not_that_of_the_logs_own_rest_is_noticed(times, is_unlike):
+    found = list(unlike_this_log({"gyroscope": of_rest(times * N)}, {"gyroscope": of_rest(N)}, (), "static.csv"))
+    assert [one.code for one in found] == [FindingCode.FILTER_NOISE_OTHER_STATIC] * is_unlike
+
+
+def test_tilt_errors_far_above_their_prediction_make_static_values_untrustworthy():
+    assert not list(too_sure(TiltCheck(20, 3.0, 2e-4, 1e-4)))
+    (found,) = too_sure(TiltCheck(20, 3.0, 13e-4, 1e-4))
+    assert found.severity is Severity.SERIOUS

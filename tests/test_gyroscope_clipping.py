@@ -1,15 +1,20 @@
 """What an ADC hides of a gyro: readings at its limit, moves inside an LSB, turns at a rate misread all along."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from hand_made_sessions import G, Instrument, recorded
+from trihedron import calibrate
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.gyroscope.measurements import bridge_clipping
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
-from trihedron.records import Recording
+from trihedron.records import FindingCode, Recording
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 from trihedron.session.rounding import rounding_of_moves, rounding_variance
+from trihedron.units import RateUnit
 
 RATE_HZ = 100.0
 DEG = np.pi / 180.0
@@ -178,3 +183,12 @@ def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars():
     # 180 scores of scales, uniform errors of two faces each; 1 % is what chance leaves below 90 %.
     assert np.mean(np.abs(scores) < 1.96) > 0.90
     assert np.sqrt(np.mean(np.square(scores))) < 1.2
+
+
+def test_a_gyro_that_clipped_in_most_moves_is_left_out_for_that_reason():
+    log = recorded(Instrument(), 3)
+    # Counts, so that no unit determines a start; a limit that most moves of 1.1 to 2.6 rad in 1.5 s exceed.
+    counts = np.round(1e4 * np.clip(log.gyroscope, -0.4, 0.4))
+    clipped = replace(log, gyroscope=counts, gyroscope_unit=RateUnit.COUNTS)
+    left_out = [f for f in calibrate(clipped, gravity_m_s2=G).findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT]
+    assert left_out[0].numbers["n_lost"] > 0.5 * left_out[0].numbers["n_moves"]

@@ -280,3 +280,27 @@ def test_a_filtered_curve_is_quoted_from_above_the_filter():
     assert FindingCode.SPECTRUM_LOW_PASS in {f.code for f in axis.findings}
     # What the filter still takes where a point is believed to 1 %.
     assert axis.value("N") == pytest.approx(1e-2, rel=0.03)
+
+
+def switched(rng, n, held):
+    """A level (n,) that switches between 0 and 1, each held for ``held`` readings on average."""
+    ends = np.cumsum(rng.exponential(held, size=4 * n // held + 9))
+    return np.searchsorted(ends, np.arange(n)) % 2
+
+
+@pytest.mark.parametrize("kind", ["wave", "levels", "walk", "flicker", "white"])
+def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_is_taken_for_them(kind):
+    rng, n = np.random.default_rng(7), 65_536
+    noise = {"walk": {"K": 0.02}, "flicker": {"B": 0.1}}.get(kind, {})
+    x = series(rng, n, RATE, N=0.1, **noise)
+    if kind == "wave":
+        x += 0.2 * np.sin(2.0 * np.pi * 3.2 * np.arange(n) / n)
+    if kind == "levels":
+        x += 0.3 * switched(rng, n, 2000)
+    found = identify_noise(x, RATE, automatic=kind != "levels")
+    waves = [f for axis in found.axes for f in axis.findings if "period_s" in f.numbers]
+    assert bool(waves) is (kind == "wave")
+    assert (FindingCode.TWO_LEVELS in codes(found)) is (kind == "levels")
+    if waves:
+        assert waves[0].numbers["period_s"] == pytest.approx(n / RATE / 3.2, rel=0.05)
+        assert "K" not in present(found.axes[0])

@@ -261,3 +261,16 @@ def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tm
     recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(table)) + "\n"))
     assert recording.n_samples == len(table)
     assert "repeated-rows" not in [f.code.value for f in recording.findings if "rows_left_out" in f.numbers]
+
+
+def test_a_channel_at_its_limit_at_rest_is_told_from_one_in_motion_and_no_axes_change_where_one_gets_stuck(tmp_path):
+    table = counts()
+    table[:, 3] = np.minimum(table[:, 3], 16000.0)
+    resting = finding(read(tmp_path, table), FindingCode.CLIPPING)
+    table = counts()
+    table[:, 4:] = np.minimum(table[:, 4:], 4096.0)
+    moving = finding(read(tmp_path, table), FindingCode.CLIPPING)
+    assert resting.cause != moving.cause
+    table = counts()
+    table[N // 2 :, 1] = 32767.0
+    assert FindingCode.AXES_CHANGED not in codes(read(tmp_path, table))

@@ -174,3 +174,14 @@ def test_an_axis_without_numbers_is_named(tmp_path):
     assert words.severity is Severity.WARNING
     with pytest.raises(trihedron.InputError, match=r"column 'ay' of the accelerometer contains no numbers"):
         trihedron.read(log_of(tmp_path, "t,ax,ay,az", lambda row: [*row[:2], "north", row[3]]))
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0 / 9.80665, "g"), (1000.0 / 9.80665, "mg"), (0.3, "counts")])
+def test_a_contradicted_accelerometer_unit_is_answered_with_the_one_that_fits(tmp_path, scale, unit):
+    time_s, force, rate = motion()
+    table = np.column_stack([time_s, scale * force, rate])
+    log = write(
+        tmp_path / "log.csv", table, "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
+    )
+    found = finding(read_recording(log), FindingCode.UNIT_CONTRADICTED)
+    assert f"--accel-unit {unit}" in found.action

@@ -12,9 +12,10 @@ from trihedron.cli import main
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
+from trihedron.estimate.verified_parameters import common_factor
 from trihedron.files.calibration import read_calibration
 from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of
-from trihedron.records import Recording, Severity
+from trihedron.records import FindingCode, Recording, Severity
 from trihedron.records.sessions import PARAMETERS, Session
 
 UNIT = Instrument()
@@ -221,3 +222,35 @@ def test_the_covariance_of_the_next_recording_holds_it_however_few_there_were(n,
     allowed = 0.02 * np.sqrt(60 / trials)
     assert np.mean(np.array(before) < 1.96) < 0.9
     assert 0.95 - allowed < np.mean(np.array(now) < 1.96) < 0.995
+
+
+def test_a_recording_in_another_unit_is_named_and_the_common_parameters_are_not_trusted(four_sessions):
+    odd = replace(four_sessions[3], accelerometer=1.1 * four_sessions[3].accelerometer)
+    result = trihedron.calibrate_sessions([*four_sessions[:2], odd], gravity_m_s2=G)
+    changed = next(one for one in result.model.changes if one.id == "accel-common-scale")
+    assert (changed.kind, changed.where) == ("apart", four_sessions[3].source)
+    # Readings are 1.1 times as large; a percent is far beyond the uncertainty of a scale.
+    assert np.exp(changed.size[0]) == pytest.approx(1.1, rel=0.01)
+    assert not result.is_trustworthy
+
+
+def test_a_calibration_applied_to_readings_two_percent_off_is_warned_of_and_to_its_own_it_is_not(four_sessions):
+    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+
+    def severity(scale):
+        log = replace(four_sessions[1], accelerometer=scale * four_sessions[1].accelerometer)
+        found = [f for f in trihedron.apply(known, log).findings if f.code is FindingCode.STATIC_FORCE]
+        return [one.severity for one in found]
+
+    assert severity(1.0) == [Severity.NOTE]
+    assert severity(1.02) == [Severity.WARNING]
+    assert severity(1.5) == [Severity.SERIOUS]
+
+
+@pytest.mark.parametrize(("factor", "is_common"), [([1.01] * 3, True), ([1.01, 1.0, 1.0], False), ([1.0] * 3, False)])
+def test_one_factor_on_all_axes_of_a_gyro_is_told_from_a_change_of_one_axis(four_sessions, factor, is_common):
+    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+    log = replace(four_sessions[1], gyroscope=four_sessions[1].gyroscope * np.array(factor))
+    verified = trihedron.verify(known, log)
+    common = common_factor(verified.verification.parameters, "gyro-scale")
+    assert (common is not None) is is_common

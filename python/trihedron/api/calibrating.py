@@ -31,6 +31,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
+from trihedron.estimate.session.start import GyroClippedError
 from trihedron.estimate.verification import sense_findings
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
@@ -328,6 +329,8 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
 def _without_gyroscope(alone: Calibration, error: Exception, *, of_faces: bool = False) -> Calibration:
     if isinstance(error, TurnAngleUnknownError):
         finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
+    elif isinstance(error, GyroClippedError):
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "clipped", n_lost=error.n_lost, n_moves=error.n_moves)
     else:
         why = words("because", sentence=str(error))
         finding = Finding.of(

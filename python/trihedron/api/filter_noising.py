@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
+from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
@@ -26,7 +26,6 @@ from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise, read_noise_findings
 from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
-    RANKED_S,
     BiasModel,
     Bounded,
     FilterNoise,
@@ -46,14 +45,10 @@ BAND_PART = 0.25
 """Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
 FILE_PART = 1.1
 """Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
-CONSISTENT = (1.0, 9.0)
-"""Acceptable NEES (3 expected, within a factor of three): outside, the covariance misleads a filter."""
 IN_COUNTS = (
     "the static log is in counts: give the JSON of `trihedron allan LOG` with --calibration FILE, or with --gyro-lsb "
     "and --accel-lsb, the sizes of a count"
 )
-UNCERTAIN = math.sqrt(CONSISTENT[1] / CONSISTENT[0])
-"""Upper over lower end of N's interval whose every N leaves the NEES, which goes with N⁻², within those limits."""
 
 Static = dict[str, StaticNoise]
 
@@ -120,7 +115,8 @@ def filter_noise(
         raise InputError(_no_noise(recording, segments, static))
     known = _static(static) if static is not None else _sensors(own)
     # The log's own rest is no other log: its faults are those of the recording already.
-    of_static = _not_noise(own) if static is None else _doubts(static)
+    name = "" if static is None else _name(static)
+    of_static = _not_noise(own) if static is None else _doubts(static, name)
     findings = (*recording.findings, *of_static, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
@@ -133,7 +129,9 @@ def filter_noise(
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
-        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC))
+        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC), *too_sure(tilt))
+    if static is not None:
+        findings = (*findings, *unlike_this_log(known, _sensors(own), sensors, name))
     return FilterNoise(
         sensors,
         recording.source,
@@ -144,6 +142,7 @@ def filter_noise(
         tilt,
         intervals,
         tuple(findings),
+        name,
     )
 
 
@@ -159,12 +158,12 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
 
 def _no_noise(recording: Recording, segments: Segments | None, static: Noise | str | os.PathLike[str] | None) -> str:
     """All that is missing where a log shows no noise of its own; with a reference counts do."""
-    is_static = _longest_rest(recording, segments) is not None
-    why = (
-        "its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)"
-        if is_static and rate_to_si(recording.gyroscope_unit) is None
-        else f"the sensor is not static in it for {LEAST_S:.0f} s"
-    )
+    missing = []
+    if rate_to_si(recording.gyroscope_unit) is None:
+        missing.append("its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)")
+    if _longest_rest(recording, segments) is None:
+        missing.append(f"the sensor is not static in it for {LEAST_S:.0f} s")
+    why = ", and ".join(missing) or "its static interval has no white noise"
     remedy = "; for static values run `trihedron allan` on a static log of ten minutes or more"
     if static is not None:
         remedy = "; static values alone are those of `trihedron allan`"
@@ -239,14 +238,21 @@ def _not_noise(static: Noise | None) -> tuple[Finding, ...]:
     return tuple(one for one in (() if static is None else static.findings) if one.code in NOT_OF_THE_SENSOR)
 
 
-def _doubts(static: Noise | str | os.PathLike[str]) -> tuple[Finding, ...]:
-    """Serious findings on a static log, under its name, and those of what is in its K beside noise."""
+def _name(static: Noise | str | os.PathLike[str]) -> str:
+    """The static log as an argument."""
+    return as_arguments(static.source) if isinstance(static, Noise) else shlex.quote(os.fspath(static))
+
+
+def _doubts(static: Noise | str | os.PathLike[str], name: str) -> tuple[Finding, ...]:
+    """Serious findings on a static log, under its ``name``, and those of what is in its K beside noise."""
     said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
-    name = as_arguments(static.source) if isinstance(static, Noise) else shlex.quote(os.fspath(static))
     return tuple(
-        Finding.of(FindingCode.FILTER_NOISE_STATIC, "doubted", name=name, seen=words("quoted", sentence=one.seen))
-        if one.severity is Severity.SERIOUS
-        else one
+        Finding.of(
+            FindingCode.FILTER_NOISE_STATIC,
+            "doubted" if one.severity is Severity.SERIOUS else "noted",
+            name=name,
+            seen=words("quoted", sentence=one.seen),
+        )
         for one in said
         if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR
     )
@@ -277,66 +283,3 @@ def _between_intervals(
     rate = np.nan_to_num(recording.gyroscope * scale)
     stated = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
     return tilt_over_moves(*stated), between_intervals(*stated)
-
-
-def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
-    """Findings about N, K and their consistency, sensor by sensor."""
-    return tuple(finding for one in sensors for finding in _noticed(one))
-
-
-def _noticed(one: SensorFilterNoise) -> Iterator[Finding]:
-    sensor, N = one.sensor, one.N
-    if not one.is_settled:
-        yield Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=sensor)
-    if N.is_limit:
-        yield Finding.of(FindingCode.FILTER_NOISE_UNCERTAIN, "limit", sensor=sensor, upper=N.upper)
-    elif N.upper > N.lower * UNCERTAIN:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCERTAIN, sensor=sensor, in_file=N.value, lower=N.lower, upper=N.upper
-        )
-    elif (mostly := _mostly_reference(one)) is not None:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCERTAIN, "reference", sensor=sensor, share=mostly[0], horizon_s=mostly[1]
-        )
-    if one.static is None:
-        yield Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=sensor)
-        if N.upper < one.quietest:
-            yield Finding.of(
-                FindingCode.FILTER_NOISE_BELOW_QUIETEST, sensor=sensor, in_file=N.filter_value, quietest=one.quietest
-            )
-    if one.reference is not None and one.reference.follows:
-        yield Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=sensor)
-    if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
-        yield Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=sensor)
-    if (uncalibrated := _uncalibrated(one)) is not None:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCALIBRATED, sensor=sensor, share=uncalibrated[0], horizon_s=uncalibrated[1]
-        )
-    tested = [c for c in one.consistency if c.n_apart >= 3]
-    worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
-    if worst is not None:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_INCONSISTENT, sensor=sensor, nees=worst.nees, horizon_s=worst.horizon_s
-        )
-
-
-def _mostly_reference(one: SensorFilterNoise) -> tuple[float, float] | None:
-    """Share of the reference's own error and horizon [s], where it is so large that N and K off by ``UNCERTAIN`` change
-    the whole error by less; over the horizon nearest ``RANKED_S``."""
-    shares = [
-        (abs(s.horizon_s - RANKED_S), s.share.filter_value, s.horizon_s) for s in one.shares if s.cause == "reference"
-    ]
-    _, share, horizon_s = min(shares, default=(0.0, 0.0, 0.0))
-    return (share, horizon_s) if share > UNCERTAIN**2 * (1.0 - share) else None
-
-
-def _uncalibrated(one: SensorFilterNoise) -> tuple[float, float] | None:
-    """Share and horizon [s] where errors that a calibration removes exceed those of N and K (lower limit against upper
-    limits); None where nowhere."""
-    found: list[tuple[float, float]] = []
-    for horizon_s in {share.horizon_s for share in one.shares}:
-        at = {share.cause: share.share for share in one.shares if share.horizon_s == horizon_s}
-        removed = sum(at[cause].lower for cause in ("calibration", "g-sensitivity", "temperature") if cause in at)
-        if removed > sum(at[cause].upper for cause in ("static", "vibration", "bias") if cause in at):
-            found.append((removed, horizon_s))
-    return max(found, default=None)

@@ -15,7 +15,7 @@ from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_of_next
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
-from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration, Severity
 from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import PARAMETERS, By, Change, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.records.words import Words, words
@@ -151,8 +151,9 @@ WIDE_RANGE_DEGC = 10.0
 """Range of temperature beyond which it changes biases by more than their other repeatability (0.1 to 1 mg and 0.01 to
 0.05 °/s per °C)."""
 
-_KINDS = ("bias", "scale", "misalignment", "alignment")
-"""Groups of parameters, by the end of their ids, whose change has a specific likely cause."""
+OTHER_UNIT = 0.05
+"""Change of a common scale (logarithm) that is of no sensor: scales of MEMS parts change by at most 2 % over their
+temperature range, |g| differs by 0.5 % between places. The common parameters then fit no recording."""
 
 
 def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
@@ -176,11 +177,14 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
 
 
 def _changed(change: Change, model: SessionsModel) -> Finding:
-    kind = change.id.rsplit("-", 1)[-1]
-    case = f"{kind if kind in _KINDS else 'other'}-{change.kind}"
+    kind = change.id if change.id.endswith("common-scale") else change.id.rsplit("-", 1)[-1]
+    is_other = kind == change.id and max(map(abs, change.size)) > OTHER_UNIT
+    case = f"{kind}-{change.kind}"
     return Finding.of(
         FindingCode.PARAMETERS_CHANGED,
         case,
+        severity=Severity.SERIOUS if is_other else Severity.WARNING,
+        is_other=is_other,
         parameter=change.id,
         device=change.group,
         is_of_device=model.by == "device",
@@ -194,7 +198,8 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
 def amount_of(change: Change) -> Words:
     """The largest of a group's changes, in words."""
     k = int(np.argmax(np.abs(change.size)))
-    value, std = change.size[k], change.std[k]
+    # Scales are logarithms.
+    value, std = math.expm1(change.size[k]) if change.unit == "1" else change.size[k], change.std[k]
     factor, unit = {
         "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
         "rad/s": (degrees_from_radians(1.0), "°/s"),

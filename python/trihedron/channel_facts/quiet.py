@@ -31,6 +31,11 @@ class Windows:
     noise: dict[str, FloatArray]
     quiet: BoolArray
 
+    @property
+    def edges(self) -> tuple[IntArray, IntArray]:
+        """(m,) first sample of each window, and one past its last."""
+        return self.start, self.start + self.length
+
     def quiet_mean(self, sensor: str) -> FloatArray:
         """(k, 3) mean readings of the quiet windows."""
         return self.mean[sensor][self.quiet]

@@ -69,13 +69,21 @@ def _size() -> tuple[int, int]:
 
 
 def _line(view: GuideView) -> str:
+    from trihedron.records.guiding import Phase
+
     known = view.examination
     if known is None:
         return ""
-    far = f"{known.shortfall:.2g} x goal" if math.isfinite(known.shortfall) else "unknown"
+    far = f"{known.shortfall:.2g} x goal" if math.isfinite(known.shortfall) else "not yet seen"
     left = "goal reached" if known.is_good_enough else far
     head = f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  worst uncertainty {left:13s} "
-    return textwrap.fill(view.instruction, _size()[0], initial_indent=head, subsequent_indent=" " * len(head))
+    # The pose that it names next, also while the board is still in this one.
+    said = (
+        f"Next: {known.next_words}."
+        if view.phase in (Phase.POSE, Phase.MOVE) and known.next_words
+        else view.instruction
+    )
+    return textwrap.fill(said, _size()[0], initial_indent=head, subsequent_indent=" " * len(head))
 
 
 def finish(

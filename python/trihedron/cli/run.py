@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
-    from trihedron.report.document import Document
+    from trihedron.report.document import Document, Section
 
 _COMMAND = re.compile(r"`[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
@@ -141,8 +141,25 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
             said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
             what_next = replace(document, next_step=said).what_next
-    filled = _COMMAND.sub(lambda found: _filled(found[0]), what_next)
-    return document if filled == document.next_step else replace(document, next_step=filled)
+    return replace(document, next_step=in_text(what_next), sections=tuple(map(_in_section, document.sections)))
+
+
+def in_text(text: str) -> str:
+    """A sentence with its commands filled in."""
+    return _COMMAND.sub(lambda found: _filled(found[0]), text)
+
+
+def _in_section(section: Section) -> Section:
+    """The section with the commands of its findings filled in."""
+    from trihedron.report.document import FindingList
+
+    blocks = tuple(
+        FindingList(tuple(replace(one, seen=in_text(one.seen), action=in_text(one.action)) for one in block.findings))
+        if isinstance(block, FindingList)
+        else block
+        for block in section.blocks
+    )
+    return replace(section, blocks=blocks)
 
 
 def _filled(command: str) -> str:

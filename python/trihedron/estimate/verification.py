@@ -11,7 +11,13 @@ from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
-from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, shifted_parameters, uncalibrated
+from trihedron.estimate.verified_parameters import (
+    common_factor,
+    judge_parameters,
+    shift_findings,
+    shifted_parameters,
+    uncalibrated,
+)
 from trihedron.records import (
     Calibration,
     Finding,
@@ -63,7 +69,7 @@ def verify_calibration(
             moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
-    changed = _changed(shifted_parameters(parameters))
+    changed = _changed(parameters)
     judged = (calibration, without, recording, segments)
     worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
@@ -121,17 +127,21 @@ def _untested(calibration: Calibration, own: Calibration | None, segments: Segme
 
 
 class _Changed(NamedTuple):
-    """What differs from the calibration of the log itself: whether biases alone, or a few parameters, by name."""
+    """What differs from the calibration of the log itself: whether biases alone, a few parameters, by name, or
+    all gyro scales by one factor."""
 
     is_bias: bool
     is_few: bool
     shifted: list[str]
+    gyro_factor: float | None
 
 
-def _changed(shifted: list[JudgedParameter]) -> _Changed:
+def _changed(parameters: tuple[JudgedParameter, ...]) -> _Changed:
+    shifted = shifted_parameters(parameters)
     ids = {one.id for one in shifted}
     is_bias = "accel-bias" in ids <= {"accel-bias", "gyro-bias"}
-    return _Changed(is_bias, 0 < len(shifted) <= FEW, [f"{one.id}-{one.name}" for one in shifted[:FEW]])
+    factor = common_factor(parameters, "gyro-scale") if "gyro-scale" in ids <= {"gyro-scale", "gyro-bias"} else None
+    return _Changed(is_bias, 0 < len(shifted) <= FEW, [f"{one.id}-{one.name}" for one in shifted[:FEW]], factor)
 
 
 def _worse_than_none(
@@ -307,6 +317,8 @@ def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> I
         shifted=changed.shifted,
         worst_move=int(moves.which[worst]) + 1,
         worst_deg=angle_deg[worst],
+        is_common=changed.gyro_factor is not None,
+        common=changed.gyro_factor or 0.0,
         is_beside=bool(unsteady),
         unsteady=unsteady,
         severity=Severity.SERIOUS if beyond.is_far else Severity.WARNING,

@@ -72,6 +72,29 @@ def shifted_parameters(parameters: tuple[JudgedParameter, ...]) -> list[JudgedPa
     return sorted(beyond, key=lambda one: -abs(one.times_sigma))
 
 
+SHARE = 0.05
+"""Difference of a scale from the common one, relative to it, that is no change of its own."""
+
+
+def common_factor(parameters: tuple[JudgedParameter, ...], name: str) -> float | None:
+    """Relative change (log less file) that the scales ``name`` of all axes share; ``None`` without one.
+
+    One factor on all axes of a gyro is that of a clock as well as of its sensitivity.
+    """
+    scales = [one for one in parameters if one.id == name and one.is_judged and one.sigma > 0.0]
+    if len(scales) < len("xyz"):
+        return None
+    changes = np.array([-one.difference for one in scales])
+    weights = np.array([one.sigma**-2 for one in scales])
+    common = float(weights @ changes / weights.sum())
+    if common**2 * weights.sum() < -2.0 * np.log(probability.FALSE_ALARM):
+        return None
+    apart = changes - common
+    is_alike = np.max(np.abs(apart)) < SHARE * abs(common)
+    is_alike |= probability.chdtrc(len(scales) - 1, float(weights @ apart**2)) > probability.FALSE_ALARM
+    return common if is_alike else None
+
+
 def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]:
     """Finding with the parameters that differ by more than chance allows."""
     shifted = shifted_parameters(parameters)

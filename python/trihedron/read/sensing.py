@@ -78,11 +78,10 @@ def judge_accelerometer(
         if _is_near(norm, 1000.0):
             return Judged(found, (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm),))
         return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm),))
-    lengths = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
-    nearest = min(lengths, key=lambda unit: abs(norm - lengths[unit]) if math.isfinite(norm) else 0.0)
-    if _is_near(norm, lengths[nearest]):
+    nearest = _of_gravity(norm)
+    if nearest is not None:
         # A usual scale error makes mg and cm/s^2 indistinguishable.
-        is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / lengths[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
+        is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
             return Judged(
                 nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", static_norm=norm, unit=nearest.value),)
@@ -97,6 +96,16 @@ def judge_accelerometer(
     )
 
 
+_GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
+"""Gravity in each unit."""
+
+
+def _of_gravity(norm: float) -> AccelerationUnit | None:
+    """The unit in which a static norm is gravity; ``None`` where it is in none."""
+    nearest = min(_GRAVITY, key=lambda unit: abs(norm - _GRAVITY[unit]) if math.isfinite(norm) else 0.0)
+    return nearest if _is_near(norm, _GRAVITY[nearest]) else None
+
+
 def _is_near(value: float, target: float) -> bool:
     return abs(value - target) <= NEAR_GRAVITY * target
 
@@ -108,10 +117,13 @@ def _contradiction_accelerometer(unit: AccelerationUnit, norm: float, *, is_give
     si = norm * scale
     if 0.6 * STANDARD_GRAVITY_M_S2 <= si <= 1.5 * STANDARD_GRAVITY_M_S2:
         return None
+    fitting = _of_gravity(norm)
     return Finding.of(
         FindingCode.UNIT_CONTRADICTED,
         "accelerometer",
         unit=unit.value,
+        has_fitting=fitting is not None,
+        fitting="" if fitting is None else fitting.value,
         is_given=is_given,
         static_norm=norm,
         gravities=si / STANDARD_GRAVITY_M_S2,
@@ -141,9 +153,12 @@ def judge_gyroscope(
         unit = parse_unit(RateUnit, given if given is not None else named)
         against = None
         if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
+            fitting = next((one for one in turning.candidates if turning.fits(one)), None)
             against = Finding.of(
                 FindingCode.UNIT_CONTRADICTED,
                 "gyro-by-turning",
+                has_fitting=fitting is not None,
+                fitting="" if fitting is None else fitting.value,
                 is_given=given is not None,
                 unit=unit.value,
                 factor=turning.factor(unit),

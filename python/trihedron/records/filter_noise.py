@@ -138,7 +138,10 @@ class IntervalCheck(Plain):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FilterNoise(Presented):
-    """Filter noise of a log: its sensors, and without a reference the checks on its static intervals."""
+    """Filter noise of a log: its sensors, and without a reference the checks on its static intervals.
+
+    ``static_source`` is the static log that was given; without one static values are of this log's own rest.
+    """
 
     sensors: tuple[SensorFilterNoise, ...]
     source: str
@@ -149,6 +152,7 @@ class FilterNoise(Presented):
     tilt: TiltCheck | None = None
     intervals: IntervalCheck | None = None
     findings: tuple[Finding, ...] = ()
+    static_source: str = ""
 
     def __repr__(self) -> str:
         return f"<FilterNoise of {self.source}: {', '.join(one.sensor for one in self.sensors)}>"

@@ -116,6 +116,7 @@ class FindingCode(str, Enum):
     # noise for a filter
     FILTER_NOISE_STATIC = "filter-noise-static"
     FILTER_NOISE_NO_STATIC = "filter-noise-no-static"
+    FILTER_NOISE_OTHER_STATIC = "filter-noise-other-static"
     FILTER_NOISE_BELOW_QUIETEST = "filter-noise-below-quietest"
     FILTER_NOISE_NOT_SEPARATED = "filter-noise-not-separated"
     FILTER_NOISE_FOLLOWED = "filter-noise-followed"
@@ -149,6 +150,7 @@ class FindingCode(str, Enum):
     LOG_MOTION = "log-motion"
     LOG_TOO_SHORT = "log-too-short"
     LOG_TURNED = "log-turned"
+    TWO_LEVELS = "two-levels"
     TEMPERATURE_DRIVEN = "temperature-driven"
     SPECTRAL_LINE = "spectral-line"
     SPECTRUM_LOW_PASS = "spectrum-low-pass"

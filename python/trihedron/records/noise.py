@@ -20,7 +20,7 @@ FEWEST_READINGS, LEAST_S = 512, 20.0
 """Fewest readings for the separation of noise terms, and least length of a log whose terms are of use."""
 USEFUL_S = 3600.0
 """Length of a static log from which on B and K that do not show are bounded usefully."""
-NOT_OF_THE_SENSOR = (FindingCode.TEMPERATURE_DRIVEN, FindingCode.LOG_TURNED)
+NOT_OF_THE_SENSOR = (FindingCode.TEMPERATURE_DRIVEN, FindingCode.LOG_TURNED, FindingCode.TWO_LEVELS)
 """Findings of a log whose slow changes are not noise: B, K and R are upper limits of the sensor's own."""
 
 

@@ -22,7 +22,7 @@ def channels_table(recording: Recording) -> Table:
             (
                 f"{plain_number(float(facts.step[k]))} {unit}" if facts.step[k] else "not visible",
                 _ends([limit for limit in facts.limits if limit.axis == k], unit),
-                UNKNOWN if filters is None else _filter(filters[k]),
+                UNKNOWN if filters is None else _filter(filters[k], 0.5 * recording.rate_hz),
             )
             for k in range(3)
         ]
@@ -60,10 +60,13 @@ def _ends(limits: list[Limit], unit: str) -> str:
     return f"{' and '.join(values)} {unit}" if values else "none"
 
 
-def _filter(one: LowPass) -> str:
-    if one.corner_hz is None:
-        return f"none below {plain_number(one.above_hz, 2)} Hz"
+def _filter(one: LowPass, nyquist_hz: float) -> str:
+    """In words; no frequency above Nyquist is stated, where a log shows nothing."""
     corner = one.corner_hz
+    if corner is None:
+        return f"none below {plain_number(min(one.above_hz, nyquist_hz), 2)} Hz"
+    if corner.value > nyquist_hz:
+        return f"above {plain_number(min(corner.lower, nyquist_hz), 2)} Hz"
     low, high = (plain_number(value, 2) for value in (corner.lower, corner.upper))
     kind = "Gaussian" if one.shape == 0 else f"order {one.shape}"
     return f"{plain_number(corner.value, 2)} Hz ({low} to {high}), {kind}"

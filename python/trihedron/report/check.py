@@ -28,7 +28,9 @@ def check_report(
         # The next pose where poses suffice; else a finding names those to add, as it does moves.
         if pose := next_pose(calibration):
             blocks.append(Facts((("most useful next pose", pose),)))
-    alone = " of the accelerometer (no gyro in the log)" if recording.gyroscope is None else ""
+    is_alone = calibration is not None and calibration.gyroscope is None
+    why = " (no gyro in the log)" if recording.gyroscope is None else ""
+    alone = f" of the accelerometer alone{why}" if is_alone or why else ""
     good, bad = f"Fit for calibration{alone}", "NOT FIT for calibration"
     return Document(
         title="Check of a log",

@@ -104,7 +104,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 def of_another_device(diagnosis: Diagnosis, model: str) -> str:
     """Advice where a calibration file, the ``model``, differs in what the package fixes; else empty."""
     differs = model.endswith(".json") and any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
-    return "Check that the calibration is of this device: its axes have other directions. " if differs else ""
+    return "Check that the calibration is of this sensor: its axes have other directions. " if differs else ""
 
 
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:

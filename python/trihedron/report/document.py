@@ -30,14 +30,17 @@ CONSEQUENCE = (
     FindingCode.GYROSCOPE_LEFT_OUT,
     FindingCode.RATE_ASSUMED,
     FindingCode.WORSE_THAN_UNCALIBRATED,
+    FindingCode.SESSION_LEFT_OUT,
     FindingCode.CALIBRATION_DOUBTED,
     FindingCode.EFFECT_NOT_APPLIED,
+    FindingCode.FILTER_NOISE_OTHER_STATIC,
     FindingCode.FILTER_NOISE_FOLLOWED,
     FindingCode.FILTER_NOISE_INCONSISTENT,
     FindingCode.FILTER_NOISE_UNCERTAIN,
     FindingCode.FILTER_NOISE_BELOW_QUIETEST,
     FindingCode.TEMPERATURE_DRIVEN,
     FindingCode.LOG_TURNED,
+    FindingCode.TWO_LEVELS,
     FindingCode.LOG_DRIFT,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
     FindingCode.LEFT_HANDED,
@@ -67,7 +70,7 @@ THEN_RUN = {
     **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
-    "calibration.json LOG -o corrected.csv`.",
+    "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
 }
 """The command of an action in the next step."""
 
@@ -201,7 +204,7 @@ class Document:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
         ``next_step``."""
         first, then = self.foremost, self.next_step
-        if first is None or not first.action or begins_with(then, first.action):
+        if first is None or not first.action or begins_with(then, first.action) or first.action in then:
             return then
         action = action_in_words(first)
         if action.startswith("If ") and then and "; else " not in action:

@@ -37,6 +37,7 @@ CAUSE_WORDS = {
     "reference": ("error of the reference", "a better reference: none of it goes into N or K"),
 }
 """Words for every cause, and measures that reduce its share."""
+OWN_REST = "the longest static interval of this log"
 TERMS = {"N": "white noise N", "K": "bias random walk K"}
 
 
@@ -145,7 +146,9 @@ def _factor(value: Bounded, static: Bounded | None) -> str:
 
 
 def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
-    facts = []
+    facts = [("for the filter", f"from {_beside(found)}{escaped(found.source)}")]
+    if any(one.static is not None for one in found.sensors):
+        facts.append(("static", f"from {escaped(found.static_source) or OWN_REST}"))
     if found.reference_source:
         facts.append(("reference", escaped(found.reference_source)))
     for one in found.sensors:
@@ -160,12 +163,19 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
     if found.tilt is not None:
         tilt = found.tilt
         actual, predicted = (plain_number(degrees_from_radians(v), 2) for v in (tilt.actual, tilt.predicted))
-        said = f"{actual}° rms over {how_many(tilt.n, 'move')}; static N predicts {predicted}° (residual calibration "
+        said = (
+            f"{actual}° rms over {how_many(tilt.n, 'move')}; static noise predicts {predicted}° (residual calibration "
+        )
         said += "error, vibration and bias are in the difference; the heading is not seen)"
         facts.append(("tilt error after a rotation", said))
     if found.intervals is not None:
         facts += _of_intervals(found.intervals)
     return tuple(facts)
+
+
+def _beside(found: FilterNoise) -> str:
+    """Where the values for the filter come from, of the log: its rest where there is no reference."""
+    return "" if found.reference_source else "the longest static interval of "
 
 
 def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:

@@ -10,6 +10,8 @@ LETTERS = 2
 QUANTITIES = {"w": "angular rate", "u": "specific force", "f": "specific force"}
 """Symbols of the variables of empirical relations."""
 MEANING = {
+    "accel-common-scale": "common scale of all accelerometer axes",
+    "gyro-common-scale": "common scale of all gyro axes",
     "static-accel": "gravity error in static poses",
     "static-gyro": "gyro rate in static poses",
     "moves": "tilt error after a rotation",
@@ -20,7 +22,7 @@ MEANING = {
     "parameters": "parameters of the model",
     "noise": "noise and sampling",
 }
-"""Domains of residuals in words."""
+"""Parameters and domains of residuals in words."""
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
     "calibration-doubted": "warnings of single calibrations",
@@ -30,13 +32,14 @@ FINDINGS = {
     "filter-noise-below-quietest": "N below the noise of the quietest second",
     "filter-noise-followed": "reference follows the sensor's noise",
     "filter-noise-inconsistent": "NEES inconsistent",
+    "filter-noise-other-static": "static log unlike this log",
     "filter-noise-static": "no reference",
     "filter-noise-uncalibrated": "errors that a calibration removes",
     "filter-noise-uncertain": "N uncertain",
     "filter-noise-unsettled": "search not settled",
     "gravity-defaulted": "gravity not given",
     "held-out-worse": "tilt error after rotations above noise",
-    "log-drift": "drift over the log",
+    "log-drift": "slow change over the log",
     "log-jump": "jumps of the level",
     "log-motion": "motion or vibration in the log",
     "non-finite": "rows without time",
@@ -47,6 +50,7 @@ FINDINGS = {
     "spectrum-low-pass": "low-pass in the spectrum",
     "spectrum-unexplained": "spectrum unlike the fitted terms",
     "table-tilt": "faces that contradict each other",
+    "two-levels": "level that switches",
     "turntable": "turntable speeds that moves and poses contradict",
     "time-duplicate": "equal timestamps",
     "time-unit-detected": "time unit uncertain",

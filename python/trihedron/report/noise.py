@@ -11,7 +11,7 @@ from trihedron.report.document import Block, Code, Document, Facts, Headline, Pa
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
 from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
-from trihedron.report.noise_units import TERM_WORDS, customary, term_in_words, unit_of
+from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
@@ -20,10 +20,8 @@ _NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-uni
 LINES = "(section Kalibr, in `... --full` and in --report)"
 NEXT = f"Take N, B, K into a filter {LINES}; average for no longer than the best averaging time."
 LONGER = "Record a static log of an hour or more for B and K; of this one take N alone."
-IN_SLOW_NOISE = {FindingCode.TEMPERATURE_DRIVEN: "the temperature", FindingCode.LOG_TURNED: "a turn of the unit"}
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
-# For a curve, which has no counts.
 SAY_UNITS = "State the unit of the deviations, for terms in SI: `... --gyro-unit UNIT --accel-unit UNIT`."
 BEYOND = "beyond the log"
 """An averaging time at which the fitted sum still falls."""
@@ -88,8 +86,9 @@ def _next(noise: Noise) -> str:
     """Use of the terms; what is missing for terms in SI, or for those of slow noise."""
     longer = [LONGER] if noise.shows_white_alone else []
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
-        codes = {f.code for f in noise.findings}
-        return " ".join([*longer, SAY_UNITS if FindingCode.CURVE_ALONE in codes else SAY_COUNTS])
+        # A curve has no counts.
+        is_curve = any(f.code is FindingCode.CURVE_ALONE for f in noise.findings)
+        return " ".join([*longer, SAY_UNITS if is_curve else SAY_COUNTS])
     if (actions := [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]) or longer:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
     has_walk = any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes)

@@ -8,6 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import (
     GEOMETRY,
     PARAMETERS,
@@ -43,7 +44,10 @@ def sessions_report(model: SessionsModel) -> Document:
     """Lay out the common parameters of many recordings, and the repeatability of each."""
     n = len(model.sessions)
     changed = [change for change in model.changes if change.significant]
-    used = f"{how_many(n, 'recording')} of {n + len(model.left_out)}" if model.left_out else how_many(n, "recording")
+    used = how_many(n, "recording")
+    if model.left_out:
+        without = ", ".join(distinct_names([path for path, _ in model.left_out])[:MOST_NAMED])
+        used += f" of {n + len(model.left_out)} (without {without})"
     agree = f"{used} differ by no more than their uncertainty and the bias drift within a recording"
     if model.by == "device":
         agree = f"{used} in one model: its uncertainty is that of a device that was not calibrated itself"

@@ -19,6 +19,8 @@ CREEP_CHANCE = 1e-3
 """Probability that any steady pose of a log is called settling though none is."""
 LARGEST_NOISE_G = 0.05
 """Noise of one sample, in g, above which poses vibrate: at 1 kHz the noisiest MEMS parts (400 µg/√Hz) reach 0.015."""
+BEYOND_GRAVITY = 0.2
+"""Excess of |f| in clipped poses that no bias or scale error of a working accelerometer explains."""
 POSES_FOR_NINE = 9
 """A norm fit of nine parameters needs nine poses in different directions, and more to test itself."""
 
@@ -102,14 +104,28 @@ def without_cut(
     """Runs whose accelerometer was inside its range, and a finding on the others."""
     cut = [is_cut(recording, channels, (run.first, run.last), ends) for run in runs]
     kept = [run for run, end in zip(runs, cut, strict=True) if end is None]
+    clipped = [run for run, end in zip(runs, cut, strict=True) if end is not None]
     first = next(((run, end) for run, end in zip(runs, cut, strict=True) if end is not None), None)
     if first is None:
         return runs, []
-    start_s = float(recording.time_s[first[0].first * channels.length])
     said = Finding.of(
-        FindingCode.POSE_AT_RANGE_LIMIT, poses=len(runs) - len(kept), first_s=start_s, reading=first[1].reading
+        FindingCode.POSE_AT_RANGE_LIMIT,
+        poses=len(clipped),
+        first_s=float(recording.time_s[first[0].first * channels.length]),
+        reading=first[1].reading,
+        is_stuck=_exceeds_gravity(channels, clipped, kept),
     )
     return kept, [said]
+
+
+def _exceeds_gravity(channels: Channels, cut: list[Run], kept: list[Run]) -> bool:
+    """Whether |f| of the clipped runs exceeds that of the others: a range limit only lowers it."""
+    sensor = ~channels.is_gyroscope
+    norms = [
+        np.linalg.norm(means_of(channels.mean, [run.quiet_ranges() for run in part])[:, sensor], axis=1)
+        for part in (cut, kept)
+    ]
+    return bool(kept) and float(np.median(norms[0])) > (1.0 + BEYOND_GRAVITY) * float(np.median(norms[1]))
 
 
 def judge_log(

@@ -132,6 +132,10 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     ]
 
 
+OFF_NOMINAL = 0.15
+"""Largest departure (logarithm) of a scale from that of the log's unit."""
+
+
 def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Finding]:
     """Findings for a left-handed triad, and for scales that contradict the unit of the log."""
     if np.linalg.det(S) < 0:
@@ -140,10 +144,16 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Findin
     nominal = acceleration_to_si(raw_unit)
     if nominal is not None:
         ratio = np.linalg.norm(S, axis=0) / nominal
-        worst = int(np.argmax(np.abs(np.log(ratio))))
+        apart = np.log(ratio)
+        worst = int(np.argmax(np.abs(apart)))
         # Uncalibrated consumer triads are within 10 % of their data sheet; a wrong unit or |g| is off by far more.
-        if abs(np.log(ratio[worst])) > 0.15:
-            scale, unit = ratio[worst], raw_unit.value
+        if abs(apart[worst]) > OFF_NOMINAL:
+            is_common = bool(np.ptp(apart) < OFF_NOMINAL)
             yield Finding.of(
-                FindingCode.SCALE_NOT_NOMINAL, "accelerometer", axis=worst + 1, scale_ratio=scale, unit=unit
+                FindingCode.SCALE_NOT_NOMINAL,
+                "accelerometer",
+                axis=worst + 1,
+                scale_ratio=np.exp(apart.mean() if is_common else apart[worst]),
+                unit=raw_unit.value,
+                is_common=is_common,
             )

@@ -42,13 +42,16 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
 
 
 def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
-    """Tilt errors after rotations, from gyro rates (n, 3) [rad/s], with their prediction from the static N.
+    """Tilt errors after rotations, from gyro rates (n, 3) [rad/s], with their prediction from static noise.
 
     The bias is the mean rate of the poses on both sides; rotation about the vertical is not observable. None without a
     move."""
     means = segments.accelerometer_mean
     if means is None:
         return None
+    sigma = np.zeros_like(means) if segments.accelerometer_sigma_mean is None else segments.accelerometer_sigma_mean
+    # Two directions across gravity.
+    variance_up = 2.0 * np.mean(sigma**2, axis=1) / np.sum(means**2, axis=1)
     errors, predicted, longest = [], [], 0.0
     for move in segments.moves:
         before, after = segments.poses[move.pose_before], segments.poses[move.pose_after]
@@ -64,7 +67,8 @@ def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, st
         up = [means[k] / np.linalg.norm(means[k]) for k in (move.pose_before, move.pose_after)]
         errors.append(float(np.arccos(np.clip(up[1] @ (turned.T @ up[0]), -1.0, 1.0))))
         static_s = len(static_samples) * float(np.median(np.diff(time_s)))
-        predicted.append(2.0 * static.N.filter_value**2 * (length + length**2 / static_s))
+        of_gyro = 2.0 * static.N.filter_value**2 * (length + length**2 / static_s)
+        predicted.append(of_gyro + variance_up[move.pose_before] + variance_up[move.pose_after])
         longest = max(longest, length)
     if not errors:
         return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -27,8 +27,9 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
-from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up
+from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up, wave
 from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
 from trihedron.records import AllanCurve, Finding, FindingCode
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
 
@@ -100,11 +101,8 @@ def identify_noise(
             f"{n} readings ({n / rate_hz:.3g} s) are too few to separate noise terms: at least {FEWEST_READINGS} are "
             "needed, an hour or more is useful"
         )
-    heat = None if temperature_degc is None else as_readings(temperature_degc)
-    if heat is not None and heat.shape != (n, 1):
-        raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, heat.shape))}")
-    logged = () if heat is None else heat[np.isfinite(heat)]
-    range_degc = (float(np.min(logged)), float(np.max(logged))) if len(logged) else remarks.UNLOGGED
+    heat = None if temperature_degc is None else _heat(as_readings(temperature_degc), n)
+    range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
@@ -112,7 +110,7 @@ def identify_noise(
         findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
 
     def screened(c: int) -> _Screened:
-        return _screen(readings[:, c], rate_hz, excluded, (names[c], units[c]), range_degc, automatic=automatic)
+        return _screen(readings[:, c], rate_hz, excluded, (names[c], units[c]), heat, automatic=automatic)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         seen = list(pool.map(screened, range(channels)))
@@ -129,7 +127,8 @@ def identify_noise(
             )
         findings += _motion(seen, rate_hz)
         if heat is not None:
-            findings += _heated(seen, heat[:, 0])
+            findings += _heated(seen, heat)
+        findings += _switching(seen, pool.map(lambda one: two_levels(one.column, rate_hz), seen))
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(lambda c: _identified(seen[c], range_degc, curve, c), range(channels)))
     return Noise(
@@ -144,12 +143,27 @@ def identify_noise(
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """One channel with excluded intervals and events as NaN, the automatic ``cuts``, and the ``steps`` of its level."""
+    """One channel with excluded intervals and events as NaN, the automatic ``cuts``, the ``steps`` of its level, and
+    the share of its slow changes that the temperature explains."""
 
     column: FloatArray
     blank: NoiseAxis
     cuts: list[tuple[int, int]]
     steps: list[Event]
+    share_of_heat: float
+
+    @property
+    def is_heated(self) -> bool:
+        """Whether the temperature is the larger part of its slow changes."""
+        return self.share_of_heat > MOSTLY
+
+
+def _heat(temperature: FloatArray, n: int) -> FloatArray | None:
+    """Temperature (n,) with missing values interpolated; ``None`` without any. Raises ``InputError`` on other sizes."""
+    if temperature.shape != (n, 1):
+        raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, temperature.shape))}")
+    there = np.flatnonzero(np.isfinite(temperature[:, 0]))
+    return np.interp(np.arange(n), there, temperature[there, 0]) if len(there) else None
 
 
 def _screen(
@@ -157,11 +171,11 @@ def _screen(
     rate_hz: float,
     excluded: Sequence[tuple[int, int]],
     named: tuple[str, str],
-    range_degc: tuple[float, float],
+    heat: FloatArray | None,
     *,
     automatic: bool,
 ) -> _Screened:
-    """A channel, ``named`` by its name and unit, beside the range of the logged temperature."""
+    """A channel, ``named`` by its name and unit, beside the logged temperature (n,)."""
     name, unit = named
     column = np.array(readings, dtype=np.float64)
     for start, stop in excluded:
@@ -188,15 +202,32 @@ def _screen(
             steps, cuts = [], []
         for start, stop in cuts:
             column[start:stop] = np.nan
-        warm = None if steps else warm_up(column, rate_hz)
-        if warm is not None:
-            findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
-            column -= warm.at(np.arange(len(column)) / rate_hz)
+    breaks = [0.5 * (e.start + e.stop) for e in steps]
+    share = 0.0 if heat is None else share_of_temperature(column, heat, breaks)
+    if automatic and not steps and share <= MOSTLY:
+        findings += _level(column, rate_hz, unit, heat)
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
-    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), cuts, steps)
+    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), cuts, steps, share)
+
+
+def _level(column: FloatArray, rate_hz: float, unit: str, heat: FloatArray | None) -> list[Finding]:
+    """Findings for a warm-up and a wave, which are subtracted from the ``column`` (n,) in place."""
+    time_s, findings = np.arange(len(column)) / rate_hz, []
+    warm = warm_up(column, rate_hz)
+    if warm is not None:
+        range_degc = remarks.UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
+        findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
+        column -= warm.at(time_s)
+    slow = wave(column, rate_hz)
+    if slow is not None:
+        findings.append(
+            Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=slow.period_s, amplitude=slow.amplitude, unit=unit)
+        )
+        column -= slow.at(time_s)
+    return findings
 
 
 def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
@@ -219,28 +250,37 @@ def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
     return [said]
 
 
-def _heated(seen: Sequence[_Screened], temperature: FloatArray) -> list[Finding]:
+def _heated(seen: Sequence[_Screened], heat: FloatArray) -> list[Finding]:
     """Finding for axes whose slow changes are mostly those of the temperature (n,)."""
-    there = np.isfinite(temperature)
-    if not there.any():
-        return []
-    heat = np.interp(np.arange(len(temperature)), np.flatnonzero(there), temperature[there])
-    share = [share_of_temperature(one.column, heat, [0.5 * (e.start + e.stop) for e in one.steps]) for one in seen]
-    axes = [one.blank.name for one, part in zip(seen, share, strict=True) if part > MOSTLY]
+    axes = [one.blank.name for one in seen if one.is_heated]
     if not axes:
         return []
     used = heat[np.isfinite([one.column for one in seen]).any(axis=0)]
+    share = max(one.share_of_heat for one in seen)
     said = Finding.of(
-        FindingCode.TEMPERATURE_DRIVEN, "noise", low_degc=used.min(), high_degc=used.max(), share=max(share), axes=axes
+        FindingCode.TEMPERATURE_DRIVEN, "noise", low_degc=used.min(), high_degc=used.max(), share=share, axes=axes
     )
     return [said]
+
+
+def _switching(seen: Sequence[_Screened], found: Iterable[TwoLevels | None]) -> list[Finding]:
+    """Finding for axes whose level switches between two values."""
+    axes = [
+        (one.blank.name, levels.size, one.blank.unit, levels.n_switches, levels.held_s)
+        for one, levels in zip(seen, found, strict=True)
+        if levels is not None
+    ]
+    return [Finding.of(FindingCode.TWO_LEVELS, axes=axes)] if axes else []
 
 
 def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
     bands = ordinates(seen.column, seen.blank.rate_hz, stretches_between(len(seen.column), seen.steps))
-    return identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column), range_degc)
+    axis = identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column), range_degc)
+    # Drift that the temperature explains is stated with it.
+    others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
+    return replace(axis, findings=others) if seen.is_heated else axis
 
 
 def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

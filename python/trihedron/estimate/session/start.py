@@ -54,6 +54,14 @@ class Log:
         return carried(measured, self.anchors_s(measured), *near)
 
 
+class GyroClippedError(InputError):
+    """The gyro clipped in ``n_lost`` of ``n_moves`` moves, and the others do not determine its scale."""
+
+    def __init__(self, measured: MoveMeasurements) -> None:
+        self.n_lost, self.n_moves = int(np.count_nonzero(measured.is_lost)), measured.n_moves
+        super().__init__(f"the gyro clipped in {self.n_lost} of {self.n_moves} moves")
+
+
 def lower(S: FloatArray, b: FloatArray) -> Near:
     """S and b of an accelerometer in the lower-triangular frame, and the rotation (3, 3) into it."""
     R = reframing(S, b, "lower").rotation
@@ -91,7 +99,7 @@ def is_enough(used: BoolArray) -> bool:
 def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
     """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given."""
     if np.all(measured.is_lost):
-        raise InputError("the gyro clipped in every move: turn more slowly or set a wider range")
+        raise GyroClippedError(measured)
     return _nearest(log, measured, starts(log.recording, measured, log.accelerometer, nominal))
 
 
@@ -108,7 +116,7 @@ def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
             continue
         found.append((core.chi2, np.asarray(core.rate_scale)))
     if not found:
-        raise InputError("the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)")
+        raise InputError("the gyro fit has no usable start: give --gyro-nominal, in rad/s per raw unit")
     return S_a, b_a, min(found, key=lambda one: one[0])[1]
 
 
@@ -197,10 +205,12 @@ def starts(
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None and nominal is None:
         found.append(unit * np.eye(3))
+    if not found and np.any(measured.is_lost):
+        raise GyroClippedError(measured)
     if not found:
         raise InputError(
             "the moves do not determine a first guess of the gyro scale and its readings are counts: "
-            "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
+            "give --gyro-nominal in rad/s per count, or add moves about all three axes"
         )
     return np.ascontiguousarray(np.stack(found))
 

@@ -57,7 +57,7 @@ def _change(sessions: Sequence[Session], name: str) -> Change:
     drift = np.mean([session.drift[picked] for session in sessions], axis=0)
     weights = np.array([_weight(session, picked, drift) for session in sessions])
     names = tuple(PARAMETERS[k].name for k in picked)
-    p_value, values, weights, name, names = _as_gravity(name, names, values, weights)
+    p_value, values, weights, name, names = _as_common_scale(name, names, values, weights)
     (kind, place, column), rest_p = _best(values, weights, name)
     if len(sessions) > 2 and rest_p < MIN_REST_P and not _stands_out(values, weights, column):
         kind = "scatter"
@@ -140,26 +140,33 @@ def _stands_out(values: FloatArray, weights: FloatArray, column: FloatArray) -> 
     """Whether a change exceeds the scatter of the rest (F test), corrected for the number of candidates."""
     n, k = values.shape
     dof = k * (n - 2)
-    if n < 4:
+    if n < 3:
         return False
     before, after = _left(values, weights, None), _left(values, weights, column)
     ratio = ((before - after) / k) / max(after / dof, 1e-300)
     return fdtrc(k, dof, ratio) * len(list(_candidates(n))) < MIN_REST_P
 
 
-def _as_gravity(
+SHARE = 0.05
+"""Largest change of one axis against the others, relative to the common one, that is no change of its own."""
+
+
+def _as_common_scale(
     name: str, names: tuple[str, ...], values: FloatArray, weights: FloatArray
 ) -> tuple[float, FloatArray, FloatArray, str, tuple[str, ...]]:
-    """p of one common value; accelerometer scales that change equally on all axes are gravity, one value a session."""
+    """p of one common value; scales that change equally on all axes (unit, gravity, clock) are one value a session."""
     n, k = values.shape
     p_value = _p(_left(values, weights, None), k * (n - 1), name, n)
-    if name != "accel-scale" or p_value >= MIN_REST_P:
+    if not name.endswith("-scale") or p_value >= MIN_REST_P:
         return p_value, values, weights, name, names
-    ones = np.ones(k)
+    # Scales of the axes differ: without their means, other weights of the axes would be another common scale.
+    values, ones = values - values.mean(axis=0), np.ones(k)
     variance = np.array([1.0 / float(ones @ w @ ones) for w in weights])
     common = np.array([v * float(ones @ w @ y) for v, w, y in zip(variance, weights, values, strict=True)])
-    # Gravity only if the scales relative to the session's common one are equal in all sessions (k - 1 dof each).
+    # Only if the scales relative to the session's common one are equal in all sessions (k - 1 dof each), or nearly so.
     shape = values - common[:, None]
-    if _p(_left(shape, weights, None), (k - 1) * (n - 1), name, n) < MIN_REST_P:
+    is_alike = bool(np.max(np.ptp(shape, axis=0)) < SHARE * np.ptp(common))
+    if not is_alike and _p(_left(shape, weights, None), (k - 1) * (n - 1), name, n) < MIN_REST_P:
         return p_value, values, weights, name, names
-    return p_value, common[:, None], (1.0 / variance)[:, None, None], "gravity", ("common scale",)
+    common_name = name.replace("-scale", "-common-scale")
+    return p_value, common[:, None], (1.0 / variance)[:, None, None], common_name, ("all axes",)

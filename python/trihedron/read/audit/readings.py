@@ -31,24 +31,40 @@ def short(sensor: str) -> str:
     return "gyro" if sensor == "gyroscope" else sensor
 
 
-def audit_clipping(sensor: str, limits: tuple[Limit, ...], place: Place) -> list[Finding]:
-    """One finding per sensor that lists every range limit (``limits``) with its clipped readings."""
-    if not limits:
-        return []
+def audit_clipping(sensor: str, limits: tuple[Limit, ...], windows: Windows | None, place: Place) -> list[Finding]:
+    """A finding that lists the range limits (``limits``) met in motion with their readings, one those met at rest."""
+    at_rest = [_is_static(limit, windows) for limit in limits]
+    return [
+        _clipped(sensor, met, place, is_static=is_static)
+        for is_static in (False, True)
+        if (met := [limit for limit, still in zip(limits, at_rest, strict=True) if still is is_static])
+    ]
+
+
+def _is_static(limit: Limit, windows: Windows | None) -> bool:
+    """Whether most readings at a limit are in quiet windows, of those that are in windows at all."""
+    if windows is None:
+        return False
+    before = np.repeat(np.concatenate([[0], np.cumsum(limit.runs[:, 1] - limit.runs[:, 0])]), 2)[1:-1]
+    inside = np.diff([np.interp(edge, limit.runs.ravel(), before) for edge in windows.edges], axis=0)[0]
+    return bool(2 * inside[windows.quiet].sum() > inside.sum())
+
+
+def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool) -> Finding:
     first = min(int(w.runs[0, 0]) for w in limits)
     numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in limits}
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in limits}
-    return [
-        Finding.of(
-            FindingCode.CLIPPING,
-            sensor=short(sensor),
-            limits=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in limits],
-            where=place(first),
-            count=sum(w.count for w in limits),
-            sample=first,
-            numbers=numbers,
-        )
-    ]
+    return Finding.of(
+        FindingCode.CLIPPING,
+        "at-rest" if is_static else "",
+        sensor=short(sensor),
+        is_gyro=sensor == "gyroscope",
+        limits=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in limits],
+        where=place(first),
+        count=sum(w.count for w in limits),
+        sample=first,
+        numbers=numbers,
+    )
 
 
 LOST_IN_NOISE = 0.01
@@ -110,7 +126,7 @@ def audit_readings(
         return findings
     findings += _repeated(sensor, readings, repeats, place)
     limits = facts.limits
-    findings += audit_clipping(sensor, limits, place)
+    findings += audit_clipping(sensor, limits, windows, place)
     for k in range(3):
         at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in limits)
         # A stuck triad is reported as repeated rows, a value stuck at a range limit as clipping.
@@ -319,11 +335,12 @@ def _leaps(readings: FloatArray, least: float) -> list[int]:
 
 def _is_unseen(gravity: FloatArray, turned_rad: FloatArray) -> bool:
     """Whether both halves of gravity (2 n, 3) are constant, and the gyro's rotation per sample (2 n, 3) [rad] explains
-    less than ``_SEEN`` of the change between them."""
+    less than ``_SEEN`` of the change between them: other axes keep its size, as a channel that gets stuck does not."""
     halves = np.split(gravity, 2)
     before, after = (half.mean(axis=0) for half in halves)
     is_calm = all(bool(np.all(np.linalg.norm(half - half.mean(axis=0), axis=1) < _CALM)) for half in halves)
     turn = float(np.linalg.norm(after - before))
+    is_gravity = abs(float(np.linalg.norm(after) - np.linalg.norm(before))) < 2.0 * _CALM
     n = len(gravity) // 2
     seen = float(np.linalg.norm(turned_rad[n // 2 : n + n // 2 + 1], axis=1).sum())
-    return is_calm and turn > _LEAST_TURN and seen < _SEEN * turn
+    return is_calm and is_gravity and turn > _LEAST_TURN and seen < _SEEN * turn

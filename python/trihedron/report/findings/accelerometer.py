@@ -74,9 +74,11 @@ ENTRIES = {
         numbers=("det_S_sign",),
     ),
     (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(
-        "The scale of {axis:axis} is {scale_ratio:.4g} although the log is in {unit:unit}.",
-        "The log is in another unit than stated, or |g| is wrong.",
-        "State the unit of the log and |g|.",
+        "The {is_common:?common scale of all axes|scale of {axis:axis}} is {scale_ratio:.4g} although the log is in "
+        "{unit:unit}.",
+        "{is_common:?The log is in another unit than stated, or gravity is wrong|That axis is damaged, or its column "
+        "is of another quantity}.",
+        "{is_common:?State the unit of the log (--accel-unit) and gravity|Check the axis and its column}.",
     ),
     (Code.NOT_CONVERGED, "accelerometer", SERIOUS): Words(
         "The accelerometer fit did not converge ({stopped_because}).",

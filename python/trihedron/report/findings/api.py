@@ -2,8 +2,9 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_MANY = "The common parameters are the mean of different ones: use the spread below as their error, or recalibrate "
-_MANY += "after the change."
+_MANY = "{is_other:?Check the unit, range and rate of that recording, and calibrate the others without it|The common "
+_MANY += "parameters are the mean of different ones: use the spread below as their error, or recalibrate after the "
+_MANY += "change}."
 
 _CALIBRATE = {
     (Code.GRAVITY_DEFAULTED, "", WARNING): Words(
@@ -25,6 +26,12 @@ _CALIBRATE = {
         "The gyro was not calibrated: {why}.",
         "The recording does not contain what the gyro needs.",
         "Turn the sensor about all three axes between poses, by 60 to 180° in 2 to 4 s.",
+    ),
+    (Code.GYROSCOPE_LEFT_OUT, "clipped", WARNING): Words(
+        "The gyro was not calibrated: it clipped in {n_lost} of {n_moves} moves, and the others do not determine its "
+        "scale.",
+        "The sensor was turned faster than its range limit.",
+        "Record again with rates below about half the range limit, or set a wider range.",
     ),
     (Code.GYROSCOPE_LEFT_OUT, "no-known-turns", WARNING): Words(
         "The gyro was not calibrated: {why}.",
@@ -80,14 +87,14 @@ _VERIFIED = {
         "{rms_without:.3g mm/s²} without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few rotations}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that file, unit and device belong together}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
     (Code.NOT_TESTED, "", WARNING): Words(
         "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
@@ -98,12 +105,13 @@ _VERIFIED = {
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
-        "A bias with the wrong sign or unit, of another device, or of another temperature.",
-        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that file, unit and device "
-        "belong together; if they do, calibrate again}.",
+        "A bias with the wrong sign or unit, of another sensor, or of another temperature.",
+        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that the file is of this "
+        "sensor, in the units of the log; if it is, calibrate again}.",
     ),
 }
 
+_FORCE = "In quiet stretches the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
         "The gyro was excluded: the calibration contains no gyro.",
@@ -126,12 +134,21 @@ _USE = {
         "Log both sensors.",
     ),
     (Code.STATIC_FORCE, "", NOTE): Words(
-        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s²; gravity is {gravity_m_s2:.4g} m/s².",
+        f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²); gravity is {{gravity_m_s2:.5g}} m/s².",
+        numbers=("share",),
+    ),
+    (Code.STATIC_FORCE, "off", WARNING): Words(
+        f"{_FORCE}, {{share:.2g %}} off gravity ({{gravity_m_s2:.5g}} m/s²); its scatter and the calibration's "
+        "uncertainty explain {sigma_m_s2:.2g} m/s² (1 σ).",
+        "The scale or bias has changed since the calibration (temperature, shock, another range), or the unit is "
+        "another one.",
+        "Check it on this log: `trihedron verify FILE LOG`.",
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
-        "In quiet stretches the corrected |f| is {norm_m_s2:.4g} m/s², but gravity {gravity_m_s2:.4g} m/s².",
-        "The calibration is of another device, or the log in another unit or range than it was made for.",
-        "Check that calibration and log belong together: `trihedron verify CALIBRATION LOG`.",
+        f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",
+        "The calibration is of another sensor, or the log in another unit or range than it was made for.",
+        "Check that calibration and log belong together: `trihedron verify FILE LOG`.",
+        numbers=("share", "sigma_m_s2"),
     ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
@@ -237,10 +254,11 @@ _CHANGED_CAUSE = {
     "scale": "Temperature, stress or the gravity that was given.",
     "misalignment": "Stress in the package or the board, or another unit.",
     "alignment": "One of two parts was remounted, or another unit.",
-    "other": "Gravity was another, or all three scales changed alike.",
+    "accel-common-scale": "{is_other:?Another unit or measuring range|Another gravity than given, or temperature}.",
+    "gyro-common-scale": "{is_other:?Another unit, measuring range or sampling rate|Another clock, or temperature}.",
 }
 _CHANGED_SEEN = {
-    "differs": "differs between the two recordings by {amount}",
+    "differs": "in {where} differs from that in the other recording, by {amount}",
     "apart": "in {where} differs from all other recordings, by {amount}",
     "step": "changed before {where}, by {amount}",
     "trend": "changes from recording to recording, by {amount} each",
@@ -290,6 +308,7 @@ _MANY_RECORDINGS = {
             cause,
             _MANY,
             numbers=("p_adjusted", "where"),
+            or_severity=SERIOUS,
         )
         for parameter, cause in _CHANGED_CAUSE.items()
         for kind, seen in _CHANGED_SEEN.items()

@@ -13,6 +13,18 @@ ENTRIES = {
         "Its log has this fault, which concerns every value beside which this log is held.",
         "See what it needs: `trihedron allan {name}`; then give the JSON of that with --static.",
     ),
+    (Code.FILTER_NOISE_STATIC, "noted", WARNING): Words(
+        "Of the static log {name}: {seen:clause}.",
+        "Its static values contain it; this log does not.",
+        "See what it needs: `trihedron allan {name}`.",
+    ),
+    (Code.FILTER_NOISE_OTHER_STATIC, "", WARNING): Words(
+        "The {sensor}'s static N in {name}, {static:.3g} {unit:unit}/√Hz, is {times:.2g} times that in "
+        "{is_rest:?this log's own static interval|the quietest second of this log}, {own:.3g}.",
+        "{is_rest:?Another part, range or filter setting; or one of the two supports shakes|Another part, range or "
+        "filter setting, or a support that shakes: the noise in motion is no less than that at rest}.",
+        "Give a static log of this unit, recorded with this log's settings.",
+    ),
     (Code.FILTER_NOISE_NO_STATIC, "", NOTE): Words(
         "The static noise of the {sensor} is not known, and separable from vibration only where vibration changes.",
         "No static log was given, and the sensor is not static for 20 s in this log.",
@@ -45,6 +57,13 @@ ENTRIES = {
         "The two halves differ in noise, vibration or the reference's error.",
         "Treat N and K as those of the whole log only; estimate them from a log of the same kind of motion.",
     ),
+    (Code.FILTER_NOISE_INCONSISTENT, "tilt", SERIOUS): Words(
+        "The tilt error after rotations is {actual_rad:.2g !deg}° rms over {n:# move}, {times:.2g} times what static "
+        "noise predicts: a filter with it is too sure by that factor in motion.",
+        "Scale and misalignment that are not corrected; else vibration, or samples that are lost in motion.",
+        "Calibrate (`trihedron calibrate LOG -o calibration.json`), correct the log (`trihedron apply "
+        "calibration.json LOG -o corrected.csv`) and give corrected.csv; what then remains needs --reference MOTION.",
+    ),
     (Code.FILTER_NOISE_UNCALIBRATED, "", WARNING): Words(
         "A calibration would remove {share:.0f %} or more of the {sensor}'s error over {horizon_s:.3g} s "
         "(scale and misalignment, g-sensitivity, temperature): more than all noise that N and K represent.",
@@ -56,20 +75,20 @@ ENTRIES = {
         "N of the {sensor} is uncertain: between {lower:.3g} and {upper:.3g} (95 % interval), and a filter is too sure "
         "with the one and too cautious with the other.",
         "The reference's own error, or a residual calibration error, is larger than the sensor's noise.",
-        "Give a static log of the unit (--static STATIC), a better reference or a longer log; for a filter that "
-        "must not be too sure replace N {in_file:.3g} of the {sensor} by {upper:.3g}.",
+        "Give {has_static:?|a static log of the unit (--static STATIC), }a better reference or a longer log; for a "
+        "filter that must not be too sure replace N {in_file:.3g} of the {sensor} by {upper:.3g}.",
     ),
     (Code.FILTER_NOISE_UNCERTAIN, "limit", WARNING): Words(
         "N of the {sensor} was not measured: {upper:.3g} is an upper limit, and may be several times too large.",
         "The reference's own error is larger than the sensor's noise.",
-        "Give a static log of the unit (--static STATIC) or a better reference; with the limit as N a filter "
-        "trusts the {sensor} less than it could.",
+        "Give {has_static:?|a static log of the unit (--static STATIC) or }a better reference; with the limit as N a "
+        "filter trusts the {sensor} less than it could.",
     ),
     (Code.FILTER_NOISE_UNCERTAIN, "reference", WARNING): Words(
         "Over {horizon_s:.3g} s the reference's own error is {share:.0f %} of the {sensor}'s error: N and K come from "
         "what little remains.",
         "The reference is less accurate than the sensor over this time.",
-        "Give a better reference, or a static log of the unit (--static STATIC).",
+        "Give a better reference{has_static:?|, or a static log of the unit (--static STATIC)}.",
     ),
     (Code.FILTER_NOISE_UNSETTLED, "", WARNING): Words(
         "The search for the {sensor}'s strengths did not settle: its intervals come from a few draws.",

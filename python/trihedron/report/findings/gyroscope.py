@@ -51,7 +51,7 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
-        "The gyro scale is {scale_ratio:.4g} although the log is in {unit:unit}.",
+        "The common scale of all gyro axes is {scale_ratio:.4g} although the log is in {unit:unit}.",
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
@@ -171,7 +171,7 @@ _MOVES = {
         "the gyro clipped in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.3g} s at most; "
         "interpolated with less weight: {bridged}, excluded: {left_out}.",
         "the sensor was turned faster than its range limit.",
-        "Turn more slowly, or set a wider range.",
+        "Turn with rates below about half the range limit, or set a wider range.",
     ),
     (Code.TIME_GAP, "moves", WARNING): Words(
         "samples are missing inside {moves} of {n_moves} moves (move {which:first 8}); their rotation is uncertain and "
@@ -185,14 +185,17 @@ _MOVES = {
         "{is_single:?, without which they are as expected|}, χ²/dof {chi2_per_dof:.2g} with each move weighted by its "
         "uncertainty.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
+        "{is_common:?All gyro scales differ by one factor ({common:+.2g %}): the clock or the rate of one of the two "
+        "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|"
         "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
         "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
-        "since; else samples were lost or the gyro clipped}}}.",
-        "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_bias:?Let the sensor "
-        "warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that "
-        "file, sensor and unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG "
-        "--calibration FILE`; or calibrate}}}} again near the conditions of use.",
+        "since; else samples were lost or the gyro clipped}}}}.",
+        "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check --rate "
+        "and the timestamps against a clock; if they are right, calibrate|{is_bias:?Let the sensor warm up, then "
+        "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that file, sensor and "
+        "unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG --calibration FILE`; or "
+        "calibrate}}}}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }

@@ -52,6 +52,12 @@ _LOG = {
         "For B, K and R take one direction alone, with"
         "{is_first:?| --exclude :{start_s:.0f}}{is_last:?| --exclude {stop_s:.0f}:}.",
     ),
+    (Code.TWO_LEVELS, "", WARNING): Words(
+        "The level switches between two values: {axes:each; }. B, K and R describe the switching, no noise of theirs.",
+        "telegraph noise of the sensor, a heater or a supply that switches.",
+        "Of that axis take N alone; a filter needs a bias that jumps, or replace the sensor.",
+        lines={"axes": "{v0:axis} by {v1:.3g} {v2:unit}, {v3} times, every {v4:.2g} s"},
+    ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
         "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
@@ -145,6 +151,12 @@ _TERMS = {
         f"{_HEATED}; that was subtracted.",
         "warming up.",
         f"The terms are those of the sensor once warm; leave off the first minutes{_OR_LOGGED}.",
+    ),
+    (Code.LOG_DRIFT, "wave", WARNING): Words(
+        "The slow changes are a wave of period {period_s:.3g} s, amplitude {amplitude:.2g} {unit:unit}, which was "
+        "subtracted.",
+        "a cycle of the temperature (heating, air conditioning), or of the supply.",
+        "The terms are those of the noise beside it; find what has that period, and record without it.",
     ),
     (Code.LOG_TOO_SHORT, "", NOTE): Words(
         "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",

@@ -60,13 +60,15 @@ _UNITS = {
         f"The accelerometer is in {{unit:unit}} {_SOURCE}, but while static it reads {{static_norm:.4g}} "
         "{unit:unit}, {gravities:.3g} times gravity.",
         "A wrong unit, wrong columns, or a log without static poses.",
-        "Correct --accel-unit (m/s^2, g, mg, ..., or counts) or --columns.",
+        "{has_fitting:?Read it with --accel-unit {fitting}, in which it is gravity|Read it with --accel-unit counts, "
+        "as it is gravity in no known unit; or correct --columns}.",
     ),
     (Code.UNIT_DETECTED, "stated", NOTE): Words(f"The {{sensor}} is in {{unit:unit}} {_SOURCE}."),
     (Code.UNIT_CONTRADICTED, "gyro-by-turning", SERIOUS): Words(
         f"The gyro is in {{unit:unit}} {_SOURCE}, but {_TURNING}.",
         "A wrong unit; or, if the unit is right, each time interval lasts {factor:.3g} times as long as it was read.",
-        "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
+        "{has_fitting:?Read it with --gyro-unit {fitting}; or correct the clock (--time-unit, --rate)|Check the clock "
+        "(--time-unit, --rate): gyro scale is inversely proportional to the rate; or read it with --gyro-unit counts}.",
     ),
     (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
         f"No known gyro unit fits: {_TURNING}.",

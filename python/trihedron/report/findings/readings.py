@@ -2,6 +2,7 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
+_LIMIT = "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"
 ENTRIES = {
     (Code.DEVICES_INTERLEAVED, "", SERIOUS): Words(
         "Rows alternate between the readings of {n} devices, and no column identifies them.",
@@ -54,9 +55,18 @@ ENTRIES = {
     (Code.CLIPPING, "", WARNING): Words(
         "The {sensor} is clipped: {limits:each}; first at {where}.",
         "The motion left the measuring range.",
-        "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
+        "{is_gyro:?Turn with rates below about half the range limit, or set a wider range; angles integrated over "
+        "clipped moves are too small|Move more gently, or set a wider range}.",
         numbers=("count", "sample"),
-        lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"},
+        lines={"limits": _LIMIT},
+    ),
+    (Code.CLIPPING, "at-rest", WARNING): Words(
+        "The {sensor} reads its range limit while static: {limits:each}; first at {where}.",
+        "The range ends below {is_gyro:?the bias|1 g plus the bias} of that axis, or the channel is stuck.",
+        "If the axis keeps that value in {is_gyro:?motion|other poses} too, it is stuck: check the sensor and its "
+        "wiring; else set a wider range.",
+        numbers=("count", "sample"),
+        lines={"limits": _LIMIT},
     ),
     (Code.RAW_LSB, "", NOTE): Words(
         "The {sensor}'s readings in {unit:unit} are multiples of a count (LSB {steps:each} {unit:unit}; {per_unit:.5g} "

@@ -13,7 +13,7 @@ ENTRIES = {
         "{is_quiet:?: it follows the gyro's own noise|}"
         "{is_square:?: it lies within {angle_rad:.2g deg} of the gyro's axes|}.",
         "An attitude computed with this unit's own readings (a filter or smoother over camera, tracker and IMU).",
-        "Take S and b as confirmed by it, not as measured; use the tracker's own poses to measure them.",
+        "Take S and b as confirmed by the reference, not as measured; use the tracker's own poses to measure them.",
     ),
     (Code.REFERENCE_APART, "", WARNING): Words(
         "From {start_s:.0f} to {end_s:.0f} s of the log the reference deviates from the remaining log.",

@@ -34,8 +34,10 @@ ENTRIES = {
     (Code.POSE_AT_RANGE_LIMIT, "", WARNING): Words(
         "{poses:# pose} {poses:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
         "reading of {reading:.6g}) and {poses:?is|are} excluded: clipped readings only bound gravity.",
-        "The range limit is below 1 g plus the bias of that axis.",
-        "Set a wider range; the remaining poses are used.",
+        "{is_stuck:?The channel is stuck: with that reading the three axes exceed gravity|The range limit is below "
+        "1 g plus the bias of that axis}.",
+        "{is_stuck:?Check the sensor and its wiring, and record again|Set a wider range; the remaining poses are "
+        "used}.",
     ),
     (Code.NOT_STATIC, "", SERIOUS): Words(
         "No pose of {least_s:.2g} s or more in {duration_s:.1f} s of log.",
