@@ -3,10 +3,10 @@
 from pathlib import PurePath
 from shlex import quote
 
-from trihedron.records import Severity
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
-from trihedron.report.calibration import errors_in_words
+from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
 from trihedron.report.diagnosis_words import OF_SAMPLES, dependent, named_effects, own_serious
 from trihedron.report.document import action_in_words
@@ -14,6 +14,8 @@ from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
 
+FAR = 2.0
+"""Error over noise from which a remedy comes before the use of a calibration."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
 
@@ -55,10 +57,15 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
     if not is_carried:
+        misread = _misread(diagnosis)
+        if misread is not None:
+            return f"{action_in_words(misread)} Then: {use[:1].lower()}{use[1:]}{_by_themselves(diagnosis)}"
         use = f"Keep using {model}: its parameters agree with this log." if is_file else use
-        verb = "is" if len(set(of_session)) == 1 else "are"
-        of_log = f"{capital(ids_in_print(dict.fromkeys(of_session)))} {verb} not corrected in another log."
-        return f"{use} {of_log}{_by_themselves(diagnosis)}{_in_the_next_log(diagnosis)}"
+        remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
+        if remedy and not is_file and _is_far_from_noise(diagnosis):
+            return f"{remedy}{beside}"
+        of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
+        return " ".join(filter(None, (f"{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     return f"{store}{beside}.{_by_themselves(diagnosis)}"
@@ -77,7 +84,20 @@ def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
     """What to do about the first effect of this session alone."""
     advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
-    return next((f" Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+    return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+
+
+def _misread(diagnosis: Diagnosis) -> Finding | None:
+    """The finding of the log's own calibration that axes are not those that their columns name."""
+    own = getattr(diagnosis, "calibration", None)
+    said = () if own is None else [one for one in own.findings if one.code is FindingCode.LEFT_HANDED]
+    return next((one for one in said if one.severity is not Severity.NOTE), None)
+
+
+def _is_far_from_noise(diagnosis: Diagnosis) -> bool:
+    """Whether an error of the calibration without effects is beyond ``FAR`` times its noise."""
+    own = getattr(diagnosis, "calibration", None)
+    return own is not None and any(times > FAR for _, times, is_held in errors_of(own) if is_held)
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:

@@ -6,6 +6,7 @@ from trihedron.records.domains import DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
+from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -34,6 +35,8 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
+IN_FULL = ("axis-handedness",)
+"""Effects whose statement names what is wrong in the log: a verdict states it."""
 NOT_JUDGED = "not judged"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
@@ -45,7 +48,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = named_effects(diagnosis, "recording")
+    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, IN_FULL)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
@@ -53,7 +56,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
-        return _unexplained(diagnosis, (list(ends) or off) if missing else off, missing)
+        named = named_effects(diagnosis, "recording")
+        return _unexplained(diagnosis, (list(ends) or off) if named else off, named)
     if diagnosis.verdict == "not-testable":
         tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
         return (
@@ -69,9 +73,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
     tail = "".join(f"; {one}" for one in still) or "; nothing else disagrees"
-    said = []
+    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in IN_FULL]
     if missing:
-        said.append(f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing from the model")
+        said.append(f"the model lacks {listed(missing)}")
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
@@ -86,8 +90,7 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
     text += "effect explains it"
     if named:
-        verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
-        text += f" ({listed(named)} {verbs} little)"
+        text += f" (found, of little effect: {listed(named)})"
     if diagnosis.relations:
         # Those of the largest relation first.
         names = list(dict.fromkeys(variable_in_print(name) for one in diagnosis.relations for name in one.depends_on))
@@ -100,6 +103,10 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
 def named_effects(diagnosis: Diagnosis, side: str = "") -> list[str]:
     """Effects of one ``side``, or of both, in words and each once."""
     return list(dict.fromkeys(id_in_print(one.id) for one in diagnosis.effects if side in ("", one.side)))
+
+
+def _clause(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
 
 
 def _disagree(subjects: list[str]) -> str:

@@ -20,6 +20,7 @@ CONSEQUENCE = (
     FindingCode.SAME_RECORDING,
     FindingCode.SENSORS_EXCHANGED,
     FindingCode.GRAVITY_MISSING,
+    FindingCode.STUCK_VALUES,
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.TURNTABLE,
     FindingCode.COLUMNS_ASSUMED,

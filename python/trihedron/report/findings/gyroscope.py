@@ -85,17 +85,20 @@ _MOVES = {
     (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
         "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
         "their columns are in another order than stated, or their documented directions are wrong.",
-        "Name the columns in their order with --columns; the calibration itself corrects the gyro's.",
+        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}; the "
+        "calibration itself corrects the gyro's.",
     ),
     (Code.LEFT_HANDED, "accelerometer-exchanged", WARNING): Words(
         "accelerometer {axes:axes and} are exchanged against the gyro's axes.",
         "their columns are in another order than stated, or their documented directions are wrong.",
-        "Name the columns in their order with --columns.",
+        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}.",
     ),
     (Code.LEFT_HANDED, "gyro-other-axes", WARNING): Words(
-        "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
+        "gyro X, Y and Z turn about accelerometer {directions:each}.",
         "the axes of one of the two sensors are in another order, or have other signs, than stated.",
-        "Check the axis directions of the board against both data sheets.",
+        "Check the axis directions of the board against both data sheets{has_columns:?; if the columns are in another "
+        "order, read it with --columns {mapping}|}; the calibration itself corrects the gyro's.",
+        lines={"directions": "{v0:?−|}{v1:axis}"},
     ),
     (Code.OUTLIER_MOVE, "", WARNING): Words(
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
