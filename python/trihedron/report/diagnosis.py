@@ -105,9 +105,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
-        verdict=verdict_in_words(diagnosis)
-        + _distrust(diagnosis)
-        + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
+        verdict=_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),
@@ -129,11 +127,17 @@ def by_reference_alone(diagnosis: Diagnosis) -> bool:
     return all(one.domain == "rate" for one in diagnosis.domains) and getattr(diagnosis, "reference", None) is not None
 
 
-def _distrust(diagnosis: Diagnosis) -> str:
-    """The first serious finding of the log's own calibration, which the diagnosis began with."""
-    serious = own_serious(diagnosis)
+def _verdict(diagnosis: Diagnosis) -> str:
+    """The verdict, after the first serious finding of the log's own calibration, which the diagnosis began with."""
+    serious, said = own_serious(diagnosis), verdict_in_words(diagnosis)
+    if serious is None:
+        return said
     whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
-    return "" if serious is None else f" The {whose} is not to be trusted: {opening(serious.seen)}."
+    if diagnosis.verdict == "not-testable":
+        return f"{said} The {whose} is not to be trusted: {opening(serious.seen)}."
+    # A fit that is not to be trusted may agree with its own poses.
+    said = "No missing effect is detectable." if diagnosis.verdict == "consistent" else said
+    return f"NOT TO BE TRUSTED, by the {whose}: {opening(serious.seen)}. {said}"
 
 
 def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:

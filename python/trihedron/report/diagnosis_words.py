@@ -59,11 +59,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         named = named_effects(diagnosis, "recording")
         return _unexplained(diagnosis, (list(ends) or off) if named else off, named)
     if diagnosis.verdict == "not-testable":
-        tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
-        return (
-            f"NOT TESTABLE: this recording has too few poses for a diagnosis (searched for effects: {tested}; none "
-            "found)."
-        )
+        searched = "; no effect was found in what it shows" if diagnosis.domains else ""
+        return f"NOT TESTABLE: this recording has too few poses for a diagnosis{searched}."
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
@@ -72,7 +69,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     still += [
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
-    tail = "".join(f"; {one}" for one in still) or "; nothing else disagrees"
+    tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
     said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in IN_FULL]
     if missing:
         said.append(f"the model lacks {listed(missing)}")
@@ -103,6 +100,14 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
 def named_effects(diagnosis: Diagnosis, side: str = "") -> list[str]:
     """Effects of one ``side``, or of both, in words and each once."""
     return list(dict.fromkeys(id_in_print(one.id) for one in diagnosis.effects if side in ("", one.side)))
+
+
+def _untested(diagnosis: Diagnosis) -> str:
+    """A remark where the poses do not determine the model, so that little can disagree with it; else empty."""
+    own = getattr(diagnosis, "calibration", None)
+    seen = None if own is None or own.accelerometer is None else own.accelerometer.observability
+    is_open = seen is not None and seen.rank < seen.n_parameters and not getattr(diagnosis, "model_is_given", False)
+    return "; the poses are too few to test the rest" if is_open else ""
 
 
 def _clause(sentence: str) -> str:

@@ -83,6 +83,12 @@ def begins_with(step: str, action: str) -> bool:
     return step[1:].startswith(action[1:].partition("`")[0])
 
 
+def concerns_whole(finding: Finding) -> bool:
+    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, a channel stuck for a short stretch aside."""
+    is_stretch = finding.code is FindingCode.STUCK_VALUES and finding.severity is not Severity.SERIOUS
+    return finding.code in CONSEQUENCE and not is_stretch
+
+
 @dataclass(frozen=True)
 class Paragraph:
     """Running text, one sentence after another."""
@@ -212,7 +218,7 @@ class Document:
             others = (one for one in self.findings if one.severity is Severity.SERIOUS and one.code is not first.code)
             second = next(others, None) if first.code is FindingCode.RATE_ASSUMED else None
             return action if second is None or not second.action else f"{action} Then: {action_in_words(second)}"
-        if first.code not in CONSEQUENCE:
+        if not concerns_whole(first):
             return then
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
         if own is not None and first_step is not None and own[1] == first_step[1]:
