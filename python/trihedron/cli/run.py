@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
-    from trihedron.report.document import Document
+    from trihedron.report.document import Block, Document
 
-_COMMAND = re.compile(r"`[^`]+`")
+_COMMAND = re.compile(r"`(?:trihedron |\.\.\. )[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
 _SHOWN = ("--json", "--report", "--full", "--force")
 _WRITTEN = ("-o", "--output", "--updated", "--improved")
@@ -127,8 +127,9 @@ def _word(value: Any) -> str:
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
-    replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next,
+    and in the actions of findings, replaced by those of this run; where nothing was stored, ``stored_by`` is the
+    command that does."""
     from trihedron.records import FindingCode
 
     said, what_next = document.next_step, document.what_next
@@ -141,8 +142,21 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
             said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
             what_next = replace(document, next_step=said).what_next
-    filled = _COMMAND.sub(lambda found: _filled(found[0]), what_next)
-    return document if filled == document.next_step else replace(document, next_step=filled)
+    sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
+    return replace(document, next_step=with_commands(what_next), sections=sections)
+
+
+def with_commands(text: str) -> str:
+    """The text with its commands for the log of this run."""
+    return _COMMAND.sub(lambda found: _filled(found[0]), text)
+
+
+def _with_actions(block: Block) -> Block:
+    from trihedron.report.document import FindingList
+
+    if not isinstance(block, FindingList):
+        return block
+    return FindingList(tuple(replace(one, action=with_commands(one.action)) for one in block.findings))
 
 
 def _filled(command: str) -> str:

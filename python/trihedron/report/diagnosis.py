@@ -170,7 +170,10 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         with_them = [_after(diagnosis, d, after.get(d.domain)) for d in diagnosis.domains]
         rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
-    caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
+    # Where the log determines S and b, a given model is compared with these in a row of its own.
+    is_refitted = not is_fitted and getattr(diagnosis, "updated", None) is not None
+    beside = ", in sample" if is_fitted else ", S and b fitted to this log (model: last row)" if is_refitted else ""
+    caption = f"Residuals by domain{beside}; χ²/dof is 1 by noise alone"
     caption += f", and a residual disagrees below p {plain_number(diagnosis.alpha / len(DOMAINS), 2)}"
     blocks: list[Block] = [Table(head, tuple(rows), caption), *_time_errors(diagnosis)]
     # Parameters that differ have a section of their own.

@@ -40,7 +40,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
         again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
         again += "to the session."
-        return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
+        checked = of_another_device(diagnosis, model)
+        return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
     differs = any(p.significant for p in diagnosis.parameters)
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
     is_file, is_carried = model.endswith(".json"), len(of_session) < len(diagnosis.effects)

@@ -2,7 +2,7 @@
 
 from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.domains import DomainTest, HeldOut, not_explained
+from trihedron.records.domains import DOMAINS, DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
@@ -168,7 +168,10 @@ def quantity(held: HeldOut) -> str:
 def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
     """Whether a domain agrees; in a log of too few poses χ² of poses is searched for effects, not judged."""
     is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
-    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else "agrees"
+    # A domain of samples agrees by an effect, which the model may have too, where its own test does not.
+    is_by_effect = test.domain in OF_SAMPLES and test.p_value < diagnosis.alpha / len(DOMAINS)
+    agrees = "explained" if is_by_effect else "agrees"
+    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else agrees
 
 
 def follows(diagnosis: Diagnosis, after: DomainTest) -> str:
