@@ -36,13 +36,12 @@ from trihedron.report.diagnosis_words import (
     rms_in_words,
     size_in_words,
     value_in_words,
-    verdict_in_words,
     where_in_words,
+    whole_verdict,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.effect_charts import alike, effect_chart, rest_panels
 from trihedron.report.findings import findings_block
-from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
 from trihedron.report.reference import beside_reference, hidden_by
@@ -105,7 +104,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
-        verdict=_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
+        verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),
@@ -125,19 +124,6 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
 def by_reference_alone(diagnosis: Diagnosis) -> bool:
     """Whether the log had too few poses for a diagnosis of its own."""
     return all(one.domain == "rate" for one in diagnosis.domains) and getattr(diagnosis, "reference", None) is not None
-
-
-def _verdict(diagnosis: Diagnosis) -> str:
-    """The verdict, after the first serious finding of the log's own calibration, which the diagnosis began with."""
-    serious, said = own_serious(diagnosis), verdict_in_words(diagnosis)
-    if serious is None:
-        return said
-    whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
-    if diagnosis.verdict == "not-testable":
-        return f"{said} The {whose} is not to be trusted: {opening(serious.seen)}."
-    # A fit that is not to be trusted may agree with its own poses.
-    said = "No missing effect is detectable." if diagnosis.verdict == "consistent" else said
-    return f"NOT TO BE TRUSTED, by the {whose}: {opening(serious.seen)}. {said}"
 
 
 def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:

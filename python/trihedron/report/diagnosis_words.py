@@ -42,6 +42,19 @@ OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
 
 
+def whole_verdict(diagnosis: Diagnosis) -> str:
+    """The verdict, after the first serious finding of the log's own calibration, which the diagnosis began with."""
+    serious, said = own_serious(diagnosis), verdict_in_words(diagnosis)
+    if serious is None:
+        return said
+    whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
+    if diagnosis.verdict == "not-testable":
+        return f"{said} The {whose} is not to be trusted: {opening(serious.seen)}."
+    # A fit that is not to be trusted may agree with its own poses.
+    said = "No missing effect is detectable." if diagnosis.verdict == "consistent" else said
+    return f"NOT TO BE TRUSTED, by the {whose}: {opening(serious.seen)}. {said}"
+
+
 def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and its reasons in one sentence."""
     off: list[str] = [MEANING[d.domain] for d in diagnosis.domains if d.disagrees]
