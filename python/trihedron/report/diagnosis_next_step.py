@@ -64,7 +64,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         use = f"Keep using {model}: its parameters agree with this log." if is_file else use
         remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
         if remedy and not is_file and _is_far_from_noise(diagnosis):
-            return f"{remedy}{beside}"
+            return f"{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
         of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
         return " ".join(filter(None, (f"{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
@@ -96,9 +96,11 @@ def _misread(diagnosis: Diagnosis) -> Finding | None:
 
 
 def _is_far_from_noise(diagnosis: Diagnosis) -> bool:
-    """Whether an error of the calibration without effects is beyond ``FAR`` times its noise."""
+    """Whether the calibration without effects is not to be trusted, or its error beyond ``FAR`` times the noise."""
     own = getattr(diagnosis, "calibration", None)
-    return own is not None and any(times > FAR for _, times, is_held in errors_of(own) if is_held)
+    if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
+        return own is not None
+    return any(times > FAR for _, times, is_held in errors_of(own) if is_held)
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:

@@ -208,7 +208,7 @@ SESSION = {
     ),
     "dropped-samples": EffectWords(
         "samples are missing while the timestamps are even",
-        "log the sensor's own sample counter",
+        "lower the rate or the load of the link; the sensor's own sample counter shows every loss",
         {"losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} more|}."},
         lines={"losses": "{v0} at {v1:.2f} s"},
     ),

@@ -143,8 +143,8 @@ _MOVES = {
         "intervals that would show it (first at {first_s:.2f} s): about {lost_share:.2g !%} ± {sigma_lost_share:.1g %} "
         "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew.",
-        "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
-        "`trihedron diagnose` puts single losses back.",
+        "Lower the rate or the load of the link and record again; or put single losses back by a fit with effects: "
+        "`trihedron calibrate LOG --extended -o FILE --force`. Do not use this gyro calibration.",
         or_severity=SERIOUS,
     ),
     (Code.LEFT_HANDED, "turns-reversed", SERIOUS): Words(
