@@ -134,3 +134,17 @@ def test_a_log_that_was_excluded_is_not_in_the_next_command():
     said = filled("Store it: `... -o calibration.json`; use it: `trihedron apply FILE LOG`.")
     assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said
     assert "calibration.json good.csv`" in said
+
+
+def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
+    effect = SimpleNamespace(id="timing-jitter", confounded_with=(), model={"applies_to_other_recordings": False})
+    own = SimpleNamespace(findings=(), gyroscope=None, accelerometer=SimpleNamespace(quality=None))
+    domain = SimpleNamespace(domain="moves", disagrees=True)
+    found = SimpleNamespace(
+        verdict="missing-physics", parameters=(), effects=(effect,), remaining=(), domains=(domain,), calibration=own
+    )
+    for rms, is_first in ((1.2e-3, False), (5e-3, True)):
+        own.accelerometer.quality = SimpleNamespace(rms=1e-3, floor=1e-3, held_out_rms=rms)
+        said = next_step_in_words(found)
+        assert said.startswith("Against timing jitter") == is_first
+        assert ("--extended" in said) == is_first
