@@ -63,13 +63,16 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
             return f"{action_in_words(misread)} Then: {use[:1].lower()}{use[1:]}{_by_themselves(diagnosis)}"
         use = f"Keep using {model}: its parameters agree with this log." if is_file else use
         remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
+        if remedy and is_file and _disagrees(diagnosis):
+            return f"{remedy} {use}"
         if remedy and not is_file and _is_far_from_noise(diagnosis):
             return f"{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
         of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
         return " ".join(filter(None, (f"{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
-    return f"{store}{beside}.{_by_themselves(diagnosis)}"
+    said = f"{store}{beside}.{_by_themselves(diagnosis)}"
+    return " ".join(filter(None, (said, _in_the_next_log(diagnosis))))
 
 
 def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
@@ -83,9 +86,16 @@ def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
 
 
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
-    """What to do about the first effect of this session alone."""
-    advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
+    """What to do about the first effect of this session alone that biases or rotations show, not a motion's force."""
+    own = (one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings"))
+    shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
+    advice = ((one.id, experiment(one.id, is_static=False)) for one in shown)
     return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+
+
+def _disagrees(diagnosis: Diagnosis) -> bool:
+    """Whether poses or rotations disagree with the model without effects."""
+    return any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES)
 
 
 def _misread(diagnosis: Diagnosis) -> Finding | None:
@@ -107,7 +117,7 @@ def _by_themselves(diagnosis: Diagnosis) -> str:
     """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
     if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
         return ""
-    if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
+    if not _disagrees(diagnosis):
         return " S and b may be used without effects: errors of poses and rotations are within noise."
     own = getattr(diagnosis, "calibration", None)
     if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):

@@ -33,8 +33,8 @@ _MOVES = {
     (Code.TURNTABLE, "not-fitted", SERIOUS): Words(
         "the fit to {turns:.0f} {is_turned:?turns by stated angles|steady turns at stated speeds} did not converge: it "
         "is off by {rms:.2g %} rms, more than noise explains; they are left out.",
-        "moves that hardly determine the gyro, or another {is_turned:?angle|speed} than stated.",
-        "Turn the sensor about all three axes between poses of many orientations; check --turn{is_turned:?s|table}.",
+        "another {is_turned:?angle|speed} than stated, or moves that hardly determine the gyro.",
+        "Check --turn{is_turned:?s|table}; turn the sensor about all three axes between poses of many orientations.",
     ),
     (Code.TURNTABLE, "turns", NOTE): Words(
         "{turns:.0f} turns by stated angles were fitted beside poses and moves: |∫ω dt| within {rms_rad:.2g deg} rms "
