@@ -14,6 +14,8 @@ from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
 
+FOUND = ("missing-physics", "unexplained")
+"""Verdicts with something to do about the readings."""
 FAR = 2.0
 """Error over noise from which a remedy comes before the use of a calibration."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
@@ -24,7 +26,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
     serious = own_serious(diagnosis)
-    if serious is not None:
+    # An action that runs this diagnosis is done: what it found is next.
+    is_done = diagnosis.verdict in FOUND and serious is not None and "`trihedron diagnose LOG`" in serious.action
+    if serious is not None and not is_done:
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
@@ -72,7 +76,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
     said = f"{store}{beside}.{_by_themselves(diagnosis)}"
-    return " ".join(filter(None, (said, _in_the_next_log(diagnosis))))
+    remedy = _in_the_next_log(diagnosis) if _is_far_from_noise(diagnosis) else ""
+    return " ".join(filter(None, (said, remedy)))
 
 
 def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
