@@ -8,7 +8,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
-from trihedron.report.diagnosis_words import OF_SAMPLES, dependent, named_effects, own_serious
+from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, named_effects, own_serious
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
@@ -61,21 +61,24 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
+    misread = _misread(diagnosis)
+    first = "" if misread is None else f"{action_in_words(misread)} "
+    # The fit corrects axes, whose finding has an action of its own.
+    of_session = [one for one in of_session if one not in IN_FULL]
+    use = f"Keep using {model}: its parameters agree with this log." if is_file else use
+    if not is_carried and not of_session:
+        return f"{first}{use}{_by_themselves(diagnosis)}"
     if not is_carried:
-        misread = _misread(diagnosis)
-        if misread is not None:
-            return f"{action_in_words(misread)} Then: {use[:1].lower()}{use[1:]}{_by_themselves(diagnosis)}"
-        use = f"Keep using {model}: its parameters agree with this log." if is_file else use
         remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
         if remedy and is_file and _disagrees(diagnosis):
-            return f"{remedy} {use}"
+            return f"{first}{remedy} {use}"
         if remedy and not is_file and _is_far_from_noise(diagnosis):
-            return f"{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
+            return f"{first}{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
         of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
-        return " ".join(filter(None, (f"{use} {of_log}{beside}", remedy)))
+        return " ".join(filter(None, (f"{first}{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
-    said = f"{store}{beside}.{_by_themselves(diagnosis)}"
+    said = f"{first}{store}{beside}.{_by_themselves(diagnosis)}"
     remedy = _in_the_next_log(diagnosis) if _is_far_from_noise(diagnosis) else ""
     return " ".join(filter(None, (said, remedy)))
 
@@ -92,7 +95,8 @@ def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
 
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
     """What to do about the first effect of this session alone that biases or rotations show, not a motion's force."""
-    own = (one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings"))
+    own = [one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings")]
+    own = [one for one in own if one.id not in IN_FULL]
     shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
     advice = ((one.id, experiment(one.id, is_static=False)) for one in shown)
     return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
