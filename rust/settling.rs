@@ -40,12 +40,14 @@ pub struct Poses<'a> {
 /// Settling beside scatter.
 #[derive(Debug, Clone, Copy)]
 pub struct Settling {
-    /// Twice the log-likelihood that it gains, less the cost of the time constants tried.
+    /// Twice the log-likelihood that it gains over scatter, less the cost of the time constants tried.
     pub score: f64,
     /// Standard deviation of the settling rate at the start of poses, rad/s.
     pub rate: f64,
     /// Time constant, s.
     pub tau: f64,
+    /// The same score of a bias that settles, which does not tilt the sensor, over scatter and over a support.
+    pub of_bias: f64,
 }
 
 /// One pose at one time constant: information on scatter and settling, each a vector `(6)`, what the readings say of
@@ -67,7 +69,8 @@ struct Parts {
     lasts: f64,
 }
 
-/// Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)).
+/// Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)), or none where
+/// the bias settles.
 ///
 /// `s` and `k` are drawn anew in every pose, with one variance for all axes. The accelerometer shows the part of `k`
 /// across the vertical, the shape in time all of it. One bias `z` for the session, restricted likelihood. `None` with
@@ -100,26 +103,37 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
             (unit * size(k)).powi(2)
         }
     };
-    let tables = SETTLES_S.map(|tau| {
-        all.iter()
-            .map(|one| Sums::of(one, tau))
-            .collect::<Vec<Sums>>()
-    });
-    let of_scatter = |a: usize| log_likelihood(&tables[0], variance(a), 0.0);
+    let sums = |tilts: f64| {
+        SETTLES_S.map(|tau| {
+            all.iter()
+                .map(|one| Sums::of(one, tau, tilts))
+                .collect::<Vec<Sums>>()
+        })
+    };
+    let [of_support, of_bias] = [1.0, 0.0].map(sums);
+    let of_scatter = |a: usize| log_likelihood(&of_support[0], variance(a), 0.0);
     let scatter = (0..=N_SIZES)
         .map(of_scatter)
         .fold(f64::NEG_INFINITY, f64::max);
     let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
         .flat_map(|t| (0..=N_SIZES).flat_map(move |a| (0..=N_SIZES).map(move |b| (t, a, b))))
         .collect();
-    let found = tried.par_iter().map(|&(t, a, b)| {
-        let value = log_likelihood(&tables[t], variance(a), variance(b));
-        (value, variance(b).sqrt(), SETTLES_S[t])
-    });
-    let best = found.reduce_with(|one, other| if other.0 > one.0 { other } else { one });
-    Ok(best.map(|(most, rate, tau)| {
-        let score = 2.0 * (most - scatter - (SETTLES_S.len() as f64).ln());
-        Settling { score, rate, tau }
+    let likeliest = |tables: &[Vec<Sums>]| {
+        let found = tried.par_iter().map(|&(t, a, b)| {
+            let value = log_likelihood(&tables[t], variance(a), variance(b));
+            (value, variance(b).sqrt(), SETTLES_S[t])
+        });
+        found.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+    };
+    let (Some(support), Some(bias)) = (likeliest(&of_support), likeliest(&of_bias)) else {
+        return Ok(None);
+    };
+    let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
+    Ok(Some(Settling {
+        score: score(support.0, scatter),
+        rate: support.1,
+        tau: support.2,
+        of_bias: score(bias.0, scatter.max(support.0)),
     }))
 }
 
@@ -185,7 +199,8 @@ fn contrasts(of: &[Vector3<f64>; N_BLOCKS]) -> [Vector3<f64>; N_BLOCKS - 1] {
 }
 
 impl Sums {
-    fn of(one: &Parts, tau: f64) -> Self {
+    /// `tilts` 1 for a support, 0 for a bias.
+    fn of(one: &Parts, tau: f64, tilts: f64) -> Self {
         let fades: [f64; N_BLOCKS] = std::array::from_fn(|block| {
             let begins = block as f64 * one.lasts;
             tau * ((-begins / tau).exp() - (-(begins + one.lasts) / tau).exp()) / one.lasts
@@ -200,7 +215,7 @@ impl Sums {
             out.add(rate, &one.of_rate, [1.0, fade]);
         }
         for (tilt, share) in one.tilts.iter().zip(tilted) {
-            out.add(tilt, &one.of_tilt, [0.0, share.x]);
+            out.add(tilt, &one.of_tilt, [0.0, tilts * share.x]);
         }
         out
     }

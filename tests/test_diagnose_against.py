@@ -60,6 +60,16 @@ def test_what_the_simulation_has_is_surplus_where_the_recording_excludes_its_siz
     assert bool(compare_effects([given], found, alpha=0.01).surplus) is is_surplus
 
 
+def test_a_row_that_the_recordings_best_shape_lacks_is_zero_there():
+    def rows(*sizes):
+        return tuple(EffectParameter(name, value, 4e-6, "(rad/s)/(m/s^2)") for name, value in sizes)
+
+    given = AcceptedEffect("gyro-g-sensitivity", "", rows(("G_xy", 0.9e-5), ("G_zy", -3.4e-5)), 1e-9, 40.0, ())
+    tried = Candidate("gyro-g-sensitivity", 0.4, True, size=rows(("G_xy", 0.1e-5)))
+    found = SimpleNamespace(effects=(), domains=(), remaining=(), candidates=(tried,))
+    assert compare_effects([given], found, alpha=0.01).surplus
+
+
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
     S, b = sensor(RNG)
     S_g, _ = sensor(RNG)

@@ -99,8 +99,9 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
 
 
 @cache
-def session(lean_rad, scatter_rad_s, seed=1):
-    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro biases drawn anew in each."""
+def session(lean_rad, scatter_rad_s, decay_rad_s=0.0, seed=1):
+    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro biases drawn anew in each, of which
+    ``decay_rad_s`` decays."""
     recording, truth = simulated(seed=seed, grade="tactical")
     rng = np.random.default_rng(seed)
     force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
@@ -115,6 +116,7 @@ def session(lean_rad, scatter_rad_s, seed=1):
         # f' = f x w for a body that turns by w: the vertical of the body goes the other way.
         force[here] += (1.0 - np.exp(-since / 2.0))[:, None] * (to_raw[0] @ np.cross(up, direction))
         turning = (np.exp(-since / 2.0) / 2.0)[:, None] * direction + rng.normal(size=3) * scatter_rad_s
+        turning += np.exp(-since / 2.0)[:, None] * rng.normal(size=3) * decay_rad_s
         rate[here] += turning @ to_raw[1].T
     log = replace(recording, accelerometer=force, gyroscope=rate)
     segments = segment_recording(log)
@@ -130,6 +132,12 @@ def test_supports_that_give_are_told_from_zeros_that_scatter():
     # Scatter alone, and scatter that a support beneath it would hide from gravity.
     for lean_rad, scatter in ((0.0, 1e-3), (0.006, 1e-3)):
         assert settling(session(lean_rad, scatter)).score < NAMED
+
+
+def test_a_bias_that_settles_without_a_tilt_is_no_support_that_gives():
+    assert settling(session(0.0, 0.0, 0.003)).of_bias > NAMED
+    for lean_rad, scatter in ((0.006, 0.0), (0.001, 0.0), (0.0, 1e-3), (0.006, 1e-3)):
+        assert settling(session(lean_rad, scatter)).of_bias < NAMED
 
 
 def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree():

@@ -123,7 +123,7 @@ def of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, im
         parts += [x, 5.0 * rng.standard_normal(int(rate))]
         windows.append((at, at + n))
         at += n + int(rate)
-    return noise_of_poses(np.concatenate(parts), rate, windows)[0]
+    return noise_of_poses(np.concatenate(parts)[:, None], rate, windows)[0]
 
 
 @pytest.mark.parametrize("options", [{"step": 0.2}, {"scatter": 0.2, "impacts": 2}], ids=str)

@@ -225,6 +225,14 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
+def test_a_clock_that_jumps_for_some_seconds_leaves_a_deviating_interval_and_the_rest_its_answer():
+    trial = tracked(53, seconds=60)
+    t = trial.motion.time_s
+    found = fit_reference(trial.log, replace(trial.motion, time_s=t + np.where(t > 55.0, 0.5, 0.0)), G)
+    assert FindingCode.REFERENCE_APART in {finding.code for finding in found.findings}
+    assert np.abs(z_of(found, trial)).max() < 4.5
+
+
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():
     # Four fifths are static, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
     trial = tracked(4, 24, sigma_deg=0.2, rest_s=9.6)

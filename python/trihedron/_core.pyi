@@ -298,7 +298,7 @@ def settling_of_poses(
     gravity_m_s2: float,
     step_s: float,
     fewest: int,
-) -> tuple[float, float, float] | None: ...
+) -> tuple[float, float, float, float] | None: ...
 def common_time_variance(
     time_s: FloatArray,
     step_s: float,

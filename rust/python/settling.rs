@@ -15,8 +15,8 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 type Matrix<'py> = PyReadonlyArray2<'py, f64>;
 
-/// Score of settling beside scatter, its rate at the start of poses, rad/s, and its time constant, s; `None` with fewer
-/// poses than `fewest`. Gyro first: `readings` `(n, 3)`, `scale` `(3, 3)`, `noise` `(h, 3)`; `up` `(h, 3)`, `spans`
+/// Score of settling beside scatter, its rate at the start of poses, rad/s, its time constant, s, and the score of a bias
+/// that settles; `None` with fewer poses than `fewest`. Gyro first: `readings` `(n, 3)`, `scale` `(3, 3)`, `noise` `(h, 3)`; `up` `(h, 3)`, `spans`
 /// `(h, 2)`.
 #[pyfunction]
 #[pyo3(signature = (readings, scale, noise, up, spans, *, gravity_m_s2, step_s, fewest))]
@@ -34,7 +34,7 @@ fn settling_of_poses(
     gravity_m_s2: f64,
     step_s: f64,
     fewest: usize,
-) -> PyResult<Option<(f64, f64, f64)>> {
+) -> PyResult<Option<(f64, f64, f64, f64)>> {
     let [rate, force] = [flat3("rate", &readings[0])?, flat3("force", &readings[1])?];
     let [of_rate, of_force] = [flat3("noise", &noise[0])?, flat3("noise", &noise[1])?];
     let up = flat3("up", &up)?;
@@ -52,7 +52,7 @@ fn settling_of_poses(
         };
         settling::settling(&poses, fewest)
     })?;
-    Ok(found.map(|one| (one.score, one.rate, one.tau)))
+    Ok(found.map(|one| (one.score, one.rate, one.tau, one.of_bias)))
 }
 
 /// Variance of the sampling instants about `time_s` `(n,)` [s²], its standard error, and the number of samples that

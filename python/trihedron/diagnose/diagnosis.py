@@ -1,5 +1,6 @@
 """The diagnosis of recordings: locate the disagreement, search for missing effects, fit them, test the improvement."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType
@@ -140,11 +141,11 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
     notify(0.05, "fitting the session")
-    predicted = _with_settling(tune_noise(obs, start, prior), start, alpha)
+    predicted, settles = _with_settling(tune_noise(obs, start, prior), start, alpha)
     context = Context(predicted)
     notify(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
-    domains = _all_domains(context, alpha, observed.rejected)
+    domains = _all_domains(context, alpha, settles, observed.rejected)
     notify(0.3, "letting effects compete")
     bare, found = _searched(observed, alpha)
     # Effects hidden by another effect, or mistaken for it, are tested once more.
@@ -164,7 +165,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
         predicted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
     named = {one.effect.id for one in observed.seen}
-    remaining = _all_domains(judged.context, alpha, observed.rejected | (sought - named))
+    remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
     remaining = with_relations(accounted_for(answer, remaining), found.related)
     if not answer.ids:
         domains = remaining  # nothing was added to the linear model: one judgement of it
@@ -183,22 +184,26 @@ def _searched(observed: Observed, alpha: float) -> tuple[Hypothesis, Found]:
     return bare, search(bare, alpha)
 
 
-def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> Fit:
-    """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f)."""
+def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:
+    """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f); and the domains in which
+    a bias settles inside the poses, with p-values: the noise of their means had absorbed it."""
     context = Context(predicted)
-    found = settling(context)
-    if found is None or found.score < threshold(alpha):
-        return predicted
-    return tune_noise(with_settling(context, found), start, predicted.prior)
+    biases = [one for one in predicted.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
+    shown: dict[Domain, float] = {"static-accel": biases[0].numbers["p_value"]} if biases else {}
+    found, limit = settling(context), threshold(alpha)
+    if found is not None and found.of_bias >= limit:
+        shown["static-gyro"] = math.exp(-0.5 * found.of_bias)
+    elif found is not None and found.score >= limit:
+        predicted = tune_noise(with_settling(context, found), start, predicted.prior)
+    return predicted, shown
 
 
-def _all_domains(context: Context, alpha: float, rejected: Collection[str] = ()) -> tuple[DomainTest, ...]:
-    """Every domain's test; ``rejected`` are ids of effects that did not improve the prediction of held-out moves: jolts
-    look like lost samples."""
-    # A bias that settles inside the poses: the noise of their means had absorbed it.
-    settling = [one for one in context.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
-    shown: dict[Domain, float] = {"static-accel": settling[0].numbers["p_value"]} if settling else {}
-    rows = _disagreeing(judge_rows(context.fitted, alpha), shown)
+def _all_domains(
+    context: Context, alpha: float, settles: Mapping[Domain, float], rejected: Collection[str]
+) -> tuple[DomainTest, ...]:
+    """Every domain's test; ``settles`` p-values of biases that settle, ``rejected`` ids of effects that did not improve
+    the prediction of held-out moves: jolts look like lost samples."""
+    rows = _disagreeing(judge_rows(context.fitted, alpha), settles)
     return (*rows, judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, rejected))
 
 

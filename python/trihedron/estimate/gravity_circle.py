@@ -7,8 +7,7 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Move, Segments
+from trihedron.records import Move, Recording, Segments
 
 BLOCK_S = 0.1
 """Longest blocks of force and angle: short against a turn, long against the correlation of filtered readings."""
@@ -18,15 +17,11 @@ HARMONICS = (2, 3, 4, 5)
 """Harmonics of whole turns without a tilt signal: vibration, shocks and an uneven table excite them like the first."""
 
 
-@dataclass(frozen=True, eq=False)
-class GravityCircle:
-    """Mean raw reading ``centre`` (3,) over the circle of gravity during a turn, and its ``variance`` (3,)."""
-
-    centre: FloatArray
-    variance: FloatArray
+Circle = tuple[FloatArray, FloatArray]
+"""Mean raw reading (3,) over the circle of gravity during a turn, and its variance (3,)."""
 
 
-def gravity_circle(recording: Recording, segments: Segments, move: Move, angle_rad: float) -> GravityCircle | None:
+def gravity_circle(recording: Recording, segments: Segments, move: Move, angle_rad: float) -> Circle | None:
     """The circle of a turn by ``angle_rad``, over it and the poses on both sides; ``None`` for too short a turn.
 
     As the body turns by θ: ``a(t) = n̄ + c cos θ + s sin θ + p θ'² + q θ''`` (p, q for a sensor off the axis), whatever
@@ -53,7 +48,7 @@ def gravity_circle(recording: Recording, segments: Segments, move: Move, angle_r
     return _fitted(force[known], np.cumsum(along[known]) - 0.5 * along[known], (along / duration)[known], angle_rad)
 
 
-def _fitted(force: FloatArray, theta: FloatArray, speed: FloatArray, angle_rad: float) -> GravityCircle | None:
+def _fitted(force: FloatArray, theta: FloatArray, speed: FloatArray, angle_rad: float) -> Circle | None:
     harmonics = HARMONICS if abs(angle_rad) > 2.0 * np.pi - 1e-6 else ()
     design = np.column_stack(
         [np.ones(len(theta)), np.cos(theta), np.sin(theta), speed**2, np.gradient(speed)]
@@ -70,7 +65,7 @@ def _fitted(force: FloatArray, theta: FloatArray, speed: FloatArray, angle_rad: 
         # Disturbance power in harmonics 2 to 5, per unit variance of each coefficient, estimates that of the centre.
         others = slice(-2 * len(harmonics), None)
         variance = np.maximum(variance, np.mean(solution[others] ** 2 / inverse[others, None], axis=0))
-    return GravityCircle(solution[0] / size[0], variance * inverse[0] / size[0] ** 2)
+    return solution[0] / size[0], variance * inverse[0] / size[0] ** 2
 
 
 # Tilt of the table from whole turns on it: horizontal gravity rotates once through the case during a turn.
@@ -94,7 +89,7 @@ def opposite_headings(
     mean = segments.accelerometer_mean
     if mean is None or segments.gyroscope_mean is None or len(turns_deg) != len(moves):
         return None
-    found: dict[int, list[GravityCircle]] = {}
+    found: dict[int, list[Circle]] = {}
     last, placed = -1, -1
     for move, angle in zip(moves, turns_deg, strict=True):
         # Consecutive turns, without the case set down anew between them, belong to one placement.
@@ -107,9 +102,8 @@ def opposite_headings(
     if not found:
         return None
     poses = np.array(list(found), dtype=np.int64)
-    centre = np.array([np.mean([one.centre for one in found[k]], axis=0) for k in poses.tolist()])
     # The unevenness of the table is common to the turns of one placement: their errors do not average out.
-    variance = np.array([np.mean([one.variance for one in found[k]], axis=0) for k in poses.tolist()])
+    centre, variance = np.array([np.mean(circles, axis=0) for circles in found.values()]).transpose(1, 0, 2)
     # With this noise the mean of both headings, n̄, has at least the variance of the circle's centre.
     return OppositeHeadings(2.0 * centre - mean[poses], 4.0 * variance[:, :, None] * np.eye(3), poses)
 

@@ -127,7 +127,7 @@ class ReplayStage:
     n: int
 
 
-SignKind = Literal["quieter-than-gyro", "mounted-without-error", "S-depends-on-duration"]
+SignKind = Literal["quieter-than-gyro", "mounted-without-error"]
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Sign(Plain):
     """Evidence that a reference was computed from this very gyro: the measured value and the value to compare with.
 
     White density of gyro minus reference and that of the static gyro [rad/s/√Hz]; angle between their frames and its
-    standard uncertainty [rad]; χ² of S from long blocks against S from short ones and its degrees of freedom.
+    standard uncertainty [rad].
     """
 
     kind: SignKind

@@ -35,7 +35,6 @@ _SHEET = {"gyro-g-sensitivity": (0.1, "°/s/g"), "gyro-scale-nonlinearity": (0.1
 _SIGNS = {
     "quieter-than-gyro": "the difference between the two is quieter than the static gyro",
     "mounted-without-error": "it lies along the gyro's own axes",
-    "S-depends-on-duration": "S changes with the time over which attitude is integrated",
 }
 
 

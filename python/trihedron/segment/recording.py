@@ -42,23 +42,11 @@ LONG_S = 4.0
 
 
 def segment_recording(recording: Recording, *, progress: Progress | None = None) -> Segments:
-    """Find poses and the moves between them; no threshold is needed, the sensor's own noise sets it.
+    """Find poses and the moves between them; no threshold is needed, the sensor's own noise sets it
+    (docs/segmentation.md).
 
-    Parameters
-    ----------
-    recording : Recording
-        Either sensor, or both (both vote).
-    progress : callable
-        Called with (done fraction, text).
-
-    Returns
-    -------
-    Segments
-            Weak answers (too few poses, a log that is never static, settling, disturbances) are findings in it.
-
-    Notes
-    -----
-    See ``docs/segmentation.md``.
+    Either sensor, or both, vote. Weak answers (too few poses, a log that is never static, settling, disturbances) are
+    findings. ``progress`` is called with (done fraction, text).
     """
     report = progress or (lambda _done, _text: None)
     report(0.0, "noise of short blocks")

@@ -55,8 +55,8 @@ def turning_blocks(
         variance = squares / (2.0 * np.diff(inner)[::2, None])
         scatter = np.maximum(scatter, np.sqrt(medians(variance) / channels.blocks(1.0)))
     step2 = np.where(channels.quantum[gyro] > 0.0, channels.quantum[gyro] ** 2, np.finfo(np.float64).tiny)
-    noise = medians(channels.variance[quiet][:, gyro]) - channels.quantisation_variance[gyro]
-    scatter = np.maximum(scatter, np.sqrt(left_by_rounding(noise, step2)[0] * step2))
+    noise = medians(channels.variance[quiet][:, gyro])
+    scatter = np.maximum(scatter, np.sqrt(left_by_rounding(noise / step2) * step2))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - bias) / scatter, nan=0.0)
     top = speed_of_moves(channels, quiet)

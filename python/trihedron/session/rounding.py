@@ -13,9 +13,9 @@ UNIFORM = 1.0 / 12.0
 IN_STEP = 0.95
 """Distance from the mean reading of the bias, in LSB, within which a code is one of the two between which the bias
 toggles; of a code read less often, one in twenty times, the running median leaves nothing."""
-UNDITHERED = 0.5
-"""Noise, in LSB, below which it does not dither the ADC: the mean of rounded readings is wrong by up to half an LSB,
-however long it is taken."""
+TWO_CODES = 0.25
+"""Largest variance, in squares of the step, of readings that toggle between two codes. With less the noise does not
+dither the ADC: the mean of rounded readings is wrong by up to half an LSB, however long it is taken."""
 CHATTER = 9
 """Length of the running median, in readings, that removes toggling between neighbouring codes."""
 STEADY = IN_STEP, CHATTER
@@ -25,8 +25,7 @@ LEAST_WHITE = 1e-2
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
     """Axes (3,) whose noise does not dither the LSB ``quantum`` (3,), by the scatter ``sigma`` (3,) of readings."""
-    white = np.sqrt(np.maximum(sigma**2 - quantum**2 / 12.0, 0.0))
-    return (quantum > 0.0) & (white < UNDITHERED * quantum)
+    return (quantum > 0.0) & (sigma**2 < TWO_CODES * quantum**2)
 
 
 def rounding_variance(

@@ -8,8 +8,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.records.recording import Recording
-from trihedron.records.truth import TrueSegment, Truth
+from trihedron.records import Recording, TrueSegment, Truth
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import effects_of
 from trihedron.simulate.gyroscope import Gyroscope

@@ -3,7 +3,6 @@
 import dataclasses
 import enum
 import inspect
-import types
 import typing
 from collections.abc import Mapping
 from pathlib import Path
@@ -163,8 +162,6 @@ def _fields(cls: type[Any], values: Mapping[str, Any], base: Any, where: str) ->
 def _value(hint: Any, value: Any, base: Any, where: str) -> Any:
     if dataclasses.is_dataclass(hint):
         return _changed(base, value, where) if base is not None else _made(typing.cast(Any, hint), value, where)
-    if isinstance(hint, types.UnionType):
-        return value
     if typing.get_origin(hint) is tuple:
         return _tuple_value(typing.get_args(hint), value, where)
     if isinstance(hint, type) and issubclass(hint, enum.Enum):

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.linalg import solveh_banded
 from scipy.spatial.transform import Rotation
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.channel_facts import ChannelFacts
@@ -25,10 +24,6 @@ from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, St
 from trihedron.simulate.readout import Adc, matrix3, sense_axes, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_poses
-
-# Knot spacing of a replayed move: a wider one would smooth the jolt of setting the case down. At this spacing the
-# recording's noise in moves is replayed as motion, and the simulated noise is added to it.
-_KNOT_S = 0.01
 
 
 def twin_motion(recording: Recording, segments: Segments, calibration: Calibration) -> Motion:
@@ -95,9 +90,10 @@ def _motion(
         if stop_s - end[i] < 2.0 * step_s:
             continue
         bias = still[i] if is_last else 0.5 * (still[i] + still[i + 1])
-        knots = _knots(time_s, end[i], stop_s)
-        turning = _averaged(time_s, rate - bias, knots)
-        f = _averaged(time_s, force, knots)
+        # A knot per sample: the kinks of fewer would be errors of time that both sensors share, and smooth the jolt of
+        # setting the case down. The recording's noise in moves is replayed as motion.
+        knots = np.linspace(end[i], stop_s, max(3, round((stop_s - end[i]) / step_s) + 1))
+        turning, f = _at(knots, time_s, rate - bias), _at(knots, time_s, force)
         if not is_last:
             turning = _ending_in(turning, attitude, stop_s - end[i], ups[i + 1])
         path = _attitudes(turning, attitude, stop_s - end[i])
@@ -112,30 +108,9 @@ def _motion(
     return Motion(tuple(steps), start=start)
 
 
-def _knots(time_s: FloatArray, start_s: float, stop_s: float) -> FloatArray:
-    spacing = max(_KNOT_S, float(np.median(np.diff(time_s))))
-    return np.linspace(start_s, stop_s, max(3, round((stop_s - start_s) / spacing) + 1))
-
-
-def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> FloatArray:
-    """(m, 3) values at the knots (m,): least-squares linear spline, so that a knot is not one sample's noise."""
-    a, b = np.searchsorted(time_s, [knots[0] - 1e-9, knots[-1] + 1e-9])
-    t, y = time_s[a:b], values[a:b]
-    place = np.clip((t - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
-    k = np.minimum(place.astype(np.intp), len(knots) - 2)
-    x = place - k
-    m = len(knots)
-    diagonal, off, right = np.zeros(m), np.zeros(m), np.zeros((m, 3))
-    np.add.at(diagonal, k, (1.0 - x) ** 2)
-    np.add.at(diagonal, k + 1, x**2)
-    np.add.at(off, k, x * (1.0 - x))
-    np.add.at(right, k, (1.0 - x)[:, None] * y)
-    np.add.at(right, k + 1, x[:, None] * y)
-    # A weak regularisation towards the interpolated readings determines knots in a gap of the log.
-    diagonal += 1e-3
-    nearest = np.column_stack([np.interp(knots, t, y[:, j]) for j in range(3)])
-    right += 1e-3 * nearest
-    return solveh_banded(np.vstack([np.concatenate([[0.0], off[:-1]]), diagonal]), right)
+def _at(knots: FloatArray, time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """(m, 3) values (n, 3) at the knots (m,)."""
+    return np.column_stack([np.interp(knots, time_s, axis) for axis in values.T])
 
 
 def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatArray:
@@ -190,9 +165,6 @@ def _filled(raw: FloatArray) -> FloatArray:
 
 # Motion beyond a sensor's range, extrapolated from the readings before and after it.
 
-SLOPE_OVER = 2
-"""Samples over which the slope beside a clipped peak is taken: fewer add noise, more include other motion."""
-
 
 def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     """(n, 3) readings with the peaks clipped at a range limit restored, raw units.
@@ -204,32 +176,15 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     if not facts.limits:
         return readings
     out = readings.copy()
-    last = len(readings) - 1
-    at_limits = facts.at_limits(len(readings))
     for limit in facts.limits:
         column = readings[:, limit.axis]
-        at_limit = at_limits[:, limit.axis]
-        away = abs(limit.value - float(np.nanmedian(column)))
-        sign = 1.0 if limit.is_high else -1.0
+        away, sign = abs(limit.value - float(np.nanmedian(column))), 1.0 if limit.is_high else -1.0
         for first, stop in limit.runs.tolist():
-            a, b = first - 1, stop
-            if a < 0 or b > last or at_limit[a] or at_limit[b]:
+            if first < 2 or stop > len(column) - 2:
                 continue
-            rise = _slope(column, at_limit, a, -1)
-            fall = _slope(column, at_limit, b, 1)
-            # Towards the limit before the run and away from it after; a slope of the wrong sign is set to 0.
-            slopes = [max(sign * rise, 0.0) * sign, min(sign * fall, 0.0) * sign]
-            curve = CubicHermiteSpline([a, b], [column[a], column[b]], slopes)
+            before, after = column[first - 2 : first], column[stop : stop + 2]
+            slopes = np.concatenate([np.diff(before), np.diff(after)])
+            curve = CubicHermiteSpline([first - 1, stop], [before[1], after[0]], slopes)
             beyond = sign * (curve(np.arange(first, stop)) - limit.value)
             out[first:stop, limit.axis] = limit.value + sign * np.clip(beyond, 0.0, away)
     return out
-
-
-def _slope(column: FloatArray, at_limit: BoolArray, place: int, step: int) -> float:
-    """Slope [raw/sample] at ``place``, from readings in direction ``step`` that are not at a limit."""
-    other = place
-    for _ in range(SLOPE_OVER):
-        if not 0 <= other + step < len(column) or at_limit[other + step]:
-            break
-        other += step
-    return 0.0 if other == place else float((column[other] - column[place]) / (other - place))

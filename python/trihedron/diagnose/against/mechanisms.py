@@ -199,9 +199,17 @@ def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
 
 
 def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: float) -> bool:
-    """Whether the recording excludes the effect at the model's size: its own estimate differs."""
+    """Whether the recording excludes the effect at the model's size: its own estimate differs.
+
+    Parameters that its best shape lacks (rows of a matrix) are 0 there, as uncertain as those that it has.
+    """
     one = next((c for c in tried if c.id == effect.id), None)
-    differences = [] if one is None else _parameters(effect.id, effect.parameters, one.size, alpha)
+    size = () if one is None else one.size
+    sigma = {p.unit: max(q.std for q in size if q.unit == p.unit) for p in size}
+    names = {p.name for p in size}
+    zeros = [EffectParameter(p.name, 0.0, sigma[p.unit], p.unit) for p in effect.parameters
+             if p.unit in sigma and p.name not in names]  # fmt: skip
+    differences = _parameters(effect.id, effect.parameters, (*size, *zeros), alpha)
     return not differences or any(p.significant for p in differences)
 
 

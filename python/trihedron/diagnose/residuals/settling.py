@@ -12,17 +12,20 @@ from trihedron.session.noise import FEWEST_POSES
 
 
 class Settling(NamedTuple):
-    """``score``: twice the log-likelihood that settling gains beside scatter, less the cost of the time constants
-    tried; ``rate_rad_s``: standard deviation of the settling rate at the start of poses, ``tau_s`` its time constant.
+    """``score``: twice the log-likelihood that settling gains over scatter, less the cost of the time constants tried;
+    ``of_bias`` the same of a bias that settles, over both; ``rate_rad_s``: standard deviation of the settling rate at
+    the start of poses, ``tau_s`` its time constant.
     """
 
     score: float
     rate_rad_s: float
     tau_s: float
+    of_bias: float
 
 
 def settling(context: Context) -> Settling | None:
-    """Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)) (eq. 8.7d).
+    """Settling against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)), or none
+    where the bias settles (eq. 8.7d).
 
     ``None`` without a gyro, or with too few poses.
     """

@@ -15,9 +15,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import design_rows, wrt_relative_errors
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.probability import fdtrc
-from trihedron.records.calibration import Calibration, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.segments import Segments
+from trihedron.records import Calibration, Finding, FindingCode, Segments, SensorCalibration
 from trihedron.sensor_model import in_frame
 
 NONLINEARITY = 2e-3

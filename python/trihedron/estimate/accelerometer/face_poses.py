@@ -9,8 +9,7 @@ from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.segments import Segments
+from trihedron.records import Finding, FindingCode, Segments
 from trihedron.records.words import Words, words
 from trihedron.session.rounding import undithered_axes
 from trihedron.units import AccelerationUnit, acceleration_to_si

@@ -15,8 +15,7 @@ from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
 from trihedron.estimate.gravity_circle import OppositeHeadings, with_opposite
 from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
-from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import AccelerationUnit, degrees_from_radians

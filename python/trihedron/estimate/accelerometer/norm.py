@@ -11,8 +11,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
-from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
-from trihedron.records.finding import Finding
+from trihedron.records import Finding, FindingCode, FitQuality, Frame, SensorCalibration
 from trihedron.records.words import words
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
@@ -35,7 +34,7 @@ def calibrate_norm(
     """Accelerometer triad from the mean readings of poses, whatever their orientation.
 
     Minimises ``Σ ((|S a' + b| - |g|)/σ)²`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
-    ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3), or covariances (n, 3, 3).
+    ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3).
     ``raw_unit`` is only used to question implausible scales. ``axis_signs`` (3,) of ±1 is the sign of each raw axis
     against the body frame's axis, from the board's documentation or method 1: gravity's magnitude does not determine
     the signs of the diagonal of S; the default is +1. An odd number of minus signs is reported as a left-handed triad.
@@ -113,11 +112,13 @@ def _assemble(
             anchor=_core.ANCHOR,
             are_faces=are_six_faces(values),
         ),
-        *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.model_findings(S, unit),
         *verdict.residual_findings(chi2, quality),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
+    if not fit.is_converged:
+        why = words(fit.stopped_because)
+        findings.append(Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=why))
     sensor = SensorCalibration(
         S=S,
         b=fit.b,
@@ -204,31 +205,19 @@ def calibrate_few_faces(
 
 
 def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Means (n, 3) and their covariances (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances (n, 3, 3).
+    """Means (n, 3) and their covariances (n, 3, 3), from standard errors (), (3,) or (n, 3).
 
-    Raises ``InputError`` when shapes do not fit, or something is not finite or not positive.
+    Raises ``InputError`` when something is not finite, or a pose has no positive standard error.
     """
     values = np.ascontiguousarray(means, dtype=np.float64)
-    if values.ndim != 2 or values.shape[1] != 3:
-        raise InputError(f"mean readings must have shape (n, 3), got {values.shape}")
     n = len(values)
     if not np.all(np.isfinite(values)):
         pose = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
         raise InputError(f"the mean reading of pose {pose} is not finite: leave that pose out")
-    sigma = np.asarray(sigma_means, dtype=np.float64)
-    if sigma.shape in ((), (3,)):
-        sigma = np.broadcast_to(sigma, (n, 3))
-    if sigma.shape == (n, 3):
-        if not np.all(np.isfinite(sigma)) or np.any(sigma < 0) or np.any(sigma.max(axis=1, initial=0.0) <= 0):
-            raise InputError("standard errors of the means must be finite and positive (at least one axis per pose)")
-        noise = np.zeros((n, 3, 3))
-        noise[:, range(3), range(3)] = sigma**2
-        return values, noise
-    if sigma.shape != (n, 3, 3):
-        raise InputError(f"noise of {n} means must have shape (3,), ({n}, 3) or ({n}, 3, 3), got {sigma.shape}")
-    if not np.allclose(sigma, np.swapaxes(sigma, 1, 2)) or np.any(np.linalg.eigvalsh(sigma)[:, -1] <= 0):
-        raise InputError("covariances of the means must be symmetric and positive")
-    return values, np.ascontiguousarray(sigma)
+    sigma = np.broadcast_to(np.asarray(sigma_means, dtype=np.float64), (n, 3))
+    if not np.all(np.isfinite(sigma)) or np.any(sigma < 0) or np.any(sigma.max(axis=1, initial=0.0) <= 0):
+        raise InputError("standard errors of the means must be finite and positive (at least one axis per pose)")
+    return values, sigma[:, :, None] ** 2 * np.eye(3)
 
 
 def checked_gravity(gravity_m_s2: float) -> float:

@@ -7,8 +7,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
-from trihedron.records.calibration import FitQuality
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records import Finding, FindingCode, FitQuality
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 SIGNIFICANCE = 0.01
@@ -148,9 +147,3 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Findin
             yield Finding.of(
                 FindingCode.SCALE_NOT_NOMINAL, "accelerometer", axis=worst + 1, scale_ratio=scale, unit=unit
             )
-
-
-def convergence_findings(is_converged: bool, stopped_because: str) -> Iterator[Finding]:
-    """Finding where the solver stopped without convergence."""
-    if not is_converged:
-        yield Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=stopped_because)

@@ -12,9 +12,15 @@ from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
-from trihedron.records.calibration import PARAMETER_NAMES, Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
-from trihedron.records.recording import Recording
+from trihedron.records import (
+    PARAMETER_NAMES,
+    Finding,
+    FindingCode,
+    Observability,
+    Recording,
+    SensorCalibration,
+    Severity,
+)
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import order_and_reversed
 from trihedron.session.noise import NOISE_DOF

@@ -14,9 +14,7 @@ from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rota
 from trihedron.probability import chdtrc
 from trihedron.quantiles import median
 from trihedron.ranges import rows_beside
-from trihedron.records import Recording
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.segments import Move, Segments
+from trihedron.records import Move, Recording, Segments, SensorCalibration
 from trihedron.session.rounding import (
     before_adc,
     density_without_rounding,
@@ -327,14 +325,10 @@ def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first:
         return
     enter = (column[left] - column[left - 1]) / before
     leave = (column[right + 1] - column[right]) / after
-    u = (time_s[first : last + 1] - time_s[left]) / span
-    column_left, column_right = column[left], column[right]
-    column[first : last + 1] = (
-        (2 * u**3 - 3 * u**2 + 1) * column_left
-        + (u**3 - 2 * u**2 + u) * span * enter
-        + (3 * u**2 - 2 * u**3) * column_right
-        + (u**3 - u**2) * span * leave
-    )
+    from scipy.interpolate import CubicHermiteSpline  # imported here: few logs clip
+
+    curve = CubicHermiteSpline(time_s[[left, right]], column[[left, right]], [enter, leave])
+    column[first : last + 1] = curve(time_s[first : last + 1])
     area = span**2 * abs(enter - leave) / 12.0
     count = last - first + 1
     # Equal and independent variances of the run's samples, whose integral has the variance of the area.

@@ -16,10 +16,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
 )
 from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_fitted
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
-from trihedron.records.calibration import Calibration, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
 
 SAME_POSE = 2.0 * np.sin(0.5 * np.radians(5.0))

@@ -13,8 +13,7 @@ from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.session.start import scale_matrix
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Move, Segments
+from trihedron.records import Move, Recording, Segments
 from trihedron.units import rate_to_si
 
 QUARTER = math.pi / 2.0
@@ -42,14 +41,6 @@ class Turn:
     face: int
     angle_rad: float | None = None
     number: int = 0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.start < self.stop - 1:
-            raise InputError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
-        if self.angle_rad is not None and not math.isfinite(self.angle_rad):
-            raise InputError("the angle of a turn must be finite")
-        if self.face not in (1, 2, 3, -1, -2, -3):
-            raise InputError(f"the face of a turn must be 1, 2, 3, -1, -2 or -3, not {self.face}")
 
     @property
     def axis(self) -> int:
@@ -281,6 +272,8 @@ def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float])
             f"{len(angles_deg)} turns were stated and {len(moves)} were found between poses of the same tilt{where}: "
             "give one angle in degrees for each, 0 to leave it out."
         )
+    if not np.all(np.isfinite(angles_deg)):
+        raise InputError("the angle of a turn must be finite")
     every = enumerate(zip(moves, angles_deg, strict=True), start=1)
     return [(k, move, math.radians(angle)) for k, (move, angle) in every if angle != 0.0]
 

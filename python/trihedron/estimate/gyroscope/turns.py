@@ -24,9 +24,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
 from trihedron.estimate.gyroscope.turn_system import TurnSystem
 from trihedron.estimate.known_vectors import KnownFit
 from trihedron.probability import FALSE_ALARM, chdtrc
-from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.recording import Recording
+from trihedron.records import Finding, FindingCode, FitQuality, Observability, Recording, SensorCalibration
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si

@@ -19,11 +19,8 @@ from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by, move_quality
 from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.ranges import ranges_of
-from trihedron.records.calibration import Calibration, FitQuality, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.checked import number_of
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
 from trihedron.sensor_model import norms
 from trihedron.session.rounding import undithered_axes
 

@@ -8,9 +8,7 @@ import numpy as np
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import continuous_densities
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.kalman import AxisNoise
-from trihedron.records.noise import NoiseAxis
+from trihedron.records import AxisNoise, NoiseAxis, SensorCalibration
 from trihedron.records.pose_noise import OctaveNoise
 from trihedron.units import AccelerationUnit, acceleration_to_si
 

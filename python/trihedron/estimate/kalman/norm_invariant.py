@@ -16,12 +16,9 @@ from trihedron.estimate.kalman.per_axis import (
     covariance_scale,
     is_settled,
     noise_per_axis,
-    pose_arrays,
     shaping_model,
 )
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.kalman import AxisNoise, NormKalmanCalibration
+from trihedron.records import AxisNoise, Finding, FindingCode, NormKalmanCalibration, SensorCalibration
 
 START_RELATIVE, START_BIAS_M_S2 = 0.3, 3.0
 """Standard uncertainty of the initial S, relative to its size, and of the bias, by the range of the readings."""
@@ -46,86 +43,15 @@ MOST_RUNS = 50
 N_PARAMETERS = 9
 
 
-class NormFilter:
-    """Kalman filter of a triad in unknown attitudes, over poses in order of time.
-
-    ``noise`` of one axis or of three, in raw units; ``start`` the initial scales and biases (3,); ``frame`` the form
-    of S, which fixes the rotation that the norm does not determine; ``session_s``, ``pose_s`` the approximate length of
-    the session, which sets the slowest noise state, and of a pose.
-    """
-
-    def __init__(
-        self,
-        noise: AxisNoise | Sequence[AxisNoise],
-        *,
-        gravity_m_s2: float,
-        start: tuple[FloatArray, FloatArray],
-        frame: NormFrame = "lower",
-        session_s: float = 1800.0,
-        pose_s: float = 3.0,
-    ) -> None:
-        self.frame: NormFrame = frame
-        self._gravity = gravity_m_s2
-        scale, self._bias = start
-        models = [shaping_model(n, session_s=session_s, pose_s=pose_s) for n in noise_per_axis(noise)]
-        sigma = np.array([START_RELATIVE * scale.mean()] * 6 + [START_BIAS_M_S2] * 3)
-        mean = np.array([scale[i] if i == j else 0.0 for i, j in ENTRIES] + [0.0] * 3)
-        self._filter = _core.NormKalman(
-            models[0], models[1], models[2], frame == "symmetric", gravity_m_s2, mean, sigma
-        )
-        self.n_runs = 0
-
-    def add(self, reading: FloatArray, start_s: float, pose_s: float, extra_variance: FloatArray) -> None:
-        """Update with the mean raw reading (3,) of one pose; ``extra_variance`` (3,), raw², adds to the noise model.
-
-        Raises ``InputError`` when the reading is not finite or the pose is earlier than the last one.
-        """
-        self._filter.add([float(v) for v in reading - self._bias], start_s, pose_s, [float(v) for v in extra_variance])
-
-    def load(self, readings: FloatArray, start_s: FloatArray, pose_s: FloatArray, extra_variance: FloatArray) -> None:
-        """Store many poses, (n, 3), (n,), (n,), (n, 3), without an update; :meth:`relinearise` estimates from all."""
-        self._filter.load(readings - self._bias, start_s, pose_s, np.ascontiguousarray(extra_variance))
-
-    def relinearise(self, most: int = MOST_RUNS) -> bool:
-        """Repeat the run over all poses until the constants converge; whether they did within ``most`` runs."""
-        runs = self._filter.relinearise(most)
-        self.n_runs = runs or 0
-        return runs is not None
-
-    def calibration(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """``S`` (3, 3), ``b`` (3,) and covariance (12, 12) of ``f = S raw + b``."""
-        theta, jacobian = self._filter.parameters, self._expand()
-        S, b = (jacobian[:9] @ theta).reshape(3, 3), theta[6:]
-        # b = b_centred − S bias
-        for k in range(3):
-            jacobian[9 + k] -= self._bias @ jacobian[3 * k : 3 * k + 3]
-        return S, b - S @ self._bias, jacobian @ self._filter.covariance @ jacobian.T
-
-    def _expand(self) -> FloatArray:
-        """(12, 9) derivative of S row by row and b with respect to the nine parameters."""
-        jacobian = np.zeros((12, N_PARAMETERS))
-        for k, (i, j) in enumerate(ENTRIES):
-            jacobian[3 * i + j, k] = 1.0
-            if self.frame == "symmetric":
-                jacobian[3 * j + i, k] = 1.0
-        jacobian[9:, 6:] = np.eye(3)
-        return jacobian
-
-    def innovations(self) -> tuple[FloatArray, FloatArray]:
-        """Innovations (n,) of the latest run and their predicted standard deviations (n,), m/s²."""
-        rows = self._filter.innovations
-        return rows[:, 0].copy(), np.sqrt(rows[:, 1])
-
-
 def calibrate_without_references(
     readings: npt.ArrayLike,
     noise: AxisNoise | Sequence[AxisNoise],
     *,
-    start_s: npt.ArrayLike,
-    pose_s: npt.ArrayLike,
+    start_s: FloatArray,
+    pose_s: FloatArray,
     gravity_m_s2: float,
     frame: NormFrame = "lower",
-    extra_variance: npt.ArrayLike = 0.0,
+    extra_variance: FloatArray | float = 0.0,
     raw_unit: str = "counts",
 ) -> NormKalmanCalibration:
     """Calibrate a triad from mean readings in unknown attitudes, with the estimate after every pose.
@@ -134,29 +60,29 @@ def calibrate_without_references(
     finite, poses are out of order, or there are fewer than nine.
     """
     a = _mean_readings(readings)
-    begin, pose, extra = pose_arrays(len(a), start_s, pose_s, extra_variance)
+    extra = np.broadcast_to(extra_variance, a.shape)
+    session_s, usual_s = float(start_s[-1] + pose_s[-1] - start_s[0]), float(np.median(pose_s))
+    x, y, z = (shaping_model(one, session_s=session_s, pose_s=usual_s) for one in noise_per_axis(noise))
+    scale, middle = start_from_range(a, gravity_m_s2)
+    mean = np.array([scale[i] if i == j else 0.0 for i, j in ENTRIES] + [0.0] * 3)
+    sigma = np.array([START_RELATIVE * scale.mean()] * 6 + [START_BIAS_M_S2] * 3)
 
-    def fresh() -> NormFilter:
-        return NormFilter(
-            noise,
-            gravity_m_s2=gravity_m_s2,
-            start=start_from_range(a, gravity_m_s2),
-            frame=frame,
-            session_s=float(begin[-1] + pose[-1] - begin[0]),
-            pose_s=float(np.median(pose)),
-        )
+    def fresh() -> _core.NormKalman:
+        return _core.NormKalman(x, y, z, frame == "symmetric", gravity_m_s2, mean, sigma)
 
-    parameters, sigmas = _track(fresh(), a, begin, pose, extra)
+    wrt = _wrt_parameters(frame, middle)
+    parameters, sigmas = _track(fresh(), wrt, (a - middle, start_s, pose_s, extra))
     # A run over all poses from the start: the result does not depend on the linearisation at the first poses.
     one = fresh()
-    one.load(a, begin, pose, extra)
-    converged = one.relinearise()
-    S, b, covariance = one.calibration()
-    parameters[-1], sigmas[-1] = _flat(S, b, covariance)
-    innovation, innovation_sigma = one.innovations()
+    one.load(a - middle, start_s, pose_s, np.ascontiguousarray(extra))
+    n_runs = one.relinearise(MOST_RUNS)
+    parameters[-1], covariance = wrt @ one.parameters, wrt @ one.covariance @ wrt.T
+    sigmas[-1] = _sigma(covariance)
+    S, b = parameters[-1, :9].reshape(3, 3).copy(), parameters[-1, 9:].copy()
+    innovation, innovation_sigma = one.innovations[:, 0].copy(), np.sqrt(one.innovations[:, 1])
     seen = check_innovations(innovation, innovation_sigma)
     findings: list[Finding] = []
-    if not converged:
+    if n_runs is None:
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
     accelerometer = SensorCalibration(
@@ -171,7 +97,7 @@ def calibrate_without_references(
         innovation=innovation,
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma),
-        n_runs=one.n_runs,
+        n_runs=n_runs or 0,
         residual_m_s2=residual,
         consistency=seen,
         findings=tuple(findings),
@@ -190,20 +116,33 @@ def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
     return a
 
 
-def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.concatenate([S.ravel(), b]), np.sqrt(np.maximum(np.diag(covariance), 0.0))
+def _wrt_parameters(frame: NormFrame, middle: FloatArray) -> FloatArray:
+    """(12, 9) derivative of S row by row and b with respect to the nine parameters: S and b of readings about
+    ``middle`` (3,)."""
+    out = np.zeros((12, N_PARAMETERS))
+    for k, (i, j) in enumerate(ENTRIES):
+        out[3 * i + j, k] = 1.0
+        if frame == "symmetric":
+            out[3 * j + i, k] = 1.0
+    out[9:, 6:] = np.eye(3)
+    out[9:] -= np.einsum("j,ijk->ik", middle, out[:9].reshape(3, 3, N_PARAMETERS))
+    return out
+
+
+def _sigma(covariance: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
 def _track(
-    one: NormFilter, a: FloatArray, begin: FloatArray, pose: FloatArray, extra: FloatArray
+    one: _core.NormKalman, wrt: FloatArray, poses: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """S row by row and b, and their standard uncertainties, (n, 12) each, after every pose."""
-    parameters, sigmas = np.empty((len(a), 12)), np.empty((len(a), 12))
-    for i in range(len(a)):
+    parameters, sigmas = [], []
+    for i, (reading, begin_s, pose_s, extra) in enumerate(zip(*poses, strict=True)):
+        one.add(reading.tolist(), float(begin_s), float(pose_s), extra.tolist())
         # The first 40 poses are relinearised each; later ones change the linearisation point by less than its error.
-        again = i < 40 or i % 10 == 0
-        one.add(a[i], float(begin[i]), float(pose[i]), extra[i])
-        if again:
+        if i < 40 or i % 10 == 0:
             one.relinearise(10)
-        parameters[i], sigmas[i] = _flat(*one.calibration())
-    return parameters, sigmas
+        parameters.append(wrt @ one.parameters)
+        sigmas.append(_sigma(wrt @ one.covariance @ wrt.T))
+    return np.array(parameters), np.array(sigmas)

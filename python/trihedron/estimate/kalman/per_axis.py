@@ -10,16 +10,9 @@ from trihedron import _core
 from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.probability import chdtrc, chdtri
+from trihedron.records import AxisKalmanResult, AxisNoise, Consistency, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.kalman import (
-    AxisKalmanResult,
-    AxisNoise,
-    Consistency,
-    ConstantsTrack,
-    KalmanCalibration,
-    PoseTable,
-)
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 
@@ -66,17 +59,10 @@ def is_settled(innovation_sigma: FloatArray) -> BoolArray:
 
 
 def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> Consistency:
-    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12).
-
-    Parameters
-    ----------
-    innovation, innovation_sigma : (n,)
-        One-step prediction errors and their predicted standard deviations, any unit.
-    """
+    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12), from
+    one-step prediction errors (n,) and their predicted standard deviations (n,) in any unit."""
     z = (innovation / innovation_sigma)[is_settled(innovation_sigma)]
     n = len(z)
-    if n == 0:
-        return Consistency(float("nan"), 0.0, float("inf"), 0, 1.0, 0)
     tail = (1.0 - CONFIDENCE) / 2.0
     low, high = chdtri(n, 1.0 - tail) / n, chdtri(n, tail) / n
     n_lags = min(20, n // 5)
@@ -142,16 +128,16 @@ def calibrate_with_references(
     table: PoseTable,
     noise: AxisNoise | Sequence[AxisNoise],
     *,
-    start_s: npt.ArrayLike,
-    pose_s: npt.ArrayLike,
-    extra_variance: npt.ArrayLike = 0.0,
+    start_s: FloatArray,
+    pose_s: FloatArray,
+    extra_variance: FloatArray | float = 0.0,
     raw_unit: str = "counts",
 ) -> KalmanCalibration:
     """Calibrate a triad from mean readings in known attitudes, by all methods after every pose (docs/kalman.md, eq. 2).
 
     ``readings`` (n, 3) are the mean raw readings of the poses in the attitudes of the ``table``, ``noise`` that of one
-    axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) or a number the start and length of the poses [s],
-    ``extra_variance`` (), (n,) or (n, 3) [raw²] in addition to the noise model.
+    axis or of three, ``start_s`` (n,) and ``pose_s`` (n,) the start and length of the poses [s], ``extra_variance``
+    (n, 3) [raw²] in addition to the noise model.
 
     Raises ``InputError`` when shapes disagree, values are not finite, poses are out of order or do not determine the
     constants.
@@ -160,34 +146,26 @@ def calibrate_with_references(
     z = np.array(readings, dtype=np.float64)
     if z.shape != f.shape:
         raise InputError(f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose")
-    start, pose, extra = pose_arrays(len(f), start_s, pose_s, extra_variance)
+    extra = np.broadcast_to(extra_variance, z.shape)
     noises = noise_per_axis(noise)
-    session = float(start[-1] + pose[-1] - start[0])
-    models = [shaping_model(n, session_s=session, pose_s=float(np.median(pose))) for n in noises]
+    session = float(start_s[-1] + pose_s[-1] - start_s[0])
+    models = [shaping_model(n, session_s=session, pose_s=float(np.median(pose_s))) for n in noises]
     if table.sigma_m_s2 > 0:
         # An angle error changes the reference by σ across it; the axis' sensitivity converts it to raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
     axes: list[AxisKalmanResult] = []
     findings: list[Finding] = []
     for axis in range(3):
-        result = _one_axis(axis, noises[axis], models[axis], z[:, axis].copy(), f, start, pose, extra[:, axis].copy())
+        result = _one_axis(
+            axis, noises[axis], models[axis], z[:, axis].copy(), f, start_s, pose_s, extra[:, axis].copy()
+        )
         axes.append(replace(result, covariance=covariance_scale(result.consistency) * result.covariance))
         findings += consistency_findings(axis, result.consistency)
     observability, seen = _observability(f)
     findings += seen
     accelerometer = direct_form(axes, raw_unit, observability)
     residual = (z @ accelerometer.S.T + accelerometer.b) - f
-    return KalmanCalibration(tuple(axes), accelerometer, f, z, start, pose, residual, tuple(findings))
-
-
-def pose_arrays(
-    n: int, start_s: npt.ArrayLike, pose_s: npt.ArrayLike, extra_variance: npt.ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses."""
-    start = np.array(start_s, dtype=np.float64)
-    pose = np.array(np.broadcast_to(np.asarray(pose_s, dtype=np.float64), (n,)))
-    extra = np.asarray(extra_variance, dtype=np.float64)
-    return start, pose, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
+    return KalmanCalibration(tuple(axes), accelerometer, f, z, start_s, pose_s, residual, tuple(findings))
 
 
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:

@@ -15,9 +15,7 @@ from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
 from trihedron.probability import NORMAL_95
-from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
+from trihedron.records import AllanCurve, Finding, FindingCode, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
 
 FALLS = np.linspace(-0.3, 0.6, 37)
 """Fractions of the power at the end of the fit band that a filter may have removed (negative: added)."""

@@ -36,21 +36,10 @@ _REACH = 40
 """Largest lag, in longer clusters: beyond it the squared covariance of flicker is below 1e-6 of its maximum."""
 
 
-def _wiener(t: FloatArray) -> FloatArray:
-    return np.asarray(-0.5 * np.abs(t))
-
-
-def _flicker(t: FloatArray) -> FloatArray:
+def _phase(t: FloatArray) -> FloatArray:
+    """Generalised autocovariance (3, ...) of the phase for N = 1, B = 1, K = 1 at lags ``t`` [s]."""
     a = np.abs(t)
-    return np.asarray(a**2 * np.log(np.where(a > 0, a, 1.0)) / (2.0 * np.pi))
-
-
-def _integrated_walk(t: FloatArray) -> FloatArray:
-    return np.asarray(np.abs(t) ** 3 / 12.0)
-
-
-_PHASE: tuple[Callable[[FloatArray], FloatArray], ...] = (_wiener, _flicker, _integrated_walk)
-"""Generalised autocovariance of the phase for N = 1, B = 1, K = 1."""
+    return np.stack([-0.5 * a, a**2 * np.log(np.where(a > 0, a, 1.0)) / (2.0 * np.pi), a**3 / 12.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +67,7 @@ def _pair(m_i: int, m_j: int, n: int, step_s: float) -> tuple[FloatArray, FloatA
     terms_i, terms_j = n - 2 * m_i + 1, n - 2 * m_j + 1
     lag, weight = _nodes(kinks, max(1 - terms_i, -_REACH * m_j), min(terms_j - 1, _REACH * m_j))
     count = np.maximum(np.minimum(terms_i, terms_j - lag) - np.maximum(0, -lag), 0) * weight
-    smooth = np.zeros((3, len(lag)))
-    distance = (lag[np.newaxis, :] - kinks[:, np.newaxis]) * step_s
-    for row, phase in enumerate(_PHASE):
-        smooth[row] = signs @ phase(distance)
+    smooth = np.einsum("k,tkl->tl", signs, _phase((lag - kinks[:, np.newaxis]) * step_s))
     inside = (lag > kinks.min()) & (lag < kinks.max())
     # Beyond this range white noise and walk are exactly uncorrelated: rounding errors are removed.
     smooth[[0, 2]] *= inside

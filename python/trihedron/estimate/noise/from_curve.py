@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -16,9 +16,7 @@ from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
-from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
 STEP = 1.9
@@ -40,21 +38,10 @@ def identify_curve(
     units: Sequence[str] = (),
     source: str = "curve",
 ) -> Noise:
-    """Noise terms of overlapping Allan deviations without their log.
+    """Noise terms of overlapping Allan deviations (k,) or (k, channels), in any unit and NaN where there is none, at
+    averaging times ``tau_s`` (k,), without their log, whose rate and length determine the uncertainty of the points.
 
-    Parameters
-    ----------
-    tau_s : (k,)
-        Averaging times, s.
-    deviation : (k,) or (k, channels)
-        Overlapping Allan deviations in any unit; NaN where there is none.
-    rate_hz, n_samples
-        Of the log of the curve: they determine the uncertainty of its points.
-
-    Raises
-    ------
-    ValueError
-        With fewer than six usable points, or times that are no whole numbers of readings.
+    Raises ``InputError`` with fewer than six usable points, or times that are no whole numbers of readings.
 
     Examples
     --------
@@ -67,8 +54,6 @@ def identify_curve(
     check_question(rate_hz, "overlapping", 0.95)
     tau, sigma = np.asarray(tau_s, dtype=np.float64), np.asarray(deviation, dtype=np.float64)
     sigma = sigma[:, np.newaxis] if sigma.ndim == 1 else sigma
-    if tau.ndim != 1 or sigma.ndim != 2 or len(tau) != len(sigma):
-        raise InputError(f"tau_s (k,) and deviation (k, channels) must fit, got {tau.shape} and {sigma.shape}")
     order = np.argsort(tau)
     tau, sigma = tau[order], sigma[order]
     clusters = np.round(tau * rate_hz).astype(np.int64)
@@ -97,9 +82,7 @@ def identify_curve(
 
 
 def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
-    points = _usable(curve, channel)
-    found = _screened(points)
-    points, fit, scale = found.points, found.fit, found.scale
+    points, fit, evidence, scale, findings = _screened(_usable(curve, channel))
     terms = {}
     for k, term in enumerate(TERMS):
         low, high = (math.sqrt(square) for square in points.interval(fit, k, scale))
@@ -107,9 +90,9 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
             value = math.sqrt(fit.squares[k])
             place = fit.active.index(k)
             error = 0.5 * value * math.sqrt(scale * fit.covariance[place, place])
-            terms[term] = NoiseTerm(term, True, value, error, low, high, high, found.evidence[k], value, value)
+            terms[term] = NoiseTerm(term, True, value, error, low, high, high, evidence[k], value, value)
         else:
-            terms[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, high, high, found.evidence[k])
+            terms[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, high, high, evidence[k])
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     first = float(points.tau_s[0])
     axis = NoiseAxis(
@@ -128,7 +111,7 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
         covariance_scale=scale,
     )
     ramp = [Finding.of(FindingCode.RAMP_OR_WALK)] if terms[TermName.RATE_RAMP].is_present else []
-    return replace(axis, findings=(*found.findings, *ramp, *remarks.about_terms(axis)))
+    return replace(axis, findings=(*findings, *ramp, *remarks.about_terms(axis)))
 
 
 def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
@@ -149,17 +132,9 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    points: CurvePoints
-    fit: CurveFit
-    evidence: FloatArray
-    scale: float
-    findings: list[Finding]
-
-
-def _screened(points: CurvePoints) -> _Found:
-    """Exclude short averaging times that no sum of terms explains; widen the uncertainties by the remaining misfit."""
+def _screened(points: CurvePoints) -> tuple[CurvePoints, CurveFit, FloatArray, float, list[Finding]]:
+    """The points without short averaging times that no sum of terms explains, their fit, the evidence (5,) of its
+    terms, the factor on variances by the remaining misfit, and findings."""
     findings: list[Finding] = []
     first, most = 0, len(points.clusters) - FEWEST_POINTS
     used = points
@@ -185,7 +160,7 @@ def _screened(points: CurvePoints) -> _Found:
         findings.append(
             Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, "curve", deviation=share, tau_s=float(used.tau_s[worst]))
         )
-    return _Found(used, fit, evidence, scale, findings)
+    return used, fit, evidence, scale, findings
 
 
 def _is_unlikely(points: CurvePoints) -> bool:

@@ -29,8 +29,7 @@ from trihedron.estimate.noise.screening import (
 )
 from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up
 from trihedron.estimate.noise.spectrum import ordinates
-from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records import AllanCurve, Finding, FindingCode
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
 
 ACCELEROMETER = ("accel x", "accel y", "accel z")

@@ -69,15 +69,11 @@ def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLi
         groups.append([item])
     out = []
     for group in groups:
-        by_band: dict[int, float] = {}
-        duration: dict[int, float] = {}
-        for line, time_s, number in group:
-            by_band[number] = by_band.get(number, 0.0) + line.amplitude**2
-            duration[number] = time_s
-        power = sum(by_band[b] * duration[b] for b in by_band) / sum(duration.values())
-        strength = np.array([line.amplitude**2 for line, _, _ in group])
-        places = np.array([line.frequency_hz for line, _, _ in group])
-        best = group[int(np.argmax(strength))][0]
+        same, times_s, numbers = zip(*group, strict=True)
+        strength = np.array([line.amplitude**2 for line in same])
+        places = np.array([line.frequency_hz for line in same])
+        power = float(strength @ np.array(times_s)) / sum(dict(zip(numbers, times_s, strict=True)).values())
+        best = same[int(np.argmax(strength))]
         out.append(
             replace(
                 best,

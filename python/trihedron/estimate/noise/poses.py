@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of, low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
 from trihedron.channel_facts.static_axes import StaticAxis
-from trihedron.errors import InputError
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
@@ -56,11 +54,9 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
     polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
-    frequency zero: the uncertainty of the filter's shape is included. Raises ``InputError`` when ``low_pass`` has no
-    corner.
+    frequency zero: the uncertainty of the filter's shape is included. ``low_pass`` has a corner.
     """
-    if low_pass.corner_hz is None:
-        raise InputError("no corner shows: the density is that of all readings")
+    assert low_pass.corner_hz is not None
     corner = low_pass.corner_hz.value
     axes = []
     for spectrum in spectra:
@@ -111,24 +107,12 @@ LEVEL_KNOWN = 1.0
 """Largest standard error of the log density below a corner; above it the differences of readings are used."""
 
 
-def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tuple[int, int]]) -> tuple[PoseNoise, ...]:
+def noise_of_poses(readings: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]]) -> tuple[PoseNoise, ...]:
     """Noise of every axis inside the poses of a session, each figure with its interval.
 
-    The channels are those of one sensor: they share a low-pass filter unless their spectra contradict it.
-
-    Parameters
-    ----------
-    readings : (n,) or (n, channels)
-        Raw readings; NaN marks a missing one (poses are divided there).
-    rate_hz : float
-        Samples per second.
-    poses : sequence of (start, stop)
-        Static intervals, in readings.
-
-    Raises
-    ------
-    ValueError
-        When the rate is not positive, a pose is not a range of readings, or none has 32 readings in a row.
+    The channels of ``readings`` (n, channels), raw, are those of one sensor: they share a low-pass filter unless their
+    spectra contradict it. NaN marks a missing reading, at which ``poses`` (start, stop) are divided. Raises
+    ``InputError`` when no pose has 32 readings in a row.
 
     Examples
     --------
@@ -138,14 +122,7 @@ def noise_of_poses(readings: npt.ArrayLike, rate_hz: float, poses: Sequence[tupl
     >>> axis.white.lower < 0.1 < axis.white.upper, axis.lines, axis.corner_hz
     (True, (), None)
     """
-    x = np.asarray(readings, dtype=np.float64)
-    x = x[:, np.newaxis] if x.ndim == 1 else x
-    if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
-    for start, stop in poses:
-        if not 0 <= start < stop <= len(x):
-            raise InputError(f"a pose runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
-    axes = [StaticAxis.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(x.T)]
+    axes = [StaticAxis.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(readings.T)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from trihedron.records.finding import Finding, FindingCode
-from trihedron.records.noise import NoiseAxis, SpectralLine, TermName
+from trihedron.records import Finding, FindingCode, NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
     from trihedron.estimate.noise.screening import Event, Readout

@@ -37,12 +37,11 @@ MEANS_S, MEANS, FEWEST_MEANS = 1.0, 160, 16
 
 @dataclass(frozen=True)
 class Event:
-    """Event at readings ``[start, stop)``: ``size`` in their unit (shaking: ratio of scatter), ``score`` of a test."""
+    """Event at readings ``[start, stop)``: ``size`` in their unit (shaking: ratio of scatter)."""
 
     start: int
     stop: int
     size: float
-    score: float
 
 
 def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
@@ -63,7 +62,7 @@ def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
     steps: list[Event] = []
     impacts: list[Event] = []
     taken: list[tuple[int, int]] = []
-    for score_ratio, at, width, jump in found:
+    for _, at, width, jump in found:
         if any(a - 2 * width <= at <= b + 2 * width for a, b in taken):
             continue
         reach = 4 * width
@@ -71,11 +70,11 @@ def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
         slack = max(width // 4, 2)
         # A step keeps at least half of its jump over all reaches; a impact returns.
         if at + reach < n and at > reach and all(change / jump > 0.5 for change in levels):
-            steps.append(Event(max(0, at - slack), min(n, at + slack), levels[0], score_ratio))
+            steps.append(Event(max(0, at - slack), min(n, at + slack), levels[0]))
             taken.append((at - 2 * width, at + 2 * width))
         else:
             start, stop = max(0, at - width - slack), min(n, at + 2 * width + slack)
-            impacts.append(Event(start, stop, jump, score_ratio))
+            impacts.append(Event(start, stop, jump))
             taken.append((start, stop))
     return sorted(steps, key=lambda e: e.start), sorted(impacts, key=lambda e: e.start)
 
@@ -105,11 +104,10 @@ def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
     out: list[Event] = []
     for i in np.flatnonzero(hit).tolist():
         size_here = float(math.exp(0.5 * (level[i] - centre)))
-        score = float((level[i] - centre) / spread)
         if out and out[-1].stop >= (i - 1) * size:
-            out[-1] = Event(out[-1].start, int((i + 1) * size), max(size_here, out[-1].size), max(score, out[-1].score))
+            out[-1] = Event(out[-1].start, int((i + 1) * size), max(size_here, out[-1].size))
         else:
-            out.append(Event(int(max(0, i - 1) * size), int((i + 1) * size), size_here, score))
+            out.append(Event(int(max(0, i - 1) * size), int((i + 1) * size), size_here))
     return out
 
 

@@ -21,8 +21,7 @@ from trihedron.estimate.noise.allan import (
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.screening import readout, steps_and_impacts, tail_error
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
-from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.noise import Noise, NoiseAxis
+from trihedron.records import AllanCurve, Noise, NoiseAxis
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
 _PARTS = ("numbers", "fine", "window", "sums")

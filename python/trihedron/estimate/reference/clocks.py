@@ -15,17 +15,12 @@ LEAST_OVERLAP = 0.25
 """Least overlap, relative to the shorter of the two."""
 BLOCK_S = 8.0
 """Length of the stretches whose lags are estimated: several turns of a hand."""
-BLOCK_PARTS = 8
-"""A remainder of less than 1/8 of a stretch after the last one is not used."""
 JUMP_S = 0.05
 """Least change of the lag between stretches that is a jump: lags of stretches scatter by milliseconds."""
 LOCKED = 0.9
 """Least correlation of a stretch whose lag is used: unrelated turns of 8 s reach 0.8 at some lag within six seconds."""
 FEWEST_BEYOND = 2
 """Fewest stretches on either side of a jump with consistent lags."""
-SURE = 0.97
-"""Least correlation of a single stretch at either end of the log that, with less than ``LOCKED`` at the lag of the
-others, proves a jump: one that matched a neighbouring turn instead fits worse at its own lag."""
 FASTEST = 0.01
 """Largest plausible clock rate: a larger one means that a periodic motion was matched at successive periods."""
 SEARCH_S = 6.0
@@ -126,31 +121,17 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, IntArray, F
     return np.asarray(correlation[keep]), np.asarray(lag[keep]), np.asarray(np.round(count[keep]))
 
 
-def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
-    """Start and length of stretches of ``n`` samples, in order of their middles: whole ones, and shorter at both ends.
-
-    A clock jump inside the first or last stretch reduces its correlation: half of it, and one at the very end of the
-    log, still determine a lag.
-    """
-    found = [(start, whole) for start in range(0, n - whole + 1, whole)]
-    found += [(0, whole // 2), (n - whole // 2, whole // 2)]
-    if n % whole > whole // BLOCK_PARTS:
-        found.append((n - whole, whole))
-    return sorted(found, key=lambda one: 2 * one[0] + one[1])
-
-
 def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) -> tuple[float, float]:
     """Offset [s] and rate from the lags of stretches.
 
     Raises ``InputError`` when neighbouring stretches fit well at lags that no steady clock explains.
     """
-    if len(ours) < 3 * round(BLOCK_S / grid.step_s):
-        return offset, 0.0
+    length = round(BLOCK_S / grid.step_s)
     lags, middles = [], []
-    fits: list[tuple[float, FloatArray]] = []
+    fits: list[FloatArray] = []
     spread = np.nanstd(ours)
     search = round(SEARCH_S / grid.step_s)
-    for start, length in _stretches(len(ours), round(BLOCK_S / grid.step_s)):
+    for start in range(0, len(ours) - length + 1, length):
         a = ours[start : start + length]
         if np.isfinite(a).sum() < 0.7 * length or np.nanstd(a) < 0.3 * spread:
             continue
@@ -163,10 +144,10 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         if not np.any(is_near):
             continue
         k = int(np.flatnonzero(is_near)[np.argmax(correlation[is_near])])
-        if correlation[k] > (SURE if length < round(BLOCK_S / grid.step_s) else LOCKED):
+        if correlation[k] > LOCKED:
             lags.append((lag[k] - search) * grid.step_s)
             middles.append(float(grid.time_s[start] + 0.5 * length * grid.step_s))
-            fits.append((float(correlation[k]), np.where(is_near, correlation, -1.0)[(lag >= 0) & (lag <= 2 * search)]))
+            fits.append(np.where(is_near, correlation, -1.0)[(lag >= 0) & (lag <= 2 * search)])
     if len(lags) < 3:
         return offset, 0.0
     found, at = np.array(lags), np.array(middles)
@@ -178,8 +159,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         # Motion that repeats fits at a period of its own as well: the shorter side must not fit at the other's lag.
         beyond, others = (fits[: k + 1], after) if k + 1 <= len(found) - k - 1 else (fits[k + 1 :], before)
         there = round(others / grid.step_s) + search
-        is_borne_out = len(beyond) >= FEWEST_BEYOND or beyond[0][0] > SURE
-        is_borne_out &= float(np.median([correlation[there] for _, correlation in beyond])) < LOCKED
+        is_borne_out = len(beyond) >= FEWEST_BEYOND and float(np.median([one[there] for one in beyond])) < LOCKED
         if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and is_borne_out:
             raise InputError(
                 f"{reference.motion.source}: the reference's clock jumps by {after - before:+.3g} s between "

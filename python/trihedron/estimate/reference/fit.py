@@ -14,7 +14,6 @@ from trihedron.estimate.reference.clocks import Alignment, align
 from trihedron.estimate.reference.coloured import Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope, held_out
 from trihedron.estimate.reference.mismatch import (
-    reject_parts_elsewhere,
     reject_still,
     reject_strangers,
     reject_two_clocks,
@@ -133,7 +132,6 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     reject_strangers(gyro, motion)
     reject_units(recording, gyro, motion)
     reject_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
-    reject_parts_elsewhere(grid, reference, gyro)
     wide = windows_on(seen, grid.step_s, max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s)))
     force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, gyro.handedness)
     felt = None if force is None else force_along(grid, force, gyro.A, gravity_m_s2)

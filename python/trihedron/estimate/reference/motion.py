@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point, SlowError, places
+from trihedron.estimate.reference.beside import Beside, Point, SlowError, places
 from trihedron.estimate.reference.likelihood import (
     TYPICAL,
     Fitted,
@@ -65,7 +65,7 @@ class MotionFit:
 
 def fit_motion(
     sides: list[Beside], wanted: tuple[str, ...] = ALWAYS, wider: Mapping[str, float] | None = None,
-    block_s: float = BLOCK_S, before: MotionFit | None = None,
+    before: MotionFit | None = None,
 ) -> MotionFit:  # fmt: skip
     """Fit parameters and strengths of recordings of one instrument, relinearised up to ``RELINEARISED`` times, and anew
     after every exclusion of deviating blocks."""
@@ -76,7 +76,7 @@ def fit_motion(
     where = places(sides, wanted)
     points = [side.start for side in sides] if before is None else before.points
     strengths = np.tile(TYPICAL, (len(sides), 1)) if before is None else before.fitted.strengths
-    problems = _problems(sides, points, where, wider, block_s)
+    problems = _problems(sides, points, where, wider)
     turn = rounds = 0
     is_new = True
     while turn < (RELINEARISED if before is None else 1):
@@ -93,14 +93,14 @@ def fit_motion(
             replace(point, lost_s=np.append(point.lost_s, one), slow=slow_error(side, problem, s, mean))
             for side, point, problem, s, one in zip(sides, points, problems, strengths, lost, strict=True)
         ]
-        problems = _problems(sides, points, where, wider, block_s)
+        problems = _problems(sides, points, where, wider)
         height = at_the_point(problems, strengths)
         for shorter in SHORTER:
             ahead = [
                 side.moved(point, {name: shorter * side.sigma(name, wider) * mean[at] for name, at in own.items()})
                 for side, point, own in zip(sides, points, where, strict=True)
             ]
-            there = _problems(sides, ahead, where, wider, block_s)
+            there = _problems(sides, ahead, where, wider)
             if at_the_point(there, strengths) > height:
                 points, problems = ahead, there
                 break
@@ -129,10 +129,9 @@ def slow_error(side: Beside, problem: Problem, strengths: FloatArray, mean: Floa
 
 
 def _problems(
-    sides: list[Beside], points: list[Point], where: list[dict[str, IntArray]], wider: Mapping[str, float],
-    block_s: float = BLOCK_S,
-) -> list[Problem]:  # fmt: skip
-    return [side.problem(point, own, wider, block_s) for side, point, own in zip(sides, points, where, strict=True)]
+    sides: list[Beside], points: list[Point], where: list[dict[str, IntArray]], wider: Mapping[str, float]
+) -> list[Problem]:
+    return [side.problem(point, own, wider) for side, point, own in zip(sides, points, where, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,24 +7,23 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.likelihood import STRENGTHS
-from trihedron.estimate.reference.motion import MotionFit, fit_motion
+from trihedron.estimate.reference.motion import MotionFit
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import chdtrc, chdtri
+from trihedron.probability import chdtri
 from trihedron.ranges import edges_of
 from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
 WHITE, WORLD, BODY = (STRENGTHS.index(one) for one in ("white", "world", "body"))
-FINE_S, COARSE = 0.1, 4.0
-"""Block length [s] whose differences show noise from some 0.1 to 5 Hz; block length [s] of a second estimate of S."""
+FINE_S = 0.1
+"""Block length [s] whose differences show noise from some 0.1 to 5 Hz."""
 SQUARE = np.radians(0.01)
 """No mounting is accurate to 0.01°: a smaller angle means that the reference's body frame is the gyro's."""
 QUIET_PARTS = 50
 """The quietest 1/50 of the log gives an upper limit of the static noise."""
 QUIETER = 0.8
 """Ratio of the difference's noise, which contains the gyro's, to static noise below which the two are dependent."""
-CERTAIN = 1e-4
 
 
 def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
@@ -71,12 +70,6 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
     angle, sigma = float(np.arccos(cosine)), float(np.sqrt(np.trace(change.tilt @ cov @ change.tilt.T) / 3.0))
     if angle < SQUARE + sigma and sigma < SQUARE:
         out.append(Sign("mounted-without-error", angle, sigma))
-    coarse = fit_motion([side], block_s=COARSE)
-    change_S = coarse.value(0, "S") - found.value(k, "S")
-    both = coarse.covariance(0, ("S",)) + found.covariance(k, ("S",))
-    far = float(change_S @ np.linalg.solve(both, change_S))
-    if chdtrc(9.0, far) < CERTAIN:
-        out.append(Sign("S-depends-on-duration", far, 9.0))
     return tuple(out)
 
 
@@ -151,7 +144,6 @@ def remarks(result: AgainstReference, is_turned: bool) -> Iterator[Finding]:
             is_quiet="quieter-than-gyro" in seen,
             is_square="mounted-without-error" in seen,
             angle_rad=seen.get("mounted-without-error", float("nan")),
-            varies="S-depends-on-duration" in seen,
         )
     if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
         rows = error.rows + error.rows_left_out

@@ -16,8 +16,7 @@ from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
-from trihedron.records.calibration import Calibration, FitQuality
-from trihedron.records.segments import Segments
+from trihedron.records import Calibration, FitQuality, Segments
 from trihedron.sensor_model import norms
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL

@@ -8,8 +8,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Recording, Segments
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise

@@ -22,10 +22,7 @@ from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted,
 from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
-from trihedron.records.calibration import Calibration, SensorCalibration
-from trihedron.records.finding import Finding
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 
 
 def calibrate_moves(
@@ -45,10 +42,6 @@ def calibrate_moves(
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
     found = solved(log, nominal_scale)
     return in_frame_of(accelerometer, found), found.findings
-
-
-HIDDEN_S = 0.01 * 2.0 ** np.arange(7)
-"""Rotations below the LSB that are tried, in seconds at a rate of one LSB: a support settles in tenths of a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +81,8 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     """
     measured = measure_moves(log.recording, log.segments, log.accelerometer)
     near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
-    found = _with_hidden_turns(log, _fitted(log, measured, near), near)
-    measured, solution, seen = found.measured, found.solution, found.seen
+    found = _fitted(log, measured, near)
+    solution, seen = found.solution, found.seen
     shown = solution.as_read(measured)
     left_out = held_out(shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
@@ -154,27 +147,6 @@ def _denied(found: _Fit) -> BoolArray:
     distance = np.einsum("mi,mij,mj->m", residual, np.linalg.inv(covariance), residual)
     out: BoolArray = distance > chdtri(2, FALSE_ALARM / len(distance))
     return out
-
-
-def _with_hidden_turns(log: Log, plain: _Fit, near: Near) -> _Fit:
-    """The fit with the variance of a rotation below the LSB, as of a settling support, in every move, by likelihood.
-
-    Unchanged where lost samples may explain the tilt errors as well: the scale would have to bear these.
-    """
-    measured = plain.measured
-    if not np.any(measured.is_undithered) or _losses(log, plain).possible > 0.0:
-        return plain
-    known = np.zeros(measured.rate.shape) if measured.reading_variance is None else measured.reading_variance
-    best, likeliest = measured, plain.solution.core.log_marginal
-    for hidden_s in HIDDEN_S:
-        variance = known.copy()
-        variance[measured.edges[:, 1] - 2] += (hidden_s / measured.nominal_step_s * measured.quantum.max()) ** 2
-        tried = replace(measured, reading_variance=variance)
-        found = solve_session(log.observed(tried, plain.used, near), *near).core.log_marginal
-        if found <= likeliest:
-            break
-        best, likeliest = tried, found
-    return plain if best is measured else _fitted(log, best, near)
 
 
 def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:

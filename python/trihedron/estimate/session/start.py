@@ -13,9 +13,7 @@ from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
-from trihedron.records.calibration import SensorCalibration
-from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
+from trihedron.records import Recording, Segments, SensorCalibration
 from trihedron.sensor_model import reframing
 from trihedron.transforms import cross_matrix
 from trihedron.units import rate_to_si
@@ -54,10 +52,6 @@ class Log:
     def carried(self, measured: MoveMeasurements, near: Near) -> Carried:
         """Tilt errors of the moves by S and b of the accelerometer and S of the gyro."""
         return carried(measured, self.anchors_s(measured), *near)
-
-    def usual_deg(self, measured: MoveMeasurements, near: Near) -> float:
-        """Median of these tilt errors as of :func:`usual_deg`."""
-        return usual_deg(self.carried(measured, near).angle_deg, measured, *near[:2])
 
 
 def lower(S: FloatArray, b: FloatArray) -> Near:
@@ -98,16 +92,7 @@ def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given."""
     if np.all(measured.is_lost):
         raise InputError("the gyro clipped in every move: turn more slowly or set a wider range")
-    first = starts(log.recording, measured, log.accelerometer, nominal)
-    found = _nearest(log, measured, first)
-    if nominal is not None or rate_to_si(log.recording.gyroscope_unit) is not None:
-        return found
-    missed = log.usual_deg(measured, found)
-    again = turned_starts(log, measured, first[0]) if missed > ASTRAY_DEG else None
-    if again is None:
-        return found
-    other = _nearest(log, measured, again)
-    return other if log.usual_deg(measured, other) < missed else found
+    return _nearest(log, measured, starts(log.recording, measured, log.accelerometer, nominal))
 
 
 def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
@@ -144,10 +129,6 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
 
 FEWEST_MOVES = 3
 """Fewest moves: S has nine elements, and a move determines three at most."""
-LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
-"""Largest angle tried for the longest rotation, and the step between angles: a fit converges from 45° off."""
-MOST_TRIED = 6
-"""Number of initial scales: neighbours of the best one, and those that differ by a whole turn."""
 
 
 def scale_matrix(nominal_scale: FloatArray | float) -> FloatArray:
@@ -222,26 +203,6 @@ def starts(
             "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
         )
     return np.ascontiguousarray(np.stack(found))
-
-
-def turned_starts(log: Log, measured: MoveMeasurements, linear: FloatArray) -> FloatArray | None:
-    """Initial scales (k, 3, 3) with the least tilt errors among scales equal on all axes; ``None`` with too few moves.
-
-    In moves of tenths of a second, through hundreds of degrees, accelerations exceed gravity: the ``linear`` start then
-    fails. The axes are tried parallel to the accelerometer's, and rotated as those of the ``linear`` start.
-    """
-    longest = 0.0
-    for (a, b), (before, after) in zip(measured.edges, measured.links, strict=True):
-        rate = measured.rate[a:b] - 0.5 * (measured.bias[before] + measured.bias[after])
-        longest = max(longest, float(np.nansum(np.linalg.norm(rate, axis=1))) * measured.nominal_step_s)
-    if np.count_nonzero(~measured.is_lost) < FEWEST_MOVES or longest == 0.0:
-        return None
-    left, _, right = np.linalg.svd(linear)
-    angles = np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
-    tried = [(angle / longest) * turn for turn in (np.eye(3), left @ right) for angle in angles]
-    S_a, b_a = log.accelerometer.S, log.accelerometer.b
-    missed = [log.usual_deg(measured, (S_a, b_a, S)) for S in tried]
-    return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
 
 
 _ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])

@@ -11,7 +11,6 @@ group's mean depends on the unknown σ_u: (1) is averaged over the distribution 
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -39,7 +38,7 @@ def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
         between = spread_between(values, own, groups)
         mean = common_mean(values, own, groups, within, between)
         own_std = float(np.sqrt(np.median(own)))
-        out.append(Repeated(parameter, mean.value, mean.std, mean.half_width, within, between, own_std))
+        out.append(Repeated(parameter, *mean, within, between, own_std))
     return tuple(out)
 
 
@@ -72,15 +71,6 @@ QUANTILES = 60
 than 1 %."""
 BISECTIONS = 60
 """Bisections of the interval of ln σ²: the result is exact to rounding."""
-
-
-@dataclass(frozen=True)
-class Mean:
-    """``value`` with its standard uncertainty, and half the width of its interval at :data:`LEVEL`."""
-
-    value: float
-    std: float
-    half_width: float
 
 
 def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
@@ -138,15 +128,16 @@ def spread_of_next(spread: Spread | None) -> float:
 
 def common_mean(
     values: FloatArray, variances: FloatArray, groups: Sequence[object], within: Spread | None, between: Spread | None
-) -> Mean:
-    """μ with an interval that accounts for the number of groups (Hartung and Knapp 2001).
+) -> tuple[float, float, float]:
+    """μ, its standard uncertainty, and half the width of its interval at :data:`LEVEL`, which accounts for the number
+    of groups (Hartung and Knapp 2001).
 
     The weighted mean of group means; its variance is that of their scatter about it, at least the stated one.
     """
     if within is None:
         value = float(np.average(values, weights=1.0 / variances))
         std = float(np.sqrt(1.0 / np.sum(1.0 / variances)))
-        return Mean(value, std, -stdtrit(max(len(values), 2), 0.5 - LEVEL / 2.0) * std)
+        return value, std, -stdtrit(max(len(values), 2), 0.5 - LEVEL / 2.0) * std
     members = _members(groups)
     if between is None:
         level, variance = values, variances + within.sd**2
@@ -158,7 +149,7 @@ def common_mean(
     dof = len(level) - 1
     scatter = float(np.sum(weights * (level - value) ** 2)) / dof
     std = float(np.sqrt(max(scatter, 1.0) / np.sum(weights)))
-    return Mean(value, std, -stdtrit(dof, 0.5 - LEVEL / 2.0) * std)
+    return value, std, -stdtrit(dof, 0.5 - LEVEL / 2.0) * std
 
 
 def _chi_square(above: Iterable[float], dof: int) -> FloatArray:

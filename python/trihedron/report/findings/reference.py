@@ -11,8 +11,7 @@ ENTRIES = {
     (Code.REFERENCE_NOT_INDEPENDENT, "", WARNING): Words(
         "The reference is not independent of this gyro"
         "{is_quiet:?: it follows the gyro's own noise|}"
-        "{is_square:?: it lies within {angle_rad:.2g deg} of the gyro's axes|}"
-        "{varies:?: S changes with the time over which attitude is integrated|}.",
+        "{is_square:?: it lies within {angle_rad:.2g deg} of the gyro's axes|}.",
         "An attitude computed with this unit's own readings (a filter or smoother over camera, tracker and IMU).",
         "Take S and b as confirmed by it, not as measured; use the tracker's own poses to measure them.",
     ),
