@@ -1,10 +1,13 @@
 """Method 2 for gyros: recovery, honesty, observability."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import trihedron
+from small_session import log_text, rows_of, simulated
 from trihedron.estimate.gyroscope.findings import handedness
 from trihedron.estimate.session.solved import calibrate_moves
 from trihedron.records import FindingCode, SensorCalibration, Severity
@@ -95,7 +98,7 @@ def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_rep
         (np.diag([-1, 1, 1]), np.eye(3), "accelerometer X points against gyro X"),
         (SWAP, np.eye(3), "accelerometer Y and Z are exchanged"),
         (np.eye(3), SWAP, "gyro Y and Z are exchanged"),
-        (np.eye(3), np.eye(3)[:, [1, 2, 0]], "other axes"),
+        (np.eye(3), np.eye(3)[:, [1, 2, 0]], "gyro x, y and z turn about accelerometer"),
     ],
 )
 def test_axes_that_are_reversed_or_exchanged_are_named(accelerometer, gyro, said):
@@ -108,6 +111,20 @@ def test_axes_that_are_reversed_or_exchanged_are_named(accelerometer, gyro, said
     if np.count_nonzero(accelerometer - np.diag(np.diag(accelerometer))) == 0:
         stated = [one.seen for one in handedness(gyro * 1e-4, accelerometer * 2.0)]
         assert bool(stated) == bool((accelerometer != gyro).any())
+
+
+@pytest.mark.parametrize(("sensor", "order"), [(0, [1, 0, 2]), (1, [0, 2, 1]), (1, [1, 2, 0])])
+def test_columns_in_another_order_are_mended_by_the_columns_that_are_named(tmp_path, sensor, order):
+    table = rows_of(simulated(hand_session(n_poses=14, pose_s=2.0, move_s=1.0)))
+    columns = 1 + 3 * sensor + np.arange(3)
+    table[:, columns] = table[:, columns[order]]
+    log = tmp_path / "log.csv"
+    log.write_text(log_text(table))
+    found = trihedron.calibrate(trihedron.read(log), gravity_m_s2=9.80665)
+    said = next(one for one in found.findings if one.code is FindingCode.LEFT_HANDED)
+    mapping = re.search(r"columns=\"([^\"]*)\"", said.action)[1]
+    mended = trihedron.calibrate(trihedron.read(log, columns=mapping), gravity_m_s2=9.80665)
+    assert FindingCode.LEFT_HANDED not in codes(mended.findings)
 
 
 def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():

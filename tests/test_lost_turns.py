@@ -9,7 +9,7 @@ from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from diagnosed_session import unit_of
-from trihedron import calibrate
+from trihedron import calibrate, extend
 from trihedron.estimate.gyroscope.lost_samples import could_be_remade, missing_samples
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.segment import segment_recording
@@ -106,3 +106,22 @@ def test_several_samples_lost_at_a_time_are_counted_at_the_joints_that_show_as_m
         beyond += found.numbers["lost_share"] - is_lost.mean()
         variance += found.numbers["sigma_lost_share"] ** 2
     assert abs(beyond) < 3.0 * np.sqrt(variance)
+
+
+def test_losses_that_the_fit_puts_back_leave_its_scales_trusted_and_right():
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=16, pose_s=3.0, move_s=2.0))
+    whole, truth = simulate(scenario, 3)
+    segments = segment_recording(whole)
+    middles = [(move.start + move.stop) // 2 for move in segments.moves[1::3]]
+    kept = np.setdiff1d(np.arange(whole.n_samples), [k + i for k in middles for i in range(3)])
+    log = Recording.from_arrays(
+        None, whole.accelerometer[kept], whole.gyroscope[kept],
+        rate_hz=whole.rate_hz, accelerometer_unit="counts", gyroscope_unit="counts",
+    )  # fmt: skip
+    plain = calibrate(log, gravity_m_s2=truth.gravity_m_s2)
+    assert FindingCode.SAMPLES_LOST in {one.code for one in plain.findings if one.severity is Severity.SERIOUS}
+    found = extend(plain).calibration
+    assert found.is_trustworthy
+    z = (found.gyroscope.S - truth.gyroscope_S) / found.gyroscope.sigma_S
+    # Nine scales and cross-axis terms: the largest is above 3.6 standard deviations in one of 350.
+    assert np.abs(z).max() < 3.6

@@ -103,7 +103,9 @@ def test_several_logs_are_all_named_in_a_command_of_another_verb():
 
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
     weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
-    effect = SimpleNamespace(id="disturbed-pose", confounded_with=(), model={"applies_to_other_recordings": False})
+    effect = SimpleNamespace(
+        id="disturbed-pose", confounded_with=(), held_out=(), model={"applies_to_other_recordings": False}
+    )
     found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), domains=(), remaining=())
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
@@ -114,7 +116,9 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
 
 def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
     lost = Finding(FindingCode.LOSSES_POSSIBLE, Severity.SERIOUS, "Seen.", "", "Record again.")
-    effect = SimpleNamespace(id="gyro-g-sensitivity", confounded_with=(), model={"applies_to_other_recordings": True})
+    effect = SimpleNamespace(
+        id="gyro-g-sensitivity", confounded_with=(), held_out=(), model={"applies_to_other_recordings": True}
+    )
     moves = SimpleNamespace(domain="moves", disagrees=False)
     found = SimpleNamespace(
         verdict="missing-physics", parameters=(), effects=(effect,), remaining=(moves,),
@@ -134,3 +138,19 @@ def test_a_log_that_was_excluded_is_not_in_the_next_command():
     said = filled("Store it: `... -o calibration.json`; use it: `trihedron apply FILE LOG`.")
     assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said
     assert "calibration.json good.csv`" in said
+
+
+def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
+    effect = SimpleNamespace(
+        id="timing-jitter", confounded_with=(), held_out=(), model={"applies_to_other_recordings": False}
+    )
+    own = SimpleNamespace(findings=(), gyroscope=None, accelerometer=SimpleNamespace(quality=None))
+    domain = SimpleNamespace(domain="moves", disagrees=True)
+    found = SimpleNamespace(
+        verdict="missing-physics", parameters=(), effects=(effect,), remaining=(), domains=(domain,), calibration=own
+    )
+    for rms, is_first in ((1.2e-3, False), (5e-3, True)):
+        own.accelerometer.quality = SimpleNamespace(rms=1e-3, floor=1e-3, held_out_rms=rms)
+        said = next_step_in_words(found)
+        assert said.startswith("Against timing jitter") == is_first
+        assert ("--extended" in said) == is_first

@@ -5,11 +5,14 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
+from small_session import rows_of as table_of
+from small_session import simulated
 from test_read import HEADER, codes, finding, readings, write
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.read import ReadError, read_recording
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
+from trihedron.simulate import hand_session
 from trihedron.units import AccelerationUnit, RateUnit
 
 N = 4000
@@ -89,6 +92,32 @@ def test_a_sensor_slower_than_its_log_and_a_frozen_channel_are_found_with_their_
     stuck = finding(read(tmp_path, table), FindingCode.STUCK_VALUES)
     assert stuck.numbers["axis"] == (column - 1) % 3
     assert (stuck.numbers["longest_run"], stuck.numbers["sample"]) == (100, 1500)
+
+
+@pytest.mark.parametrize("column", [1, 3, 4, 6])
+@pytest.mark.parametrize("kind", ["noise", "half"])
+def test_a_channel_that_does_not_follow_the_motion_is_serious_and_named(tmp_path, column, kind):
+    table = table_of(simulated(hand_session(n_poses=12, pose_s=2.0, move_s=1.0)))
+    half = len(table) // 2
+    if kind == "noise":
+        noise = np.std(np.diff(table[:100, column])) / np.sqrt(2.0)
+        dither = noise * np.random.default_rng(3).standard_normal(len(table))
+        table[:, column] = np.rint(np.median(table[:, column]) + dither)
+    else:
+        table[half:, column] = table[half, column]
+    stuck = finding(read(tmp_path, table), FindingCode.STUCK_VALUES)
+    assert stuck.severity is Severity.SERIOUS
+    assert stuck.numbers["axis"] == (column - 1) % 3
+
+
+def test_a_turn_about_one_axis_leaves_the_other_gyro_channels_free_to_read_noise(tmp_path):
+    # Gravity turns in the plane of X and Y, by a rotation about Z that gyro Z reads.
+    rng, t = np.random.default_rng(3), np.arange(N) / 100.0
+    angle = np.cumsum(np.where((t % 8) > 4, 0.5, 0.0)) / 100.0
+    force = 9.8 * np.column_stack([np.sin(angle), np.cos(angle), np.zeros(N)])
+    rate = np.column_stack([np.zeros((N, 2)), np.where((t % 8) > 4, 0.5, 0.0)])
+    table = np.column_stack([t, force + 0.02 * rng.standard_normal((N, 3)), rate + 1e-3 * rng.standard_normal((N, 3))])
+    assert FindingCode.STUCK_VALUES not in codes(read(tmp_path, table))
 
 
 def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):

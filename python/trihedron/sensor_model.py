@@ -35,12 +35,12 @@ def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     return inverse, -inverse @ b
 
 
-def exchanged_and_reversed(S: FloatArray) -> tuple[list[int], list[int]]:
-    """Sensor axes nearest to another body axis than their own, and those against theirs; none where two share one."""
+def order_and_reversed(S: FloatArray) -> tuple[list[int], list[int]]:
+    """The body axis nearest to each sensor axis, and the sensor axes against theirs; as named where two share one."""
     order = np.argmax(np.abs(S), axis=0)
     if len(set(order.tolist())) < 3:
-        return [], []
-    return np.flatnonzero(order != np.arange(3)).tolist(), np.flatnonzero(S[order, range(3)] < 0.0).tolist()
+        return [0, 1, 2], []
+    return order.tolist(), np.flatnonzero(S[order, range(3)] < 0.0).tolist()
 
 
 def other_form_jacobian(S: FloatArray, b: FloatArray) -> FloatArray:

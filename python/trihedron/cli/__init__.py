@@ -19,7 +19,7 @@ import typer
 
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.output import silence, spell_out
-from trihedron.cli.run import begin
+from trihedron.cli.run import begin, with_commands
 from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
 from trihedron.sanitise import escaped
@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         is_in_words = isinstance(error, Exception) or type(error).__name__ == "PanicException"
         if not is_in_words or os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
-        return _reject(_sentence(error))
+        return _reject(with_commands(_sentence(error)))
 
 
 def _sentence(error: BaseException) -> str:

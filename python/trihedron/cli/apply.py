@@ -6,7 +6,7 @@ import typer
 
 from trihedron.cli.options import LogSource, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_json
-from trihedron.cli.run import in_text, note_file
+from trihedron.cli.run import note_file, with_commands
 from trihedron.cli.streamed import apply_stream
 
 OPTIONS = {
@@ -51,6 +51,6 @@ def apply(
         say(f"{done.n_samples} samples{clock}: {output}")
     for finding in done.findings:
         if finding not in recording.findings and finding.severity is not Severity.SERIOUS:
-            say(in_text(finding.seen if finding.severity is Severity.NOTE else str(finding)))
+            say(with_commands(finding.seen if finding.severity is Severity.NOTE else str(finding)))
     write_json(lambda: recording_record(done), json, force=force)
     leave(done.findings)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
-from trihedron.cli.run import in_text, with_arguments, with_provenance
+from trihedron.cli.run import with_arguments, with_commands, with_provenance
 from trihedron.files.output import check_free, check_report, write_whole
 from trihedron.sanitise import escaped
 
@@ -226,7 +226,7 @@ def leave(findings: Iterable[Finding], *, is_shown: bool = False) -> None:
         why = ", for the reason above." if is_seen else f": {opening(reasons[0].seen)}.{more}"
         say(f"trihedron: not to be trusted{why}")
         if not is_shown and reasons[0].action:
-            say(f"→ {in_text(reasons[0].action)}")
+            say(f"→ {with_commands(reasons[0].action)}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)
 
 

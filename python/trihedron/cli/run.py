@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
-    from trihedron.report.document import Document, Section
+    from trihedron.report.document import Block, Document
 
-_COMMAND = re.compile(r"`[^`]+`")
+_COMMAND = re.compile(r"`(?:trihedron |\.\.\. )[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output")
 _SHOWN = ("--json", "--report", "--full", "--force")
 _WRITTEN = ("-o", "--output", "--updated", "--improved")
@@ -127,8 +127,9 @@ def _word(value: Any) -> str:
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next
-    replaced by those of this run; where nothing was stored, ``stored_by`` is the command that does."""
+    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next,
+    and in the actions of findings, replaced by those of this run; where nothing was stored, ``stored_by`` is the
+    command that does."""
     from trihedron.records import FindingCode
 
     said, what_next = document.next_step, document.what_next
@@ -141,25 +142,23 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
             said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
             what_next = replace(document, next_step=said).what_next
-    return replace(document, next_step=in_text(what_next), sections=tuple(map(_in_section, document.sections)))
+    sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
+    return replace(document, next_step=with_commands(what_next), sections=sections)
 
 
-def in_text(text: str) -> str:
-    """A sentence with its commands filled in."""
+def with_commands(text: str) -> str:
+    """The text with its commands for the log of this run."""
     return _COMMAND.sub(lambda found: _filled(found[0]), text)
 
 
-def _in_section(section: Section) -> Section:
-    """The section with the commands of its findings filled in."""
+def _with_actions(block: Block) -> Block:
     from trihedron.report.document import FindingList
 
-    blocks = tuple(
-        FindingList(tuple(replace(one, seen=in_text(one.seen), action=in_text(one.action)) for one in block.findings))
-        if isinstance(block, FindingList)
-        else block
-        for block in section.blocks
+    if not isinstance(block, FindingList):
+        return block
+    return FindingList(
+        tuple(replace(one, seen=with_commands(one.seen), action=with_commands(one.action)) for one in block.findings)
     )
-    return replace(section, blocks=blocks)
 
 
 def _filled(command: str) -> str:

@@ -18,6 +18,8 @@ from trihedron.probability import betaincinv, fdtrc, ndtr
 from trihedron.records.fleet import EffectCount, FleetLog, FleetSummary, MixedLogs, Outlier
 from trihedron.records.sessions import PARAMETERS, Session
 
+MOST_NAMED = 4
+"""Most logs that are named among those that were not compared."""
 FEWEST = 4
 """Fewest devices for outliers: with three, the spread of the others would be from two."""
 ONE_UNIT = 0.01
@@ -81,6 +83,8 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
         passed_over,
         mixed,
         farthest,
+        len(sessions),
+        len(by_device),
     )
     return FleetResult(folder, tuple(rows), summary)
 
@@ -119,14 +123,21 @@ def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], s
     taken = [
         row for row in sound if (row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) == chosen
     ]
-    doubtful = sum(row["status"] == "done" for row in rows) - len(sound)
+    doubtful = [row for row in rows if row["status"] == "done" and not row.get("is_trustworthy")]
+    unlike = [row for row in sound if row not in taken]
     words = []
     if doubtful:
-        words.append(f"{doubtful} whose own calibration is not to be trusted")
-    if len(sound) > len(taken):
-        words.append(f"{len(sound) - len(taken)} in other units or without the same sensors")
+        words.append(f"{len(doubtful)} whose own calibration is not to be trusted ({_names(doubtful)})")
+    if unlike:
+        words.append(f"{len(unlike)} in other units or without the same sensors ({_names(unlike)})")
     order = sorted(range(len(taken)), key=lambda k: (taken[k].get("start_epoch_s") or 0.0, k))
     return [taken[k] for k in order], " and ".join(words)
+
+
+def _names(rows: Sequence[dict[str, Any]]) -> str:
+    """``unit3: log1.csv, unit4: log0.csv, ...``."""
+    more = ", ..." if len(rows) > MOST_NAMED else ""
+    return ", ".join(f"{row['serial']}: {row['name']}" for row in rows[:MOST_NAMED]) + more
 
 
 def _session(row: dict[str, Any]) -> Session:

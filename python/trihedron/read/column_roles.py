@@ -23,14 +23,17 @@ def columns_of_words(table: Table, columns: Columns) -> Iterator[Finding]:
             yield Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=label, example=cell)
 
 
+def numbers_of(columns: Columns) -> dict[str, float]:
+    """Column numbers (from 1) of time and readings by role."""
+    triads = {"a": columns.accelerometer or (), "g": columns.gyroscope or ()}
+    time = {} if columns.time is None else {"time": columns.time + 1.0}
+    return time | {f"{s}{axis}": c + 1.0 for s, triad in triads.items() for axis, c in zip("xyz", triad, strict=False)}
+
+
 def mapping_of(columns: Columns, gyroscope: Triad | None = None) -> str:
     """The value of ``--columns`` for time and both sensors; ``gyroscope`` is used where ``columns`` has no gyro."""
-    triads = {"a": columns.accelerometer, "g": columns.gyroscope or gyroscope}
-    time = [] if columns.time is None else [f"time={columns.time + 1}"]
-    readings = [
-        f"{s}{axis}={c + 1}" for s, triad in triads.items() for axis, c in zip("xyz", triad or (), strict=bool(triad))
-    ]
-    return ",".join([*time, *readings])
+    said = numbers_of(replace(columns, gyroscope=columns.gyroscope or gyroscope))
+    return ",".join(f"{role}={column:.0f}" for role, column in said.items())
 
 
 def rivals_of(table: Table, columns: Columns) -> Iterator[Finding]:
@@ -67,4 +70,5 @@ def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
         roles=roles,
         has_others=bool(rest),
         others=rest[:24],
+        numbers=numbers_of(columns),
     )

@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
+from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
 from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
@@ -166,6 +167,8 @@ def audited(
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
         findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
+        if name == "accelerometer":
+            findings += audit_motionless_accelerometer(windows, facts.of(name).step)
         findings += audit_steps(name, facts.of(name), windows, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
         progress(1.0, f"read {len(time_s)} samples")
@@ -222,6 +225,10 @@ def _judged_gyro(
         )
     elif clear is not None and acc is not None:
         changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
+    if clear is not None and clear.motionless:
+        is_one_file = sensors.columns.gyroscope is not None
+        without_gyro = mapping_of(replace(sensors.columns, gyroscope=None)) if is_one_file else ""
+        changed += audit_motionless_gyro(clear.motionless, without_gyro)
     return Judged(judged.unit, (*judged.findings, *changed), fits)
 
 

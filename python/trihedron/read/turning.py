@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.units import RateUnit, rate_to_si
 
 USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
@@ -28,6 +28,9 @@ PARTS, _FEWEST = 4, 50
 """Parts of the log, each of which must fit with the same axes, and the smallest number of blocks to test one."""
 _AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
 """A part has other axes if they correlate so well, and the axes of the whole log leave 4 times the unexplained part."""
+_STILL, _ONE_SIDED = 2.0, 4.0
+"""A channel is motionless if its blocks scatter less than twice as much as their differences imply, and of the change
+of gravity that the others leave, 4 times as much is a rotation about its axis as is not."""
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
 _MOST_TURN_RAD = 0.7
@@ -45,7 +48,8 @@ class Turning:
     """The gyro's ``scale`` [rad/s per unit] from the rotation of gravity, its standard uncertainty, the correlation of
     gravity's change with the gyro's prediction, and the number of blocks. ``odd_part`` (from 1; 0: none) of ``PARTS``
     fits only with other axes; ``odd_correlation`` is that with its own axes and that with those of the whole log.
-    ``clock_is_weighed``: the unit of whole-numbered timestamps was inferred, not stated."""
+    ``motionless`` (from 0) are gyro axes that read nothing while gravity rotates about them. ``clock_is_weighed``: the
+    unit of whole-numbered timestamps was inferred, not stated."""
 
     scale: float
     sigma: float
@@ -53,6 +57,7 @@ class Turning:
     n: int
     odd_part: int = 0
     odd_correlation: tuple[float, float] = (0.0, 0.0)
+    motionless: tuple[int, ...] = ()
     clock_is_weighed: bool = False
 
     @property
@@ -104,7 +109,9 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     if not usable.any():
         return None
     usable &= (speed > np.median(speed[usable])) & (np.linalg.norm(seen, axis=1) < _MOST_TURN_RAD)
-    return _fitted(mean_a[usable], mean_w[usable], seen[usable], length / rate_hz)
+    # Motion lasts longer than a block, noise does not.
+    is_noise = np.nanstd(w, axis=0) < _STILL * np.nanstd(np.diff(w, axis=0), axis=0) / math.sqrt(2.0)
+    return _fitted(mean_a[usable], mean_w[usable], seen[usable], is_noise, length / rate_hz)
 
 
 @dataclass(frozen=True)
@@ -141,7 +148,7 @@ def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sum
     return _Sums(design.T @ design, design.T @ seen.ravel(), float((seen**2).sum()), len(a))
 
 
-def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> Turning | None:
+def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray, step_s: float) -> Turning | None:
     parts = [
         _sums(*part, step_s)
         for part in zip(np.array_split(a, PARTS), np.array_split(w, PARTS), np.array_split(seen, PARTS), strict=True)
@@ -161,6 +168,9 @@ def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> Tu
     if found is None:
         return None
     turning, axes = found
+    left = seen - turning.scale * step_s * np.cross(a, w @ axes.T)
+    still = [k for k in range(3) if is_noise[k] and len(a) >= _FEWEST and _turns_about(axes[:, k], a, left)]
+    turning = replace(turning, motionless=tuple(still))
     for k, part in enumerate(parts):
         own, shared = part.best(_SIGNED_AXES), part.on(axes)
         others = shared.correlation if shared is not None else 0.0
@@ -169,3 +179,10 @@ def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> Tu
         if 1.0 - others**2 > _MORE_UNEXPLAINED * (1.0 - own[0].correlation ** 2):
             return replace(turning, odd_part=k + 1, odd_correlation=(own[0].correlation, others))
     return turning
+
+
+def _turns_about(axis: FloatArray, a: FloatArray, left: FloatArray) -> bool:
+    """Whether changes ``left`` (n, 3) of the directions a (n, 3) are a rotation about ``axis`` (3,)."""
+    about = np.cross(a, axis)
+    by_it, beside = (float(np.sum(np.sum(left * direction, axis=1) ** 2)) for direction in (about, np.cross(a, about)))
+    return by_it > _ONE_SIDED * beside

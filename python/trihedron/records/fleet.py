@@ -67,7 +67,8 @@ class EffectCount:
 class FleetSummary:
     """Statistics of the fleet. ``repeated`` is the spread between devices and between sessions of one device;
     ``None`` where there are too few logs. ``n_before`` results are from an earlier run. ``farthest`` is the largest
-    deviation that makes no outlier; ``None`` where there are too few devices to tell."""
+    deviation that makes no outlier; ``None`` where there are too few devices to tell. ``n_compared`` logs of
+    ``n_devices_compared`` devices are in ``repeated`` and ``outliers``, ``passed_over`` says which others are not."""
 
     logs: tuple[FleetLog, ...]
     n_before: int
@@ -80,3 +81,5 @@ class FleetSummary:
     passed_over: str = ""
     mixed: tuple[MixedLogs, ...] = ()
     farthest: Outlier | None = None
+    n_compared: int = 0
+    n_devices_compared: int = 0

@@ -48,9 +48,13 @@ SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
 
 def calibration_report(
-    calibration: Calibration, segments: Segments | None = None, recording: Recording | None = None
+    calibration: Calibration,
+    segments: Segments | None = None,
+    recording: Recording | None = None,
+    errors_beside: str = "",
 ) -> Document:
-    """Lay out a calibration; with its segments and recording also their tables and figures."""
+    """Lay out a calibration; with its segments and recording also their tables and figures. ``errors_beside`` are the
+    errors in words of one whose fit is to a reference."""
     sections = [
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
@@ -66,7 +70,7 @@ def calibration_report(
     return Document(
         title="Calibration",
         subtitle=calibration.recording_source or "no recording named",
-        verdict=verdict(calibration),
+        verdict=verdict(calibration, errors_beside),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         headlines=tuple(_headlines(calibration)),
@@ -138,9 +142,9 @@ def errors_in_words(calibration: Calibration) -> str:
     return f"{listed(said)}, {HELD_OUT}" if said else ""
 
 
-def verdict(calibration: Calibration) -> str:
+def verdict(calibration: Calibration, errors_beside: str = "") -> str:
     """The verdict: usable or not, how far beyond noise, a gyro bias that drifts, the effects of an extended one."""
-    said = errors_in_words(calibration)
+    said = errors_in_words(calibration) or errors_beside
     above = f"{WITHIN}{said}" if said else "Usable"
     if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
         above += ", for the accelerometer alone"

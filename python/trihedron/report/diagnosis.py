@@ -36,13 +36,12 @@ from trihedron.report.diagnosis_words import (
     rms_in_words,
     size_in_words,
     value_in_words,
-    verdict_in_words,
     where_in_words,
+    whole_verdict,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.effect_charts import alike, effect_chart, rest_panels
 from trihedron.report.findings import findings_block
-from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
 from trihedron.report.reference import beside_reference, hidden_by
@@ -105,9 +104,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
-        verdict=verdict_in_words(diagnosis)
-        + _distrust(diagnosis)
-        + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
+        verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),
@@ -127,13 +124,6 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
 def by_reference_alone(diagnosis: Diagnosis) -> bool:
     """Whether the log had too few poses for a diagnosis of its own."""
     return all(one.domain == "rate" for one in diagnosis.domains) and getattr(diagnosis, "reference", None) is not None
-
-
-def _distrust(diagnosis: Diagnosis) -> str:
-    """The first serious finding of the log's own calibration, which the diagnosis began with."""
-    serious = own_serious(diagnosis)
-    whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
-    return "" if serious is None else f" The {whose} is not to be trusted: {opening(serious.seen)}."
 
 
 def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -166,7 +156,10 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         with_them = [_after(diagnosis, d, after.get(d.domain)) for d in diagnosis.domains]
         rows = [(*row[:2], now[0], *row[2:], *now[1:]) for row, now in zip(rows, with_them, strict=True)]
     is_fitted = not getattr(diagnosis, "model_is_given", False)
-    caption = f"Residuals by domain{', in sample' if is_fitted else ''}; χ²/dof is 1 by noise alone"
+    # Where the log determines S and b, a given model is compared with these in a row of its own.
+    is_refitted = not is_fitted and getattr(diagnosis, "updated", None) is not None
+    beside = ", in sample" if is_fitted else ", S and b fitted to this log (model: last row)" if is_refitted else ""
+    caption = f"Residuals by domain{beside}; χ²/dof is 1 by noise alone"
     caption += f", and a residual disagrees below p {plain_number(diagnosis.alpha / len(DOMAINS), 2)}"
     blocks: list[Block] = [Table(head, tuple(rows), caption), *_time_errors(diagnosis)]
     # Parameters that differ have a section of their own.

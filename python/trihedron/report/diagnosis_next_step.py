@@ -3,17 +3,21 @@
 from pathlib import PurePath
 from shlex import quote
 
-from trihedron.records import Severity
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
-from trihedron.report.calibration import errors_in_words
+from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
-from trihedron.report.diagnosis_words import OF_SAMPLES, dependent, named_effects, own_serious
+from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, named_effects, own_serious
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
 
+FOUND = ("missing-physics", "unexplained")
+"""Verdicts with something to do about the readings."""
+FAR = 2.0
+"""Error over noise from which a remedy comes before the use of a calibration."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
 
@@ -22,7 +26,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     """The next action; ``improved`` is the scenario already written with the parameters that differ."""
     use = "Store S and b and use them: `trihedron calibrate LOG -o calibration.json`."
     serious = own_serious(diagnosis)
-    if serious is not None:
+    # An action that runs this diagnosis is done: what it found is next.
+    is_done = diagnosis.verdict in FOUND and serious is not None and "`trihedron diagnose LOG`" in serious.action
+    if serious is not None and not is_done:
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
@@ -38,7 +44,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
         again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
         again += "to the session."
-        return f"{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
+        checked = of_another_device(diagnosis, model)
+        return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
     differs = any(p.significant for p in diagnosis.parameters)
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
     is_file, is_carried = model.endswith(".json"), len(of_session) < len(diagnosis.effects)
@@ -54,14 +61,26 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
+    misread = _misread(diagnosis)
+    first = "" if misread is None else f"{action_in_words(misread)} "
+    # The fit corrects axes, whose finding has an action of its own.
+    of_session = [one for one in of_session if one not in IN_FULL]
+    use = f"Keep using {model}: its parameters agree with this log." if is_file else use
+    if not is_carried and not of_session:
+        return f"{first}{use}{_by_themselves(diagnosis)}"
     if not is_carried:
-        use = f"Keep using {model}: its parameters agree with this log." if is_file else use
-        verb = "is" if len(set(of_session)) == 1 else "are"
-        of_log = f"{capital(ids_in_print(dict.fromkeys(of_session)))} {verb} not corrected in another log."
-        return f"{use} {of_log}{_by_themselves(diagnosis)}{_in_the_next_log(diagnosis)}"
+        remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
+        if remedy and is_file and _disagrees(diagnosis):
+            return f"{first}{remedy} {use}"
+        if remedy and not is_file and _is_far_from_noise(diagnosis):
+            return f"{first}{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
+        of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
+        return " ".join(filter(None, (f"{first}{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
     beside = f", which does not correct {ids_in_print(of_session)} in another log" if of_session else ""
-    return f"{store}{beside}.{_by_themselves(diagnosis)}"
+    said = f"{first}{store}{beside}.{_by_themselves(diagnosis)}"
+    remedy = _in_the_next_log(diagnosis) if _is_far_from_noise(diagnosis) else ""
+    return " ".join(filter(None, (said, remedy)))
 
 
 def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
@@ -75,16 +94,39 @@ def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
 
 
 def _in_the_next_log(diagnosis: Diagnosis) -> str:
-    """What to do about the first effect of this session alone."""
-    advice = ((one.id, experiment(one.id, is_static=False)) for one in diagnosis.effects)
-    return next((f" Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+    """What to do about the first effect of this session alone that biases or rotations show, not a motion's force."""
+    own = [one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings")]
+    own = [one for one in own if one.id not in IN_FULL]
+    shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
+    advice = ((one.id, experiment(one.id, is_static=False)) for one in shown)
+    return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+
+
+def _disagrees(diagnosis: Diagnosis) -> bool:
+    """Whether poses or rotations disagree with the model without effects."""
+    return any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES)
+
+
+def _misread(diagnosis: Diagnosis) -> Finding | None:
+    """The finding of the log's own calibration that axes are not those that their columns name."""
+    own = getattr(diagnosis, "calibration", None)
+    said = () if own is None else [one for one in own.findings if one.code is FindingCode.LEFT_HANDED]
+    return next((one for one in said if one.severity is not Severity.NOTE), None)
+
+
+def _is_far_from_noise(diagnosis: Diagnosis) -> bool:
+    """Whether the calibration without effects is not to be trusted, or its error beyond ``FAR`` times the noise."""
+    own = getattr(diagnosis, "calibration", None)
+    if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
+        return own is not None
+    return any(times > FAR for _, times, is_held in errors_of(own) if is_held)
 
 
 def _by_themselves(diagnosis: Diagnosis) -> str:
     """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
     if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
         return ""
-    if not any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES):
+    if not _disagrees(diagnosis):
         return " S and b may be used without effects: errors of poses and rotations are within noise."
     own = getattr(diagnosis, "calibration", None)
     if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):

@@ -28,7 +28,7 @@ MOST_NUMBERS, MOST_NOISE = 3, 2
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
-_DEFINED = f"a bias is {BIAS}; {TRIAD}"
+_DEFINED = f"a bias is {BIAS}; {TRIAD}; a scale without unit is dimensionless (readings in SI)"
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 
 

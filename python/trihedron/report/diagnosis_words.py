@@ -2,10 +2,11 @@
 
 from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.domains import DomainTest, HeldOut, not_explained
+from trihedron.records.domains import DOMAINS, DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
+from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -34,9 +35,24 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_NAMED = 4
+IN_FULL = ("axis-handedness",)
+"""Effects whose statement names what is wrong in the log: a verdict states it."""
 NOT_JUDGED = "not judged"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
+
+
+def whole_verdict(diagnosis: Diagnosis) -> str:
+    """The verdict, after the first serious finding of the log's own calibration, which the diagnosis began with."""
+    serious, said = own_serious(diagnosis), verdict_in_words(diagnosis)
+    if serious is None:
+        return said
+    whose = "log's own calibration" if getattr(diagnosis, "model_is_given", False) else "calibration without effects"
+    if diagnosis.verdict == "not-testable":
+        return f"{said} The {whose} is not to be trusted: {opening(serious.seen)}."
+    # A fit that is not to be trusted may agree with its own poses.
+    said = "No missing effect is detectable." if diagnosis.verdict == "consistent" else said
+    return f"NOT TO BE TRUSTED, by the {whose}: {opening(serious.seen)}. {said}"
 
 
 def verdict_in_words(diagnosis: Diagnosis) -> str:
@@ -45,7 +61,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = named_effects(diagnosis, "recording")
+    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, IN_FULL)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
@@ -53,13 +69,11 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
-        return _unexplained(diagnosis, (list(ends) or off) if missing else off, missing)
+        named = named_effects(diagnosis, "recording")
+        return _unexplained(diagnosis, (list(ends) or off) if named else off, named)
     if diagnosis.verdict == "not-testable":
-        tested = listed([MEANING[d.domain] for d in diagnosis.domains]) if diagnosis.domains else "nothing"
-        return (
-            f"NOT TESTABLE: this recording has too few poses for a diagnosis (searched for effects: {tested}; none "
-            "found)."
-        )
+        searched = "; no effect was found in what it shows" if diagnosis.domains else ""
+        return f"NOT TESTABLE: this recording has too few poses for a diagnosis{searched}."
     if diagnosis.verdict == "parameters-differ":
         beside = _footnotes(diagnosis) + _not_compared(diagnosis)
         return f"PARAMETERS DIFFER: {listed(numbers)}; no effect is missing{beside}."
@@ -68,10 +82,10 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     still += [
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
-    tail = "".join(f"; {one}" for one in still) or "; nothing else disagrees"
-    said = []
+    tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
+    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in IN_FULL]
     if missing:
-        said.append(f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} missing from the model")
+        said.append(f"the model lacks {listed(missing)}")
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
@@ -86,8 +100,7 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
     text += "effect explains it"
     if named:
-        verbs = "are present, and explain" if len(named) > 1 else "is present, and explains"
-        text += f" ({listed(named)} {verbs} little)"
+        text += f" (found, of little effect: {listed(named)})"
     if diagnosis.relations:
         # Those of the largest relation first.
         names = list(dict.fromkeys(variable_in_print(name) for one in diagnosis.relations for name in one.depends_on))
@@ -100,6 +113,18 @@ def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
 def named_effects(diagnosis: Diagnosis, side: str = "") -> list[str]:
     """Effects of one ``side``, or of both, in words and each once."""
     return list(dict.fromkeys(id_in_print(one.id) for one in diagnosis.effects if side in ("", one.side)))
+
+
+def _untested(diagnosis: Diagnosis) -> str:
+    """A remark where the poses do not determine the model, so that little can disagree with it; else empty."""
+    own = getattr(diagnosis, "calibration", None)
+    seen = None if own is None or own.accelerometer is None else own.accelerometer.observability
+    is_open = seen is not None and seen.rank < seen.n_parameters and not getattr(diagnosis, "model_is_given", False)
+    return "; the poses are too few to test the rest" if is_open else ""
+
+
+def _clause(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
 
 
 def _disagree(subjects: list[str]) -> str:
@@ -156,7 +181,10 @@ def quantity(held: HeldOut) -> str:
 def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
     """Whether a domain agrees; in a log of too few poses χ² of poses is searched for effects, not judged."""
     is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
-    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else "agrees"
+    # A domain of samples agrees by an effect, which the model may have too, where its own test does not.
+    is_by_effect = test.domain in OF_SAMPLES and test.p_value < diagnosis.alpha / len(DOMAINS)
+    agrees = "explained" if is_by_effect else "agrees"
+    return "disagrees" if test.disagrees else NOT_JUDGED if is_open else agrees
 
 
 def follows(diagnosis: Diagnosis, after: DomainTest) -> str:

@@ -20,6 +20,7 @@ CONSEQUENCE = (
     FindingCode.SAME_RECORDING,
     FindingCode.SENSORS_EXCHANGED,
     FindingCode.GRAVITY_MISSING,
+    FindingCode.STUCK_VALUES,
     FindingCode.UNIT_CONTRADICTED,
     FindingCode.TURNTABLE,
     FindingCode.COLUMNS_ASSUMED,
@@ -83,6 +84,12 @@ def action_in_words(finding: Finding) -> str:
 def begins_with(step: str, action: str) -> bool:
     """Whether a next step states an action, whose commands may be filled there."""
     return step[1:].startswith(action[1:].partition("`")[0])
+
+
+def concerns_whole(finding: Finding) -> bool:
+    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck stretches aside."""
+    is_stretch = finding.code is FindingCode.STUCK_VALUES and finding.severity is not Severity.SERIOUS
+    return finding.code in CONSEQUENCE and not is_stretch
 
 
 @dataclass(frozen=True)
@@ -214,7 +221,7 @@ class Document:
             others = (one for one in self.findings if one.severity is Severity.SERIOUS and one.code is not first.code)
             second = next(others, None) if first.code is FindingCode.RATE_ASSUMED else None
             return action if second is None or not second.action else f"{action} Then: {action_in_words(second)}"
-        if first.code not in CONSEQUENCE:
+        if not concerns_whole(first):
             return then
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
         if own is not None and first_step is not None and own[1] == first_step[1]:

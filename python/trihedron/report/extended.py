@@ -17,7 +17,7 @@ from trihedron.report.diagnosis import effect_pictures, effects_blocks, residual
 from trihedron.report.document import Document, Headline, Picture, Section
 from trihedron.report.names import MEANING, ids_in_print
 from trihedron.report.numbers import listed, plain_number, shown, with_unit
-from trihedron.report.reference import beside_reference
+from trihedron.report.reference import beside_reference, errors_beside
 
 FIRST = "static-accel"
 """The domain that is always drawn: gravity error in static poses."""
@@ -29,7 +29,8 @@ NEXT = (
 
 def calibration_result_report(result: CalibrationResult) -> Document:
     """The report of a calibration, with the sections on its reference and on its effects where it has them."""
-    document = calibration_report(result.calibration, result.segments, result.recording)
+    beside = errors_beside((result.reference,) if result.reference else ())
+    document = calibration_report(result.calibration, result.segments, result.recording, beside)
     document = beside_reference(document, result.reference, 1)
     return document if result.diagnosis is None else _with_effects(document, result, result.diagnosis)
 

@@ -4,25 +4,30 @@ import statistics
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
+from shlex import quote
 
 import numpy as np
 
 from trihedron.arrays import BoolArray
-from trihedron.records.finding import FindingCode
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import PARAMETERS, Parameter, Spread
 from trihedron.report.axes import TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
+from trihedron.report.fleet_next_step import (
+    BY_FILE,
+    MOST_NAMED,
+    OPEN,
+    files_of,
+    first_of,
+    is_usable,
+    next_step_of_fleet,
+)
 from trihedron.report.names import axis_in_print, finding_in_print, id_in_print, label_of
-from trihedron.report.numbers import capital, how_many, listed, plain_number, shown
+from trihedron.report.numbers import how_many, listed, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
-MOST_NAMED = 4
-"""Most devices or logs in a sentence, and most parameters in the first picture."""
-BY_FILE = "`... --serial '([^/]+)$'`: one unit a file"
-RATE_ASSUMED = FindingCode.RATE_ASSUMED.value
 VERDICTS = {
     "consistent": "no missing effect is detectable",
     "missing-physics": "physics beyond the linear model",
@@ -30,8 +35,6 @@ VERDICTS = {
     "not-testable": "cannot be tested",
     "parameters-differ": "other parameters",
 }
-OPEN = ("missing-physics", "unexplained")
-"""Verdicts with effects or residuals that the calibration does not include."""
 
 
 def fleet_report(summary: FleetSummary) -> Document:
@@ -44,7 +47,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
-        reasons = tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in bad)
+        reasons = tuple((f"{log.serial}: {log.name}", f"{log.status}: {_reason(log)}") for log in bad)
         sections.append(Section("Logs that were not calibrated", (Facts(reasons),)))
     if mixed:
         sections.append(Section("Logs taken for one device that are not", tuple(_mixed(summary))))
@@ -57,7 +60,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
     if summary.changes:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
-    n_usable = sum(map(_is_usable, summary.logs))
+    n_usable = sum(map(is_usable, summary.logs))
     lead = None
     if n_done:
         caption = "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the "
@@ -68,10 +71,10 @@ def fleet_report(summary: FleetSummary) -> Document:
         caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    verdict = f"{n_usable} of {how_many(n, 'log')} usable, {n_devices}."
+    verdict = f"{n_usable} of {how_many(n, 'log')} usable, of {n_devices}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
-    none = {log.serial for log in summary.logs} - {log.serial for log in summary.logs if _is_usable(log)}
+    none = {log.serial for log in summary.logs} - {log.serial for log in summary.logs if is_usable(log)}
     if none and n_done:
         verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
@@ -79,14 +82,16 @@ def fleet_report(summary: FleetSummary) -> Document:
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
-        named = _first([id_in_print(effect.id) for effect in summary.effects])
+        named = first_of([id_in_print(effect.id) for effect in summary.effects])
         verdict += f" Diagnosis: {listed(found)}{f' ({named})' if named else ''}."
     strays = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if summary.repeated and len(devices) > 1 and not strays:
         verdict += f" {_within(summary)}"
     if strays:
-        verdict += f" {_named(strays)} outside the others."
+        first = summary.outliers[0]
+        what, away = _by(first.parameter, first.deviation)
+        verdict += f" {_named(strays)} outside the others (most: {first.serial}, {what} by {away})."
     if summary.passed_over:
         verdict += f" Not compared: {summary.passed_over}."
     if moved:
@@ -99,7 +104,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections=tuple(sections),
         lead=lead,
         headlines=_headlines(summary),
-        next_step="" if mixed else _next_step(summary, strays, moved),
+        next_step="" if mixed else next_step_of_fleet(summary, strays, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or strays or moved) else None,
     )
 
@@ -110,40 +115,10 @@ def _named(devices: list[str]) -> str:
     return f"{how_many(len(devices), 'device')} ({', '.join(devices[:MOST_NAMED])}{more})"
 
 
-def _next_step(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
-    usable = [log for log in summary.logs if _is_usable(log)]
-    unusable = [log for log in summary.logs if not _is_usable(log)]
-    rates = [_called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
-    again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if RATE_ASSUMED not in log.serious]
-    opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
-    steps = [f"state the units if {_first(moved)} contains several ({BY_FILE})"] if moved else []
-    steps += [f"give --rate for {_first(rates)}"] if rates else []
-    steps += [f"record again, if it was to be a calibration: {_first(again)}"] if again else []
-    steps += [f"see what effects gain in {_first(opened)}: `trihedron diagnose` each"] if opened else []
-    steps += [f"look at {_first(strays)}"] if strays else []
-    steps += ["use each device's own calibration (folder calibrations)"] if usable else []
-    return capital("; ".join(steps)) + "." if steps else ""
-
-
-def _is_usable(log: FleetLog) -> bool:
-    return log.status == "done" and log.is_trustworthy
-
-
-def _called(log: FleetLog, summary: FleetSummary) -> str:
-    """The name of a log, with its device where several have that name."""
-    is_alone = sum(one.name == log.name for one in summary.logs) == 1
-    return log.name if is_alone else f"{log.serial}: {log.name}"
-
-
-def _why(log: FleetLog) -> str:
-    why = finding_in_print(log.serious[0]) if log.serious else "not calibrated"
-    return f" ({why})"
-
-
-def _first(names: list[str]) -> str:
-    """``a, b and 7 more``."""
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more
+def _reason(log: FleetLog) -> str:
+    """Why a log was not calibrated, its command with the path that the sentence begins with."""
+    path, colon, rest = log.reason.partition(": ")
+    return log.reason.replace(" LOG`", f" {quote(path)}`") if colon and path.endswith(log.name) and rest else log.reason
 
 
 def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
@@ -174,7 +149,7 @@ def _largest(spreads: Sequence[Spread]) -> Spread:
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     status = Counter(log.status for log in summary.logs)
     doubtful = [log for log in summary.logs if log.status == "done" and not log.is_trustworthy]
-    facts = [("calibrated", how_many(status["done"], "log"))]
+    facts = [("calibrated", f"{how_many(status['done'], 'log')} of {len(summary.logs)}")]
     if doubtful:
         codes = Counter(code for log in doubtful for code in log.serious).most_common()
         why = ", ".join(f"{finding_in_print(code)} ({count})" for code, count in codes)
@@ -183,9 +158,13 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         facts.append(("not calibrated", f"{how_many(status['rejected'], 'log')}: they do not allow a calibration"))
     if status["crashed"]:
         facts.append(("failed", f"{how_many(status['crashed'], 'log')}: tried again by the next run"))
+    if summary.n_compared:
+        without = f"; not {summary.passed_over}" if summary.passed_over else ""
+        devices = how_many(summary.n_devices_compared, "device")
+        facts.append(("compared", f"{how_many(summary.n_compared, 'log')} of {devices}{without}"))
     if summary.n_before:
         facts.append(("from before", f"{how_many(summary.n_before, 'result')} of an earlier run were kept"))
-    for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict and _is_usable(log)).most_common():
+    for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict and is_usable(log)).most_common():
         facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
     seconds = [log.seconds for log in summary.logs if log.seconds is not None]
     if seconds:
@@ -248,17 +227,24 @@ def _outliers(summary: FleetSummary) -> list[Block]:
     if not summary.outliers:
         return [Paragraph(_within(summary))]
     rows = [
-        (one.serial, *_by(one.parameter, one.deviation), plain_number(one.sigmas, 2), plain_number(one.p_adjusted, 1))
+        (
+            one.serial,
+            *_by(one.parameter, one.deviation),
+            plain_number(one.sigmas, 2),
+            plain_number(one.p_adjusted, 1),
+            files_of(one.serial, summary),
+        )
         for one in summary.outliers
     ]
-    return [Table(("device", "parameter", "from the median", "in spreads of the others", "p"), tuple(rows), "Outliers")]
+    head = ("device", "parameter", "from the median", "in spreads of the others", "p", "logs")
+    return [Table(head, tuple(rows), "Outliers")]
 
 
 def _drift(summary: FleetSummary) -> list[Block]:
     moved = [change for change in summary.changes if change.significant]
     n_devices = len({change.group for change in summary.changes})
-    tested = f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of parameters each, 1 % over"
-    tested += " all."
+    tested = f"{how_many(n_devices, 'device')} with two compared logs or more, seven groups of parameters each, 1 % "
+    tested += "over all."
     if not moved:
         return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = []

@@ -1,5 +1,6 @@
 """Report sections of the fit to a reference, and charts of its error and of the residual rate."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, XYZ
 from trihedron.records import Calibration
+from trihedron.records.published import HELD_OUT
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.report.calibration import calibration_report, shared_power
 from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Level, Line, Mark, Panel, Scale, Span
@@ -17,6 +19,8 @@ from trihedron.report.numbers import (
     capital,
     each_with_sigma,
     engineering_exponent,
+    in_mm_s2,
+    listed,
     plain_number,
     power_of_ten,
     with_sigma,
@@ -69,6 +73,23 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     return (*blocks, Picture("reference", caption, partial(residual_chart, found)))
 
 
+def errors_beside(references: Sequence[AgainstReference]) -> str:
+    """The largest cross-validated errors of both sensors beside references, in words; empty without any."""
+    said = []
+    replays = [one.replay[-1] for one in references if one.replay]
+    if replays:
+        worst = max(replays, key=lambda one: one.error_rad)
+        angle = plain_number(degrees_from_radians(worst.error_rad))
+        said.append(f"attitude {angle}° after {worst.horizon_s:g} s by the gyro alone")
+    elif references:
+        rate = max(one.gyroscope.rms_held_out for one in references)
+        said.append(f"rate in motion {plain_number(degrees_from_radians(rate), 3)} °/s")
+    forces = [one.accelerometer.rms_held_out for one in references if one.accelerometer is not None]
+    if forces:
+        said.append(f"acceleration in motion {in_mm_s2(max(forces))}")
+    return f"{listed(said)}, {HELD_OUT}" if said else ""
+
+
 def reference_headlines(found: AgainstReference) -> list[Headline]:
     """The attitude error of the calibrated gyro, and the reference's own error."""
     error = found.error
@@ -96,7 +117,7 @@ def _latitude(found: AgainstReference) -> str:
 
 def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:
     """Lay out one unit with several references: the shared calibration, then the results of each recording."""
-    document = calibration_report(calibration)
+    document = calibration_report(calibration, errors_beside=errors_beside(references))
     own = Table(
         ("reference", "its slow error", "gyro bias [°/s]", "clock rate [ppm]"),
         tuple(

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ, FloatArray
-from trihedron.records import Pose, Recording, Segments, Severity, Truth
+from trihedron.records import FindingCode, Pose, Recording, Segments, Severity, Truth
+from trihedron.records.noise import least_length_s
 from trihedron.report.channels import logged_sensors
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
@@ -21,6 +22,9 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
     findings = segments.findings if recording is None else (*recording.findings, *segments.findings)
     found = f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"
     still = f"{duration(_still_s(segments))} in all"
+    is_long = recording is not None and _is_of_noise(segments, recording)
+    if is_long:
+        found += f", {duration(_still_s(segments))} static: a log for noise or temperature, not for S and b"
     facts = (("found", f"{found}, {still} static"),) if recording is None else recording_facts(recording, segments)
     return Document(
         title="Poses and moves",
@@ -39,8 +43,16 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
         lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
         if recording is None
         else signals_picture(recording, segments),
-        next_step="Is every pose found? Then see what the log is fit for: `trihedron check LOG`.",
+        next_step="For noise: `trihedron allan LOG`; for drift and temperature: `trihedron diagnose LOG`."
+        if is_long
+        else "Is every pose found? Then see what the log is fit for: `trihedron check LOG`.",
     )
+
+
+def _is_of_noise(segments: Segments, recording: Recording) -> bool:
+    """Whether a log has too few poses for S and b, and these are as long as a log for noise."""
+    has_few = any(one.code is FindingCode.FEW_POSES for one in segments.findings)
+    return has_few and _still_s(segments) >= segments.n_poses * least_length_s(recording.rate_hz)
 
 
 def recording_facts(recording: Recording, segments: Segments | None = None) -> tuple[tuple[str, str], ...]:

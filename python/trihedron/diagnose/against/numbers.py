@@ -109,7 +109,7 @@ def compare_numbers(
     ``alpha`` is the chance that any group of one unit on one day is called different; half of it is used here (Holm).
     ``linear`` is the recording's fit without effects: a linear calibration absorbs part of an effect that it does not
     contain, and a group counts only where it differs from this fit too. ``left_open`` are groups whose reference an
-    accepted effect leaves undefined by so much: no smaller difference is significant.
+    accepted effect leaves undefined by so much: a smaller difference is no evidence, its p is 1.
     """
     groups, factors = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
@@ -117,7 +117,8 @@ def compare_numbers(
         beside = {group.id: group.p_value for group in _groups(model, linear)[0]}
         p = np.array([max(value, beside.get(group.id, 0.0)) for value, group in zip(p, groups, strict=True)])
     is_judged = [float(np.abs(group.difference).max()) > left_open.get(group.id, 0.0) for group in groups]
-    significant = _holm(p, alpha / 2.0) & np.array(is_judged)
+    p = np.where(is_judged, p, 1.0)
+    significant = _holm(p, alpha / 2.0)
     out: list[ParameterDifference] = []
     for group, p_value, is_significant in zip(groups, p.tolist(), significant.tolist(), strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group

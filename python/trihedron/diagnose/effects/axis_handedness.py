@@ -6,7 +6,7 @@ from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence, per_axis_parameters
 from trihedron.records.domains import Where
-from trihedron.sensor_model import exchanged_and_reversed
+from trihedron.sensor_model import order_and_reversed
 
 SIGN_SIGMA = 5.0
 """Standard errors between a scale and zero from which its sign counts: wrong by chance in one of 3.5 million axes."""
@@ -23,7 +23,8 @@ class AxisHandedness(DirectEffect):
         S = context.fitted.state.gyro_S
         if context.obs.raw_rate is None or len(context.moves) < 3:
             return None
-        moved, reversed_axes = ([AXES[j] for j in axes] for axes in exchanged_and_reversed(S))
+        order, against = order_and_reversed(S)
+        moved, reversed_axes = [AXES[j] for j in range(3) if order[j] != j], [AXES[j] for j in against]
         main, n = np.argmax(np.abs(S), axis=0), len(reversed_axes)
         sigma = np.sqrt(np.maximum(np.diag(context.fitted.covariance())[9:18], 0.0)).reshape(3, 3)
         largest = S[main, range(3)]
@@ -31,13 +32,15 @@ class AxisHandedness(DirectEffect):
         if not (moved or n) or (np.abs(largest) < SIGN_SIGMA * sigma[main, range(3)]).any():
             return None
         if moved:
-            statement = self.reported("exchanged", moved=moved, is_turned=n not in (0, 3))
+            # An exchange of accelerometer axes reflects its frame, in which all rates then appear reversed.
+            directions = [(j in against, order[j] + 1) for j in range(3)]
+            statement = self.reported(
+                "exchanged", moved=moved, is_gyro=n == 0, is_pair=len(moved) == 2 and n in (0, 3), directions=directions
+            )
         else:
             # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
             kept = [axis for axis in AXES if axis not in reversed_axes]
-            statement = self.reported(
-                "reversed", is_one=n == 1, is_two=n == 2, is_three=n == 3, reversed=reversed_axes, kept=kept,
-            )  # fmt: skip
+            statement = self.reported("reversed", is_one=n == 1, is_two=n == 2, reversed=reversed_axes, kept=kept)
         parameters = per_axis_parameters("gyro_sign", np.sign(largest), np.zeros(3), "1")
         where = Where(tuple(f"g{axis}" for axis in reversed_axes))
         return Evidence(0.0, CERTAIN, parameters, statement, "moves", where)

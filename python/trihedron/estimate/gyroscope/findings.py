@@ -12,9 +12,17 @@ from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
-from trihedron.records import PARAMETER_NAMES, Finding, FindingCode, Observability, SensorCalibration, Severity
+from trihedron.records import (
+    PARAMETER_NAMES,
+    Finding,
+    FindingCode,
+    Observability,
+    Recording,
+    SensorCalibration,
+    Severity,
+)
 from trihedron.records.words import Words, words
-from trihedron.sensor_model import exchanged_and_reversed
+from trihedron.sensor_model import order_and_reversed
 from trihedron.session.noise import NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
@@ -28,12 +36,13 @@ def findings_of(
     solution: SessionSolution,
     gyroscope: SensorCalibration,
     seen: Carried,
+    recording: Recording,
 ) -> Iterator[Finding]:
-    """All findings of the fit of moves; ``outliers`` are the moves that were excluded."""
+    """All findings of the fit of moves of a recording; ``outliers`` are the moves that were excluded."""
     S, observability = gyroscope.S, gyroscope.observability
     assert observability is not None
     yield from audit_moves(measured)
-    yield from handedness(S, solution.S_a)
+    yield from handedness(S, solution.S_a, recording)
     yield from observability_findings(observability, gyroscope.covariance[:9, :9], S)
     if not solution.is_converged:
         yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
@@ -67,16 +76,20 @@ def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
     yield Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=ratio, unit=raw_unit.value)
 
 
-def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
+def handedness(S: FloatArray, S_accelerometer: FloatArray, recording: Recording | None = None) -> Iterator[Finding]:
     """LEFT_HANDED when the gyro's axes are not the accelerometer's axes of the same name.
 
     ``M = S_a⁻¹ S_ω`` holds the gyro's axes in those of the accelerometer. Where the handedness of the accelerometer is
     another one than stated, a reflection ``R`` of its frame makes ``S_ω → −R S_ω``: ``M = −1`` is a reflection that
     both sensors share, two reversed axes are the third one of the accelerometer, and a negative exchange of two axes
-    is one of the accelerometer's columns.
+    is one of the accelerometer's columns. The ``--columns`` that mends an order are named where no sign is wrong.
     """
-    exchanged, against = exchanged_and_reversed(np.asarray(np.linalg.solve(S_accelerometer, S), dtype=np.float64))
-    moved, others = [i + 1 for i in exchanged], [i + 1 for i in against]
+    order, against = order_and_reversed(np.asarray(np.linalg.solve(S_accelerometer, S), dtype=np.float64))
+    moved, others = [i + 1 for i in range(3) if order[i] != i], [i + 1 for i in against]
+    mapping = ""
+    if recording is not None and len(against) in (0, 3):
+        mapping = recording.mapping_with("a" if against else "g", order)
+    is_known = bool(mapping)
     match len(moved), len(others):
         case 0, 0:
             return
@@ -97,11 +110,22 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> Iterator[Finding]:
                 is_stated=is_stated,
             )
         case 2, 0:
-            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved)
+            yield Finding.of(
+                FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved, has_columns=is_known, mapping=mapping
+            )
         case 2, 3:
-            yield Finding.of(FindingCode.LEFT_HANDED, "accelerometer-exchanged", axes=moved)
+            yield Finding.of(
+                FindingCode.LEFT_HANDED, "accelerometer-exchanged", axes=moved, has_columns=is_known, mapping=mapping
+            )
         case _:
-            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-other-axes")
+            directions = [(i in against, order[i] + 1) for i in range(3)]
+            yield Finding.of(
+                FindingCode.LEFT_HANDED,
+                "gyro-other-axes",
+                directions=directions,
+                has_columns=is_known and not against,
+                mapping=mapping,
+            )
 
 
 def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> Iterator[Finding]:

@@ -32,7 +32,10 @@ def grid_of(recording: Recording) -> Grid:
     Raises ``InputError`` when there is no gyro.
     """
     if recording.gyroscope is None:
-        raise InputError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
+        raise InputError(
+            f"{recording.source}: a reference is compared with the gyro, and this log has none; "
+            "calibrate its accelerometer by static poses, without the reference."
+        )
     recording = recording.with_distinct_timestamps()
     gyroscope = recording.gyroscope
     assert gyroscope is not None

@@ -109,7 +109,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
         quality=replace(quality, n_iterations=solution.iterations, stopped_because=solution.stopped_because),
         observability=describe(covariance[12:21, 12:21], solution.S_w),
     )
-    said = findings_of(found.outliers, measured, solution, gyroscope, seen)
+    said = findings_of(found.outliers, measured, solution, gyroscope, seen, log.recording)
     return SolvedSession(
         solution, covariance, gyroscope, left_out, (*said, *losses.findings(own_sigma))
     )  # fmt: skip

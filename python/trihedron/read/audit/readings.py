@@ -202,7 +202,8 @@ def _stuck(
     Where the LSB exceeds the noise, a value may be constant for a whole pose; then the other axes must move.
     """
     longest, start = int(repeats.longest[k]), int(repeats.longest_start[k])
-    if longest <= max(longest_by_chance(repeats.n, repeats.chance(k)), 2.0 * repeats.longest[3]):
+    chance = repeats.chance_outside(k, start, longest)
+    if longest <= max(longest_by_chance(repeats.n, chance), 2.0 * repeats.longest[3]):
         return []
     if windows is not None:
         others = [j for j in range(3) if j != k]
@@ -262,10 +263,14 @@ class Repeats:
         of_left = windows[-1:] / max(left, 1) if 0 < left < WINDOW else np.zeros((0, 4))
         whole = windows[: (self.n - 1) // WINDOW] / float(WINDOW)
         self.rates = np.concatenate([whole, of_left]) if self.n > 1 else np.zeros((1, 4))
+        self.starts = WINDOW * np.arange(len(self.rates))
 
-    def chance(self, k: int) -> float:
-        """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows)."""
-        return float(quantile(self.rates[:, k], 0.9))
+    def chance_outside(self, k: int, start: int, length: int) -> float:
+        """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows), in
+        the log outside ``length`` rows from ``start``: a channel frozen for half of it is no measure of chance."""
+        first = self.starts
+        rates = self.rates[(first + WINDOW <= start) | (first >= start + length), k]
+        return float(quantile(rates, 0.9)) if len(rates) else 1.0
 
 
 def longest_by_chance(n: int, probability: float) -> float:

@@ -176,13 +176,15 @@ SESSION = {
         "the documented axes do not form one right-handed triad",
         "tilt each axis up in turn and turn about it by hand: the signs show which axis is documented wrongly",
         {
-            "exchanged": "{moved:axes and} of one sensor are exchanged against the axes of the other by their names"
-            "{is_turned:?, with a sign: one sensor is turned against the other|}.",
-            "reversed": "The documented axes of accelerometer and gyro do not fit one right-handed triad. In "
-            "question: {is_one:?gyro {reversed:axes}|{is_two:?accelerometer {kept:axes}, or gyro {reversed:axes and}|"
-            "{is_three:?one axis of the board alike for both sensors (or two are exchanged), or every gyro axis|"
-            "the order of the axes}}}.",
+            "exchanged": "{is_pair:?{is_gyro:?gyro {moved:axes and} are exchanged against the accelerometer's axes|"
+            "accelerometer {moved:axes and} are exchanged against the gyro's axes}|"
+            "gyro X, Y and Z turn about accelerometer {directions:each}}.",
+            "reversed": "{is_one:?gyro {reversed:axes} turns against accelerometer {reversed:axes}|{is_two:?"
+            "accelerometer {kept:axes} points against gyro {kept:axes}, or gyro {reversed:axes and} are both reversed|"
+            "every gyro axis turns against the accelerometer's axis of the same name}}: as documented, the axes form "
+            "no right-handed triad.",
         },
+        lines={"directions": "{v0:?−|}{v1:axis}"},
     ),
     "supply-sensitivity": EffectWords(
         "the readings depend on the supply voltage", "repeat one pose at two supply voltages"
@@ -206,7 +208,7 @@ SESSION = {
     ),
     "dropped-samples": EffectWords(
         "samples are missing while the timestamps are even",
-        "log the sensor's own sample counter",
+        "lower the rate or the load of the link; the sensor's own sample counter shows every loss",
         {"losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} more|}."},
         lines={"losses": "{v0} at {v1:.2f} s"},
     ),

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, Severity
-from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with
+from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with, concerns_whole
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import warnings_in_print
 from trihedron.report.numbers import MINUS, capital, how_many, listed
@@ -35,8 +35,8 @@ def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _weight(finding: Finding) -> tuple[int, int]:
-    is_listed = finding.code in CONSEQUENCE
-    return _ORDER[finding.severity], CONSEQUENCE.index(finding.code) if is_listed else len(CONSEQUENCE)
+    place = CONSEQUENCE.index(finding.code) if concerns_whole(finding) else len(CONSEQUENCE)
+    return _ORDER[finding.severity], place
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:

@@ -33,8 +33,8 @@ _MOVES = {
     (Code.TURNTABLE, "not-fitted", SERIOUS): Words(
         "the fit to {turns:.0f} {is_turned:?turns by stated angles|steady turns at stated speeds} did not converge: it "
         "is off by {rms:.2g %} rms, more than noise explains; they are left out.",
-        "moves that hardly determine the gyro, or another {is_turned:?angle|speed} than stated.",
-        "Turn the sensor about all three axes between poses of many orientations; check --turn{is_turned:?s|table}.",
+        "another {is_turned:?angle|speed} than stated, or moves that hardly determine the gyro.",
+        "Check --turn{is_turned:?s|table}; turn the sensor about all three axes between poses of many orientations.",
     ),
     (Code.TURNTABLE, "turns", NOTE): Words(
         "{turns:.0f} turns by stated angles were fitted beside poses and moves: |∫ω dt| within {rms_rad:.2g deg} rms "
@@ -85,17 +85,20 @@ _MOVES = {
     (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
         "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
         "their columns are in another order than stated, or their documented directions are wrong.",
-        "Name the columns in their order with --columns; the calibration itself corrects the gyro's.",
+        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}; the "
+        "calibration itself corrects the gyro's.",
     ),
     (Code.LEFT_HANDED, "accelerometer-exchanged", WARNING): Words(
         "accelerometer {axes:axes and} are exchanged against the gyro's axes.",
         "their columns are in another order than stated, or their documented directions are wrong.",
-        "Name the columns in their order with --columns.",
+        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}.",
     ),
     (Code.LEFT_HANDED, "gyro-other-axes", WARNING): Words(
-        "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
+        "gyro X, Y and Z turn about accelerometer {directions:each}.",
         "the axes of one of the two sensors are in another order, or have other signs, than stated.",
-        "Check the axis directions of the board against both data sheets.",
+        "Check the axis directions of the board against both data sheets{has_columns:?; if the columns are in another "
+        "order, read it with --columns {mapping}|}; the calibration itself corrects the gyro's.",
+        lines={"directions": "{v0:?−|}{v1:axis}"},
     ),
     (Code.OUTLIER_MOVE, "", WARNING): Words(
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
@@ -140,8 +143,8 @@ _MOVES = {
         "intervals that would show it (first at {first_s:.2f} s): about {lost_share:.2g !%} ± {sigma_lost_share:.1g %} "
         "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew.",
-        "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
-        "`trihedron diagnose` puts single losses back.",
+        "Lower the rate or the load of the link and record again; or put single losses back by a fit with effects: "
+        "`trihedron calibrate LOG --extended -o FILE --force`. Do not use this gyro calibration.",
         or_severity=SERIOUS,
     ),
     (Code.LEFT_HANDED, "turns-reversed", SERIOUS): Words(

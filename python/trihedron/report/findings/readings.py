@@ -39,12 +39,20 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.STUCK_VALUES, "", WARNING): Words(
-        "The {sensor}'s {axis_name} axis stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
+        "{sensor} {axis_name:axis} stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
         "chance.",
         "A frozen channel, clipping, or a bus that answers with an old value.",
         "Leave that stretch out.",
         numbers=("axis", "sample"),
         or_severity=SERIOUS,
+    ),
+    (Code.STUCK_VALUES, "motionless", SERIOUS): Words(
+        "{sensor} {axis_name:axis} does not follow the motion: it reads only noise while {sensor} readings of the "
+        "other axes, and gravity, turn.",
+        "A dead channel, or a column that is not this axis.",
+        "Name its column with --columns, or repair the channel and log again{has_others:?; the accelerometer alone: "
+        "--columns {mapping}|}.",
+        numbers=("axis",),
     ),
     (Code.COARSE_RESOLUTION, "", WARNING): Words(
         "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
