@@ -84,7 +84,8 @@ class Answer:
         explained = sum(max(d.excess - left[d.domain], 0.0) for d in self.domains if d.domain in left)
         if sum(left[d.domain] for d in self.remaining if d.disagrees) > explained:
             return False
-        of_instrument = sum(gain for effect, gain, _ in self.gains if not effect.is_of_motion)
+        # An arm and Earth rate are no faults that would stand in for what the instrument does.
+        of_instrument = sum(gain for effect, gain, _ in self.gains if not (effect.is_of_motion or effect.of_session))
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
         beside = {one.effect.id for one in self.seen if not one.reobserves}
