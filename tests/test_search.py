@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import polars
@@ -10,11 +11,13 @@ import pytest
 import trihedron
 from diagnosed_session import diagnosed, nearest_pose, simulated
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.accepted import Answer
+from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_state
+from trihedron.records.domains import DomainTest
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import contiguous, core_state
 from trihedron.session.noise import ANYTHING
@@ -89,6 +92,24 @@ def test_every_candidate_says_why_it_was_not_taken():
         assert row["size"], row["id"]
         if row["id"] not in {effect["id"] for effect in said["effects"]}:
             assert row["limit95"] > 0.0, row["id"]
+
+
+@pytest.mark.parametrize(
+    ("named", "is_explained"), [("earth-rate", False), ("lever-arm", False), ("gyro-g-sensitivity", True)]
+)
+def test_a_relation_beside_the_place_and_the_motion_alone_is_unexplained(named, is_explained):
+    domain = DomainTest("static-gyro", 9.0, 60.0, 0.0, True)
+    found = SimpleNamespace(related=SimpleNamespace(relations=(SimpleNamespace(score=20.0),)))
+    gains = [(by_id()[named], 80.0, None)]
+    answer = SimpleNamespace(
+        domains=(domain,),
+        remaining=(replace(domain, chi2_per_dof=1.0),),
+        found=found,
+        gains=gains,
+        shares=[0.8],
+        seen=(),
+    )
+    assert Answer.says_why.fget(answer) is is_explained
 
 
 def test_a_long_delay_is_a_delay_of_that_length():
