@@ -163,7 +163,7 @@ def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
     assert FindingCode.CLIPPING in codes(findings)
     assert np.abs(z_scores(found, truth)).max() < 4.0
     hard = np.clip(recording.gyroscope, -0.3 * limit, 0.3 * limit)
-    with pytest.raises(ValueError, match="clipped in every move"):
+    with pytest.raises(ValueError, match="rotate at less than"):
         calibrated(replace(recording, gyroscope=hard), segments, truth)
 
 

@@ -325,10 +325,14 @@ def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first:
         return
     enter = (column[left] - column[left - 1]) / before
     leave = (column[right + 1] - column[right]) / after
-    from scipy.interpolate import CubicHermiteSpline  # imported here: few logs clip
-
-    curve = CubicHermiteSpline(time_s[[left, right]], column[[left, right]], [enter, leave])
-    column[first : last + 1] = curve(time_s[first : last + 1])
+    # The Hermite cubic: SciPy has it, and takes longer to load than a calibration does.
+    u = (time_s[first : last + 1] - time_s[left]) / span
+    column[first : last + 1] = (
+        (2 * u**3 - 3 * u**2 + 1) * column[left]
+        + (u**3 - 2 * u**2 + u) * span * enter
+        + (3 * u**2 - 2 * u**3) * column[right]
+        + (u**3 - u**2) * span * leave
+    )
     area = span**2 * abs(enter - leave) / 12.0
     count = last - first + 1
     # Equal and independent variances of the run's samples, whose integral has the variance of the area.

@@ -59,7 +59,9 @@ class GyroClippedError(InputError):
 
     def __init__(self, measured: MoveMeasurements) -> None:
         self.n_lost, self.n_moves = int(np.count_nonzero(measured.is_lost)), measured.n_moves
-        super().__init__(f"the gyro clipped in {self.n_lost} of {self.n_moves} moves")
+        super().__init__(
+            f"the gyro clipped in {self.n_lost} of {self.n_moves} moves: rotate at less than about half its range limit"
+        )
 
 
 def lower(S: FloatArray, b: FloatArray) -> Near:

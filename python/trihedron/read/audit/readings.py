@@ -110,8 +110,6 @@ def _per_unit(step_si: float, sensor: str) -> float:
 Place = Callable[[int], str]
 LAGS = 8
 """Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
-LAGS = 8
-"""Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
 MANY, LONG, HALF = 0.05, 0.1, 0.5
 """Shares of a log that are not finite, stuck, or repeated, from which on the finding is serious."""
 
