@@ -14,13 +14,13 @@ from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.probability import NORMAL_95
 from trihedron.records.filter_noise import Bounded
 
-COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
+COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body", "per_kelvin")
 """Coordinates of the search: logarithms of strengths; ``slow`` is the reference's total slow error; ``body`` is a
 standard normal number whose quantile Φ(x), in right angles, is the angle with world part ``slow`` cos, body part
 ``slow`` sin. Two strengths that may both be zero would have a posterior with a corner. The ratio of the parts is then
 half-Cauchy; Φ(x) as the share of the *square* makes a zero body part so unlikely that ``slow`` comes out too small."""
 SLOW_S = COORDINATES.index("slow_s")
-MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
+MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow", "per_kelvin"))
 NU = 3.0
 """Degrees of freedom of the half-Student prior: the fewest with a mean square, which a predicted covariance needs."""
 MEDIAN = float(np.log(stdtrit(NU, 0.75)))
@@ -52,9 +52,9 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) is 1 for those in the model.
+    """Prior of the coordinates: ``mean`` (8,), ``sigma`` (8,); ``is_there`` (8,) is 1 for those in the model.
 
-    A strength that ``may_be_nothing`` (7,) has a half-Student prior with median exp(mean) (Gelman 2006): flat towards
+    A strength that ``may_be_nothing`` (8,) has a half-Student prior with median exp(mean) (Gelman 2006): flat towards
     zero, so that the log and not the prior sets the upper limit of a strength that is not detected. ``sigma`` then
     bounds the search. The other coordinates are normal.
     """
@@ -65,7 +65,7 @@ class Prior:
     may_be_nothing: BoolArray = field(default_factory=MAY_BE_NOTHING.copy)
 
     def ends(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest coordinates (7,). A slow error that lasts less than a block is white between blocks."""
+        """Lowest and highest coordinates (8,). A slow error that lasts less than a block is white between blocks."""
         lowest = self.mean - FARTHEST * self.sigma
         lowest[SLOW_S] = max(lowest[SLOW_S], np.log(BLOCK_S))
         return lowest, self.mean + FARTHEST * self.sigma
@@ -73,7 +73,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Strengths (7,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 7) of the
+    """Strengths (8,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 8) of the
     strengths, and their effective number."""
 
     mode: FloatArray
@@ -158,16 +158,16 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
-    """Strengths (7,) in SI from free coordinates (f,); strengths that are not in the model are 0."""
+    """Strengths (8,) in SI from free coordinates (f,); strengths that are not in the model are 0."""
     every = np.full(len(COORDINATES), -np.inf)
     every[prior.is_there > 0.0] = x
-    angle = 0.5 * np.pi * float(ndtr(every[-1]))
+    angle = 0.5 * np.pi * float(ndtr(every[6]))
     slow = np.exp(every[4])
-    return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), np.exp(every[5])])
+    return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), *np.exp(every[[5, 7]])])
 
 
 def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
-    """``prior`` of another sensor with the reference's slow error from ``draws`` (k, 7) of this sensor: it is one
+    """``prior`` of another sensor with the reference's slow error from ``draws`` (k, 8) of this sensor: it is one
     attitude error, in the angle of the gyro and in the tilt of gravity for the accelerometer."""
     s = dict(zip(NAMES, draws.T, strict=True))
     right_angles = np.arctan2(s["body"], s["world"]) / (0.5 * np.pi)
