@@ -244,7 +244,8 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
 
 def bounded(values: Sequence[float] | FloatArray) -> Bounded:
     """Median and 95 % interval of draws; an upper limit where the interval spans more than a factor of ``ABSENT``."""
-    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
+    # The truth is one draw more: ends between order statistics k and n + 1 - k hold it with 1 - 2 k/(n + 1).
+    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975], method="weibull"))
     is_limit = high > 0.0 and low < high / ABSENT
     return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
