@@ -77,7 +77,11 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
     stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording)
-    _reject_short(stretches, motion)
+    shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
+    if shared < LEAST_S:
+        raise InputError(
+            f"{motion.source}: log and reference share {shared:.0f} s without a gap; give at least {LEAST_S:.0f} s."
+        )
     left = left_over(found, asked.horizons_s)
     of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
     out = [_sensor(of_gyro, asked, asked.gyroscope, left)]
@@ -126,14 +130,6 @@ def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: Sta
         independent_or_not(stretches, of_all, usual[1]),
         of_all,
     )
-
-
-def _reject_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
-    shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
-    if shared < LEAST_S:
-        raise InputError(
-            f"{motion.source}: log and reference share {shared:.0f} s without a gap; give at least {LEAST_S:.0f} s."
-        )
 
 
 def _sensor(

@@ -70,17 +70,17 @@ def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
-def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray, n: int = DRAWN, seed: int = 0) -> FloatArray:
-    """(n, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
+def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatArray:
+    """(k, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
 
     Without the prior the variance of the estimate would count twice: noise makes a perfect matrix seem imperfect.
     """
     width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
     log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
     weight = np.exp(log_p - log_p.max())
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     out = []
-    for k in rng.choice(len(sizes), n, p=weight / weight.sum()):
+    for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
         gain = sizes[k] ** 2 * np.linalg.inv(width[k])
         left = sizes[k] ** 2 * (np.eye(len(seen)) - gain)
         values, vectors = np.linalg.eigh(0.5 * (left + left.T))
@@ -166,6 +166,7 @@ def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
         information, moment = np.zeros((3, 3)), np.zeros(3)
         # All stretches are of one sensor.
         for one in told:
+            assert one.warmth is not None
             L, w = one.factor(others)
             half = solve_triangular(L, one.warmth, lower=True, check_finite=False)
             information += half.T @ half

@@ -283,7 +283,8 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
     """
     if N.is_limit:
         return ()
-    pairs = [(_without_noise(one, found.mode), _of_axes(one, found.mode)) for one in stretches]
+    others = np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, found.mode)
+    pairs = [(one.covariance(others), _of_axes(one, found.mode)) for one in stretches]
 
     def low(x: FloatArray) -> float:
         heights = [
@@ -305,11 +306,6 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
         value, factor = N.value * float(np.exp(x)), float(np.exp(NORMAL_95 * np.sqrt(variance + common)))
         each.append(Bounded(value, value / factor, value * factor))
     return tuple(each)
-
-
-def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) of all random errors except noise and vibration."""
-    return stretch.covariance(np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, strengths))
 
 
 def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:
