@@ -79,7 +79,9 @@ class Stretch:
         """Covariance (3 m, 3 m) of all random errors under ``strengths`` (8,) in SI; a strength may be 0."""
         s = dict(zip(NAMES, strengths, strict=True))
         m = len(self.time_s)
-        correlation = matern(self.lag_s, s["slow_s"])
+        # An observation is a mean over a block; of a velocity's increment over a triangle, as wide as √2 blocks.
+        width_s = float(np.median(np.diff(self.time_s))) * (1.0 if self.tilts is None else np.sqrt(2.0))
+        correlation = matern_of_means(self.lag_s, float(s["slow_s"]), width_s)
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
@@ -154,6 +156,18 @@ def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
     """Matérn-3/2 correlation at lags [s]: the error of a smoothed reference is differentiable."""
     x = np.sqrt(3.0) * lag_s / np.maximum(tau_s, 1e-9)
     return np.asarray((1.0 + x) * np.exp(-x))
+
+
+def matern_of_means(lag_s: FloatArray, tau_s: float, width_s: float) -> FloatArray:
+    """Correlation of means over ``width_s`` of a unit Matérn-3/2 process: second difference of its second integral."""
+    rate = np.sqrt(3.0) / max(tau_s, 1e-9)
+
+    def twice_integrated(lag: FloatArray) -> FloatArray:
+        t = np.abs(lag)
+        return np.asarray((3.0 / rate**2 + t / rate) * np.exp(-rate * t) + 2.0 * t / rate)
+
+    both = twice_integrated(lag_s + width_s) + twice_integrated(lag_s - width_s)
+    return np.asarray((both - 2.0 * twice_integrated(lag_s)) / width_s**2)
 
 
 def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
