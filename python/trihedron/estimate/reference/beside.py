@@ -16,8 +16,6 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 BLOCK_S = 1.0
 """Length of a block: gyro errors over 1 s are negligible, and a reference's slow error lasts longer."""
 
-PARTS = (np.arange(8) + 0.5) / 8 - 0.5
-"""Parts of a block at which a slow error is averaged."""
 NUMBERS = {
     "S": 9, "gyro-g-sensitivity": 9, "quadratic": 3, "cubic": 3, "b": 3, "clock": 2, "earth": 3, "mounting": 3,
 }  # fmt: skip
@@ -47,11 +45,6 @@ class SlowError:
         inside = np.clip(time, self.time_s[0], self.time_s[-1])
         both = CubicSpline(self.time_s, np.hstack([self.world, self.body]))(inside)
         return both[:, :3], both[:, 3:]
-
-    def means(self, time: FloatArray, block_s: float) -> tuple[FloatArray, FloatArray]:
-        """Their means (n, 3) [rad] over blocks about other times, as observations are."""
-        world, body = self.at((time[:, None] + block_s * PARTS).ravel())
-        return world.reshape(len(time), -1, 3).mean(axis=1), body.reshape(len(time), -1, 3).mean(axis=1)
 
     def compensated(self, time: FloatArray, attitude: FloatArray) -> FloatArray:
         """Attitudes (n, 3, 3) with the slow error removed."""
@@ -192,7 +185,7 @@ class Beside:
         }
         observed = blocks.angle()
         if point.slow is not None:
-            world, body = point.slow.means(blocks.time_s(), block_s)
+            world, body = point.slow.at(blocks.time_s())
             observed = observed + world + np.einsum("mij,mj->mi", blocks.attitude(), body)
         names = list(places)
         sigma = np.concatenate([self.sigma(name, wider) for name in names])
