@@ -5,6 +5,7 @@
 Each run draws for both sensors N, K, vibration that follows a throttle and a scale matrix that is off, for the gyro
 g-sensitivity and a bias that follows the temperature, and a truth with white and slow (Matérn-3/2) error
 (filter_noise_trial/); the static noise is given with 5 % of error. NEES is cross-validated over halves: 3 is right.
+`--prior` draws strengths from the prior and errors from the model instead, in one motion: the sampler alone.
 `--euroc FOLDER` takes the recorded flights instead, with the data sheet's values as static ones; `--backwards` predicts
 the angles of the first half of each from the second as well.
 """
@@ -12,6 +13,7 @@ the angles of the first half of each from the second as well.
 import argparse
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 # Threads of the algebra beside one another on small matrices only wait.
@@ -31,6 +33,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
     independent_or_not,
     informed,
 )
+from trihedron.estimate.filter_noise.strengths import MEDIAN, NU, bounded, fit, whole
 from trihedron.estimate.filter_noise.stretches import angle_stretches
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
@@ -104,6 +107,37 @@ def summarise(sensor, runs):
     print(f"  all shares {100 * np.mean(every):.1f} %", flush=True)
 
 
+def from_prior(given):
+    """Share of the strengths of the gyro, drawn from their prior, in the 95 % intervals of a log of 80 s."""
+    flight = drawn(given.seed, "drone", 80.0, HORIZONS)
+    log = Recording.from_arrays(flight.t, flight.force, flight.rate, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    motion = ReferenceMotion(flight.truth_t - flight.truth_t[0], attitude=flight.truth, source="truth")
+    static = known(flight.gyroscope)
+    (stretch,) = angle_stretches(fit_motion([laid_beside(log, motion, G)]), 25.0, static.N.value)
+    prior = informed(ANGLE, [stretch], static)
+    lowest, highest = prior.ends()
+    free, rng = prior.is_there > 0.0, np.random.default_rng(given.seed)
+    inside = []
+    for _ in range(given.runs):
+        x = np.full(len(free), np.inf)
+        while np.any((x < lowest) | (x > highest)):
+            student = np.log(np.abs(rng.standard_t(NU, len(free)))) - MEDIAN
+            x = prior.mean + np.where(prior.may_be_nothing, student, prior.sigma * rng.normal(size=len(free)))
+        true = whole(prior, x[free])
+        L, _ = stretch.factor(true)
+        seen = stretch.columns @ stretch.centre + L @ rng.normal(size=len(L))
+        draws = fit([replace(stretch, observed=seen)], prior).draws
+        inside.append([holds(bounded(found), value) for found, value in zip(sizes(draws), sizes(true), strict=True)])
+    of_each = zip(("N", "K", "white", "slow", "time constant"), 100.0 * np.mean(inside, axis=0), strict=True)
+    print(f"{given.runs} runs, {100.0 * np.mean(inside):.1f} %: " + ", ".join(f"{n} {v:.0f} %" for n, v in of_each))
+
+
+def sizes(strengths):
+    """N, K, white and slow error of the reference and its time constant from strengths (..., 8)."""
+    s = np.moveaxis(strengths, -1, 0)
+    return np.hypot(s[0], s[1]), s[2], s[3], np.hypot(s[4], s[5]), s[6]
+
+
 def flights(folder, is_backwards):
     for path in sorted(Path(folder).glob("*.log.csv.gz")):
         motion = motion_of(str(path).replace(".log.", ".truth."))
@@ -140,11 +174,14 @@ def main():
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=160.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--prior", action="store_true")
     parser.add_argument("--euroc")
     parser.add_argument("--backwards", action="store_true")
     given = parser.parse_args()
     if given.euroc:
         flights(given.euroc, given.backwards)
+    elif given.prior:
+        from_prior(given)
     else:
         simulated(given)
 

@@ -17,6 +17,7 @@ from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_l
 from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
+from trihedron.estimate.filter_noise.left_over import of_temperature
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, fit, height, most_likely
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
 from trihedron.estimate.filter_noise.stretches import bias_steps, velocity_stretches
@@ -28,7 +29,7 @@ from trihedron.units import AccelerationUnit, RateUnit
 
 EUROC = Path(__file__).parents[2] / "shared" / "data" / "euroc"
 N, K, SLOW, TAU = 2e-4, 3e-5, 2e-3, 6.0
-STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, 0.0, TAU])
+STRENGTHS = np.array([N, 0.0, K, 1e-5, SLOW, 0.0, TAU, 0.0])
 HZ = 100.0
 
 
@@ -54,15 +55,15 @@ def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
     nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(20)]
     # 20 runs of about five stretches apart: 3 with a standard error of sqrt(6/100) = 0.25.
     assert np.mean(nees) == pytest.approx(3.0, abs=0.8)
-    plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0])
+    plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0, 0.0])
     assert errors_over([(drawn(0), 30)], plain[None], 5.0).nees.mean() > 6.0
 
 
 def test_strengths_lie_within_their_intervals():
     prior = Prior(
-        np.log([2e-4, 1.0, 2e-5, 3e-5, 1e-3, 8.0, 1.0]),
-        np.log([1.1, 2.0, 30.0, 3.0, 30.0, 4.0, 2.0]),
-        np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]),
+        np.log([2e-4, 1.0, 2e-5, 3e-5, 1e-3, 8.0, 1.0, 1.0]),
+        np.log([1.1, 2.0, 30.0, 3.0, 30.0, 4.0, 2.0, 2.0]),
+        np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
     )
     found = fit([drawn(3)], prior)
     for name, true in (("noise", N), ("bias_walk", K), ("world", SLOW), ("slow_s", TAU)):
@@ -73,15 +74,44 @@ def test_strengths_lie_within_their_intervals():
     assert not replace(found, n_effective=1.0).is_settled
 
 
+def test_a_strength_that_is_nothing_has_an_interval_down_to_nothing():
+    # Of a flat density from 0 to a limit a tenth lies below a tenth of the limit: a tail that a logarithm makes long.
+    usual = replace(ANGLE, is_there=np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]))
+    draws = fit([drawn(4)], usual).draws
+    walk = draws[:, NAMES.index("bias_walk")]
+    white = draws[:, NAMES.index("white")]
+    assert np.mean(white < 0.1 * np.quantile(white, 0.9)) > 0.05
+    assert walk.min() < 0.05 * walk.max()
+    # A slow error that lasts less than a block would be white error once more.
+    assert draws[:, NAMES.index("slow_s")].min() >= 1.0
+
+
+def test_the_size_of_a_bias_per_kelvin_is_found_with_the_other_strengths():
+    kelvin = np.linspace(-2.0, 2.0, 60)
+    stretch = still()
+    stretch = replace(stretch, kelvin=kelvin, warmth=stretch.bias_steps @ np.kron(kelvin[:, None], np.eye(3)))
+    warm = np.array([1.5e-3, -1e-3, 5e-4])
+    # Of a bias that grows by 4/59 K a second the angle after h is h²/2 of it.
+    true = np.sum(warm**2) * (4.0 / 59.0) ** 2 * 10.0**4 / 4.0
+    ratios = []
+    for seed in range(3):
+        one = replace(stretch, observed=drawn(seed).observed + stretch.warmth @ warm)
+        found = fit([one], informed(ANGLE, [one], None))
+        assert np.median(found.draws[:, NAMES.index("per_kelvin")]) == pytest.approx(1e-3, rel=0.7)
+        ratios.append(np.median(of_temperature([one], found, [10.0])[10.0]["temperature"]) / true)
+    # Each is known to some 12 %.
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.25)
+
+
 def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():
     # A quarter of the noise is left beside a smoother over the same gyro; its datum is good to five per cent.
-    weak = STRENGTHS * [0.25, 1.0, 1.0, 1.0, 0.2, 1.0, 1.0]
+    weak = STRENGTHS * [0.25, 1.0, 1.0, 1.0, 0.2, 1.0, 1.0, 1.0]
     stretch = still(100)
     L, _ = stretch.factor(weak)
     stretch = replace(stretch, observed=L @ np.random.default_rng(2).normal(size=300))
     static = StaticNoise(Bounded(N, 0.9 * N, 1.1 * N), Bounded(K, K, K))
     prior = informed(ANGLE, [stretch], static)
-    plain = replace(prior, is_there=np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]))
+    plain = replace(prior, is_there=np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]))
     fitted, follows = independent_or_not([stretch], plain, ANGLE)
     assert follows
     assert np.median(fitted.draws[:, 0]) < 0.5 * N
@@ -95,7 +125,7 @@ def test_parts_of_an_error_are_the_textbook_ones():
     far = parts_of(STRENGTHS[None], 1e6)["reference"][0]
     assert far == pytest.approx(6 * SLOW**2, rel=1e-3)  # two errors that no longer know of each other
     # Of an error fixed in a body that has turned by half a turn two axes have changed sign: (2 σ)² each.
-    fixed, half = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, SLOW, 1e6]]), np.array([1.0, -1.0 / 3.0])
+    fixed, half = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, SLOW, 1e6, 0.0]]), np.array([1.0, -1.0 / 3.0])
     assert parts_of(fixed, 10.0, alike=half)["reference"][0] == pytest.approx(8 * SLOW**2, rel=1e-3)
 
 
@@ -283,9 +313,10 @@ def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
 @pytest.mark.parametrize("far", [0.1, 10.0])
 def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
     # From a prior a factor of ten off on either side: searching along slopes alone ended on a ridge in a real flight.
-    sigma = np.log([1.1, 2.0, 30.0, 30.0, 30.0, 4.0, 2.0])
-    near = Prior(np.log([N, 1.0, K, 3e-5, SLOW, TAU, 1.0]), sigma, np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]))
-    off = replace(near, mean=near.mean + np.log(far) * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0]))
+    sigma = np.log([1.1, 2.0, 30.0, 30.0, 30.0, 4.0, 2.0, 2.0])
+    there = np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0])
+    near = Prior(np.log([N, 1.0, K, 3e-5, SLOW, TAU, 1.0, 1.0]), sigma, there)
+    off = replace(near, mean=near.mean + np.log(far) * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     x, _ = most_likely([drawn(3)], off)
     other, _ = most_likely([drawn(3)], near)
     # Under that prior nothing is likelier, the other prior's greatest posterior among it; 0.01 ends the search.

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 from motion import running_product
 
 HZ, TRACK_HZ, G = 100, 50, 9.81
+EARTH = 7.292e-5 * np.array([0.0, np.cos(0.8), np.sin(0.8)])
+"""Earth's rate [rad/s] at 46 degrees of latitude, in the world."""
 KINDS = ("drone", "car", "walk")
 
 
@@ -93,7 +95,7 @@ def drawn(seed, kind, seconds, horizons):
     path, pushed = moved(rng, len(t))
     force = middle.inv().apply(pushed + np.array([0, 0, G]))
     bias = 0.02 * rng.normal(size=3) + warm
-    raw = (w + shaking) @ M.T + force @ of_force.T + bias + noise(rng, N, V, K, throttle)
+    raw = (w + middle.inv().apply(EARTH) + shaking) @ M.T + force @ of_force.T + bias + noise(rng, N, V, K, throttle)
     k = np.arange(0, len(t), HZ // TRACK_HZ)
     truth_t = t[k] - 0.5 / HZ
     off = slow_error(rng, truth_t, sigma, tau) + white * rng.normal(size=(len(k), 3))

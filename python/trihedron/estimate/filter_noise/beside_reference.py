@@ -38,12 +38,12 @@ from trihedron.records.reference import ReferenceMotion
 from trihedron.session.drift import PER_KELVIN
 
 ANGLE = Prior(
-    np.append(np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0]), 0.0),
-    np.append(np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0]), 1.0),
-    np.ones(7),
+    np.array([*np.log([2e-4, 2e-4, 2e-5, 3e-4, 1e-3, 8.0]), 0.0, np.log(PER_KELVIN[1])]),
+    np.array([*np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0]), 1.0, np.log(30.0)]),
+    np.ones(8),
 )
 """Prior for consumer gyros and optical trackers: factor 30 either way, 4 for the time constant (as `--reference`)."""
-VELOCITY = Prior(np.append(np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0), ANGLE.sigma, np.ones(7))
+VELOCITY = replace(ANGLE, mean=np.array([*np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0, np.log(PER_KELVIN[0])]))
 """Prior for accelerometers with a reference position: 1 mm of white error; the slow error is that of the attitude and
 gets its prior from the gyro's fit (`Learnt.told`)."""
 LEAST_S = 40.0
@@ -76,8 +76,12 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
     side = laid_beside(recording, motion, asked.gravity_m_s2)
     found = fit_motion([side])
     known = 0.0 if asked.gyroscope is None else asked.gyroscope.N.value
-    stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording, PER_KELVIN[1])
-    _reject_short(stretches, motion)
+    stretches = beside_temperature(angle_stretches(found, asked.band_hz, known), recording)
+    shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
+    if shared < LEAST_S:
+        raise InputError(
+            f"{motion.source}: log and reference share {shared:.0f} s without a gap; give at least {LEAST_S:.0f} s."
+        )
     left = left_over(found, asked.horizons_s)
     of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
     out = [_sensor(of_gyro, asked, asked.gyroscope, left)]
@@ -86,7 +90,7 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
         assert out[0].reference is not None
         white = out[0].reference.white.value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2, white)
-        more = beside_temperature(more, recording, PER_KELVIN[0])
+        more = beside_temperature(more, recording)
         of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
         out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
     return tuple(out)
@@ -126,14 +130,6 @@ def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: Sta
         independent_or_not(stretches, of_all, usual[1]),
         of_all,
     )
-
-
-def _reject_short(stretches: Sequence[Stretch], motion: ReferenceMotion) -> None:
-    shared = sum(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
-    if shared < LEAST_S:
-        raise InputError(
-            f"{motion.source}: log and reference share {shared:.0f} s without a gap; give at least {LEAST_S:.0f} s."
-        )
 
 
 def _sensor(
@@ -181,7 +177,8 @@ def _sensor(
 
 
 def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | None) -> Prior:
-    """The usual prior with the static N as a datum; without vibration where the band power does not exceed noise."""
+    """The usual prior with the static N as a datum; without vibration where the band power does not exceed noise,
+    without temperature where none was logged."""
     mean, sigma, is_there = usual.mean.copy(), usual.sigma.copy(), usual.is_there.copy()
     if static is not None and not static.N.is_limit and static.N.value > 0.0:
         mean[0] = np.log(static.N.value)
@@ -192,6 +189,7 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     # Without a static N only a change of power separates vibration from noise.
     shows = np.any(power > 0.0) and (static is not None or np.std(power) > 0.2 * np.mean(power))
     is_there[1] = float(shows)
+    is_there[7] = float(any(one.kelvin is not None for one in stretches))
     return replace(usual, mean=mean, sigma=sigma, is_there=is_there)
 
 
@@ -266,7 +264,7 @@ def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
 def parts_of(
     draws: FloatArray, horizon_s: float, tilt: FloatArray | None = None, alike: FloatArray = UNTURNED
 ) -> dict[Cause, FloatArray]:
-    """Mean squares (k,), summed over the axes, by cause, under strengths (k, 7); without calibration and temperature.
+    """Mean squares (k,), summed over the axes, by cause, under strengths (k, 8); without calibration and temperature.
 
     For an angle over h: 3 N² h, 3 V² h, K² h³; for the reference 2 σ² (1 - k(h)) per axis and white error, because two
     of its errors are subtracted. A body-frame error rotates with the body: the fraction ``alike`` (n,), at times from 0

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.filter_noise.strengths import DRAWN, Fitted
@@ -69,17 +70,17 @@ def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
-def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray, n: int = DRAWN, seed: int = 0) -> FloatArray:
-    """(n, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
+def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatArray:
+    """(k, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
 
     Without the prior the variance of the estimate would count twice: noise makes a perfect matrix seem imperfect.
     """
     width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
     log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
     weight = np.exp(log_p - log_p.max())
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     out = []
-    for k in rng.choice(len(sizes), n, p=weight / weight.sum()):
+    for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
         gain = sizes[k] ** 2 * np.linalg.inv(width[k])
         left = sizes[k] ** 2 * (np.eye(len(seen)) - gain)
         values, vectors = np.linalg.eigh(0.5 * (left + left.T))
@@ -101,22 +102,16 @@ def left_of(S: FloatArray) -> FloatArray:
     return np.asarray(S - scale * (u @ vt).ravel())
 
 
-# Bias proportional to a logged temperature: columns of a stretch, and its share of the error.
+# Bias proportional to a logged temperature: its effect on a stretch, and its share of the error.
 
 
-WIDE = 3.0
-"""Prior σ of the columns in units of the typical bias change per kelvin: a part may be worse than most."""
-KELVIN_SIZES = np.geomspace(1e-3, 2.0, 33)
-"""Sizes of the temperature coefficient that are tried, in units of the prior σ."""
 GROUPS = 40
 """Groups of draws with similar K: the coefficients of a group use the strengths of its median draw."""
 
 
-def beside_temperature(stretches: Sequence[Stretch], recording: Recording, per_kelvin: float) -> list[Stretch]:
-    """Stretches with three columns for a bias proportional to the logged temperature, with prior σ ``WIDE per_kelvin``.
-
-    Unchanged where no temperature was logged or its range is below ``LEAST_SWING_K``. ``per_kelvin`` is in SI/K.
-    """
+def beside_temperature(stretches: Sequence[Stretch], recording: Recording) -> list[Stretch]:
+    """Stretches with a bias proportional to the logged temperature; unchanged where none was logged or its range is
+    below ``LEAST_SWING_K``."""
     degrees = recording.temperature_degc
     if degrees is None:
         return list(stretches)
@@ -137,21 +132,11 @@ def beside_temperature(stretches: Sequence[Stretch], recording: Recording, per_k
     every = np.concatenate(of_stretches)
     if np.ptp(every) < LEAST_SWING_K:
         return list(stretches)
+    of_stretches = [kelvin - every.mean() for kelvin in of_stretches]
     return [
-        _with_columns(one, kelvin - every.mean(), WIDE * per_kelvin)
+        replace(one, kelvin=kelvin, warmth=one.bias_steps @ np.kron(kelvin[:, None], np.eye(3)))
         for one, kelvin in zip(stretches, of_stretches, strict=True)
     ]
-
-
-def _with_columns(stretch: Stretch, kelvin: FloatArray, size: float) -> Stretch:
-    along = stretch.bias_steps @ np.kron(kelvin[:, None], size * np.eye(3))
-    return replace(
-        stretch,
-        columns=np.hstack([stretch.columns, along]),
-        centre=np.append(stretch.centre, np.zeros(3)),
-        kelvin=kelvin,
-        kelvin_size=size,
-    )
 
 
 def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequence[float]) -> Left:
@@ -172,15 +157,23 @@ def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
 
     A slow bias change is due to temperature or to the random walk: each coefficient is drawn under a K near its draw's.
     """
+    size = found.draws[:, NAMES.index("per_kelvin")]
     order = np.argsort(found.draws[:, NAMES.index("bias_walk")])
+    rng = np.random.default_rng(0)
     errors = np.empty((len(order), 3))
-    for seed, some in enumerate(np.array_split(order, GROUPS)):
-        parts = [one.coefficients(found.draws[some[len(some) // 2]]) for one in told]
-        # All stretches are of one sensor; each posterior contains the prior, which counts once.
-        inverses = [np.linalg.inv(cov[-3:, -3:]) for _, cov in parts]
-        cov = np.linalg.inv(np.sum([one - np.eye(3) for one in inverses], axis=0) + FLAT * np.eye(3))
-        seen = np.sum([inverse @ mean[-3:] for inverse, (mean, _) in zip(inverses, parts, strict=True)], axis=0)
-        errors[some] = told[0].kelvin_size * drawn_errors(cov @ seen, cov, KELVIN_SIZES, len(some), seed)
+    for some in np.array_split(order, GROUPS):
+        others = np.where(np.isin(NAMES, "per_kelvin"), 0.0, found.draws[some[len(some) // 2]])
+        information, moment = np.zeros((3, 3)), np.zeros(3)
+        # All stretches are of one sensor.
+        for one in told:
+            assert one.warmth is not None
+            L, w = one.factor(others)
+            half = solve_triangular(L, one.warmth, lower=True, check_finite=False)
+            information += half.T @ half
+            moment += half.T @ w
+        for k in some:
+            cov = np.linalg.inv(information + np.eye(3) / size[k] ** 2)
+            errors[k] = cov @ moment + np.linalg.cholesky(cov) @ rng.normal(size=3)
     return errors
 
 

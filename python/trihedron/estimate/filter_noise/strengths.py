@@ -10,15 +10,17 @@ from scipy.special import gammaln, logsumexp, ndtr, ndtri, stdtrit
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch
+from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.probability import NORMAL_95
 from trihedron.records.filter_noise import Bounded
 
-COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body")
+COORDINATES = ("noise", "vibration", "bias_walk", "white", "slow", "slow_s", "body", "per_kelvin")
 """Coordinates of the search: logarithms of strengths; ``slow`` is the reference's total slow error; ``body`` is a
 standard normal number whose quantile Φ(x), in right angles, is the angle with world part ``slow`` cos, body part
 ``slow`` sin. Two strengths that may both be zero would have a posterior with a corner. The ratio of the parts is then
 half-Cauchy; Φ(x) as the share of the *square* makes a zero body part so unlikely that ``slow`` comes out too small."""
-MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow"))
+SLOW_S = COORDINATES.index("slow_s")
+MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow", "per_kelvin"))
 NU = 3.0
 """Degrees of freedom of the half-Student prior: the fewest with a mean square, which a predicted covariance needs."""
 MEDIAN = float(np.log(stdtrit(NU, 0.75)))
@@ -32,9 +34,9 @@ SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
 """Most steps of the search, longest step in a coordinate, and gain of the log posterior below which it ends."""
 ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
 """Fewest and most rounds of proposals, proposals per round, and number of draws returned."""
-LEAST_DRAWS, ENOUGH_DRAWS = 3, 15
+LEAST_DRAWS, ENOUGH_DRAWS = 3, 40
 """Effective draws per strength: below the first their covariance is too narrow, or singular, for proposals; above the
-second sampling may end."""
+second sampling may end: of 280 draws the ends of a 95 % interval are sound, of 100 they are too close together."""
 TAILS = 5
 """Degrees of freedom of a proposal: heavier tails than the posterior's."""
 TIMES_S = (10.0, 30.0, 100.0)
@@ -50,9 +52,9 @@ ABSENT = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of the coordinates: ``mean`` (7,), ``sigma`` (7,); ``is_there`` (7,) is 1 for those in the model.
+    """Prior of the coordinates: ``mean`` (8,), ``sigma`` (8,); ``is_there`` (8,) is 1 for those in the model.
 
-    A strength that ``may_be_nothing`` (7,) has a half-Student prior with median exp(mean) (Gelman 2006): flat towards
+    A strength that ``may_be_nothing`` (8,) has a half-Student prior with median exp(mean) (Gelman 2006): flat towards
     zero, so that the log and not the prior sets the upper limit of a strength that is not detected. ``sigma`` then
     bounds the search. The other coordinates are normal.
     """
@@ -62,10 +64,16 @@ class Prior:
     is_there: FloatArray
     may_be_nothing: BoolArray = field(default_factory=MAY_BE_NOTHING.copy)
 
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest coordinates (8,). A slow error that lasts less than a block is white between blocks."""
+        lowest = self.mean - FARTHEST * self.sigma
+        lowest[SLOW_S] = max(lowest[SLOW_S], np.log(BLOCK_S))
+        return lowest, self.mean + FARTHEST * self.sigma
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Strengths (7,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 7) of the
+    """Strengths (8,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 8) of the
     strengths, and their effective number."""
 
     mode: FloatArray
@@ -85,7 +93,7 @@ def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray,
     Levenberg-Marquardt steps with the average information: along the posterior's ridges a gradient search stops early.
     """
     free = prior.is_there > 0.0
-    reach = (FARTHEST - 0.1) * prior.sigma[free]
+    lowest, highest = (end[free] for end in prior.ends())
     x = prior.mean[free]
     here = height(stretches, prior, x)
     slope, information = _slope(stretches, prior, x)
@@ -93,7 +101,7 @@ def most_likely(stretches: Sequence[Stretch], prior: Prior) -> tuple[FloatArray,
     for _ in range(SEARCHES):
         step = np.linalg.solve(information + damping * np.diag(np.diag(information)), slope)
         step *= min(1.0, LONGEST_STEP / float(np.max(np.abs(step))))
-        tried = np.clip(x + step, prior.mean[free] - reach, prior.mean[free] + reach)
+        tried = np.clip(x + step, lowest + STEP, highest - STEP)
         there = height(stretches, prior, tried)
         if there > here:
             gain, x, here, damping = there - here, tried, there, damping / 5.0
@@ -136,10 +144,11 @@ def _half_slope(far: FloatArray) -> FloatArray:
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
-    """Log posterior (evidence times prior) at free coordinates (f,); -inf outside ``FARTHEST``."""
+    """Log posterior (evidence times prior) at free coordinates (f,); -inf outside ``Prior.ends``."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
-    if np.any(np.abs(far) > (FARTHEST + STEP) * sigma):
+    lowest, highest = (end[free] for end in prior.ends())
+    if np.any(x < lowest) or np.any(x > highest):
         return -np.inf
     strengths = whole(prior, x)
     normal = -0.5 * (far / sigma) ** 2 - np.log(np.sqrt(2.0 * np.pi) * sigma)
@@ -149,16 +158,16 @@ def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:
 
 
 def whole(prior: Prior, x: FloatArray) -> FloatArray:
-    """Strengths (7,) in SI from free coordinates (f,); strengths that are not in the model are 0."""
+    """Strengths (8,) in SI from free coordinates (f,); strengths that are not in the model are 0."""
     every = np.full(len(COORDINATES), -np.inf)
     every[prior.is_there > 0.0] = x
-    angle = 0.5 * np.pi * float(ndtr(every[-1]))
+    angle = 0.5 * np.pi * float(ndtr(every[6]))
     slow = np.exp(every[4])
-    return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), np.exp(every[5])])
+    return np.array([*np.exp(every[:4]), slow * np.cos(angle), slow * np.sin(angle), *np.exp(every[[5, 7]])])
 
 
 def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
-    """``prior`` of another sensor with the reference's slow error from ``draws`` (k, 7) of this sensor: it is one
+    """``prior`` of another sensor with the reference's slow error from ``draws`` (k, 8) of this sensor: it is one
     attitude error, in the angle of the gyro and in the tilt of gravity for the accelerometer."""
     s = dict(zip(NAMES, draws.T, strict=True))
     right_angles = np.arctan2(s["body"], s["world"]) / (0.5 * np.pi)
@@ -178,32 +187,47 @@ def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
 def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
     """Posterior of the strengths by adaptive importance sampling (Cornuet et al. 2012): each round proposes from
     Student's distribution with the moments of all earlier draws; weights are against the mixture of all rounds.
+
+    Proposals are in coordinates u whose strength is proportional to sinh u where it may be nothing: its density is flat
+    at 0, where the logarithm has a long tail that proposals of the right moments miss.
     """
-    middle, information = most_likely(stretches, prior)
-    first = np.linalg.inv(information)
+    mode, information = most_likely(stretches, prior)
+    from_zero = prior.may_be_nothing[prior.is_there > 0.0]
+    # u is 1 at the mode; there du / d log s is tanh 1.
+    slope = np.where(from_zero, np.tanh(1.0), 1.0)
+    first = np.linalg.inv(information) * np.outer(slope, slope)
+
+    def coordinates(u: FloatArray) -> FloatArray:
+        return np.where(from_zero, mode + np.log(np.sinh(np.where(from_zero, u, 1.0)) / np.sinh(1.0)), u)
+
+    def log_density(u: FloatArray) -> float:
+        if np.any(u[from_zero] <= 0.0):
+            return -np.inf
+        return height(stretches, prior, coordinates(u)) - float(np.sum(np.log(np.tanh(u[from_zero]))))
+
     rng = np.random.default_rng(0)
-    spread, proposals = first, []
-    x, heights = np.empty((0, len(middle))), np.empty(0)
+    middle, spread, proposals = np.where(from_zero, 1.0, mode), first, []
+    u, heights = np.empty((0, len(middle))), np.empty(0)
     for drawn in range(1, MOST_ROUNDS + 1):
         root = np.linalg.cholesky(spread)
         proposals.append((middle, root))
         widths = np.sqrt(TAILS / rng.chisquare(TAILS, size=(PROPOSED, 1)))
         new = middle + widths * rng.normal(size=(PROPOSED, len(middle))) @ root.T
-        x = np.vstack([x, new])
-        heights = np.append(heights, [height(stretches, prior, one) for one in new])
-        logs = heights - _mixture(x, proposals)
+        u = np.vstack([u, new])
+        heights = np.append(heights, [log_density(one) for one in new])
+        logs = heights - _mixture(u, proposals)
         weights = np.exp(logs - logs.max())
         weights /= weights.sum()
         if drawn >= ROUNDS and _effective(weights) > ENOUGH_DRAWS * len(middle):
             break
         # Too few effective draws make the next proposal too narrow: the weights are flattened until there are enough.
         flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
-        middle = flat @ x
-        spread = ((x - middle).T * flat) @ (x - middle) + 0.02 * first
+        middle = flat @ u
+        spread = ((u - middle).T * flat) @ (u - middle) + 0.02 * first
     evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
-    chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(x) - 1)
-    draws = np.array([whole(prior, one) for one in x[chosen]])
-    return Fitted(whole(prior, x[np.argmax(heights)]), evidence, draws, _effective(weights))
+    chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(u) - 1)
+    draws = np.array([whole(prior, coordinates(one)) for one in u[chosen]])
+    return Fitted(whole(prior, coordinates(u[np.argmax(heights)])), evidence, draws, _effective(weights))
 
 
 def _effective(weights: FloatArray) -> float:
@@ -220,7 +244,8 @@ def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) 
 
 def bounded(values: Sequence[float] | FloatArray) -> Bounded:
     """Median and 95 % interval of draws; an upper limit where the interval spans more than a factor of ``ABSENT``."""
-    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975]))
+    # The truth is one draw more: ends between order statistics k and n + 1 - k hold it with 1 - 2 k/(n + 1).
+    low, middle, high = (float(v) for v in np.quantile(values, [0.025, 0.5, 0.975], method="weibull"))
     is_limit = high > 0.0 and low < high / ABSENT
     return Bounded(middle, 0.0 if is_limit else low, high, is_limit)
 
@@ -258,7 +283,8 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
     """
     if N.is_limit:
         return ()
-    pairs = [(_without_noise(one, found.mode), _of_axes(one, found.mode)) for one in stretches]
+    others = np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, found.mode)
+    pairs = [(one.covariance(others), _of_axes(one, found.mode)) for one in stretches]
 
     def low(x: FloatArray) -> float:
         heights = [
@@ -280,11 +306,6 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
         value, factor = N.value * float(np.exp(x)), float(np.exp(NORMAL_95 * np.sqrt(variance + common)))
         each.append(Bounded(value, value / factor, value * factor))
     return tuple(each)
-
-
-def _without_noise(stretch: Stretch, strengths: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) of all random errors except noise and vibration."""
-    return stretch.covariance(np.where(np.isin(NAMES, ("noise", "vibration")), 0.0, strengths))
 
 
 def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:

@@ -18,8 +18,8 @@ from trihedron.arrays import FloatArray
 
 AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
-NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s")
-"""Order of the seven strengths of a stretch."""
+NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s", "per_kelvin")
+"""Order of the eight strengths of a stretch."""
 ALIKE = ("noise", "vibration", "white")
 """Strengths whose errors are equal and independent on the three axes."""
 BLOCK_ENDS, TRIANGLE_ENDS = (1.0 / 6.0, 0.0), (7.0 / 30.0, 1.0 / 120.0)
@@ -37,7 +37,7 @@ class Stretch:
     where the observation is the angle itself; ``given`` (3 m, 3 m) a known covariance, or None; ``attitude`` (m, 3, 3)
     body to world; ``bias_steps`` (3 m, 3 m) the derivative of the observations with respect to the bias in each block;
     ``power`` (m,) that of vibration, with mean 1; ``ends`` as ``BLOCK_ENDS``; ``kelvin`` (m,) the logged temperature
-    less its mean, ``kelvin_size`` [SI/K] the prior σ of the bias per kelvin, which is the last three columns;
+    less its mean, and ``warmth`` (3 m, 3) the derivative of the observations by the bias per kelvin, or None;
     ``quietest`` [SI/√Hz] the noise density of the log's quietest block, above the band: static noise and vibration.
     """
 
@@ -53,7 +53,7 @@ class Stretch:
     power: FloatArray
     ends: tuple[float, float] = BLOCK_ENDS
     kelvin: FloatArray | None = None
-    kelvin_size: float = 0.0
+    warmth: FloatArray | None = None
     given: AnyFloats | None = None
     quietest: float = 0.0
 
@@ -76,10 +76,12 @@ class Stretch:
         return np.abs(np.subtract.outer(self.time_s, self.time_s))
 
     def covariance(self, strengths: FloatArray) -> FloatArray:
-        """Covariance (3 m, 3 m) of all random errors under ``strengths`` (7,) in SI; a strength may be 0."""
+        """Covariance (3 m, 3 m) of all random errors under ``strengths`` (8,) in SI; a strength may be 0."""
         s = dict(zip(NAMES, strengths, strict=True))
         m = len(self.time_s)
-        correlation = matern(self.lag_s, s["slow_s"])
+        # An observation is a mean over a block; of a velocity's increment over a triangle, as wide as √2 blocks.
+        width_s = float(np.median(np.diff(self.time_s))) * (1.0 if self.tilts is None else np.sqrt(2.0))
+        correlation = matern_of_means(self.lag_s, float(s["slow_s"]), width_s)
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
@@ -93,6 +95,8 @@ class Stretch:
             parted += np.cumsum(np.cumsum(added, axis=0), axis=2)
         for axis in range(3):
             parted[:, axis, :, axis] += same
+        if self.warmth is not None:
+            out += s["per_kelvin"] ** 2 * self.warmth @ self.warmth.T
         return np.asarray(out if self.given is None else out + self.given)
 
     def evidence(self, strengths: FloatArray) -> float:
@@ -112,14 +116,6 @@ class Stretch:
         gain = solve_triangular(inner, X.T @ y, lower=True)
         log_det = np.sum(np.log(np.diag(L))) + np.sum(np.log(np.diag(inner)))
         return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
-
-    def coefficients(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Posterior mean (p,), relative to ``centre``, and covariance (p, p) of the columns' coefficients."""
-        L = cholesky(self.covariance(strengths), lower=True, check_finite=False)
-        y = self.observed - self.columns @ self.centre
-        half = solve_triangular(L, np.column_stack([self.columns, y]), lower=True, check_finite=False)
-        covariance = np.asarray(np.linalg.inv(np.eye(self.columns.shape[1]) + half[:, :-1].T @ half[:, :-1]), float)
-        return covariance @ (half[:, :-1].T @ half[:, -1]), covariance
 
     def factor(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Cholesky factor (3 m, 3 m) of the covariance plus the columns' prior, and whitened observations (3 m,)."""
@@ -144,6 +140,7 @@ class Stretch:
             attitude=self.attitude[at],
             power=self.power[at],
             kelvin=None if self.kelvin is None else self.kelvin[at],
+            warmth=None if self.warmth is None else self.warmth[rows],
         )
 
     def with_gauss_markov(self, correlation_time_s: float) -> Stretch:
@@ -159,6 +156,18 @@ def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
     """Matérn-3/2 correlation at lags [s]: the error of a smoothed reference is differentiable."""
     x = np.sqrt(3.0) * lag_s / np.maximum(tau_s, 1e-9)
     return np.asarray((1.0 + x) * np.exp(-x))
+
+
+def matern_of_means(lag_s: FloatArray, tau_s: float, width_s: float) -> FloatArray:
+    """Correlation of means over ``width_s`` of a unit Matérn-3/2 process: second difference of its second integral."""
+    rate = np.sqrt(3.0) / max(tau_s, 1e-9)
+
+    def twice_integrated(lag: FloatArray) -> FloatArray:
+        t = np.abs(lag)
+        return np.asarray((3.0 / rate**2 + t / rate) * np.exp(-rate * t) + 2.0 * t / rate)
+
+    both = twice_integrated(lag_s + width_s) + twice_integrated(lag_s - width_s)
+    return np.asarray((both - 2.0 * twice_integrated(lag_s)) / width_s**2)
 
 
 def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
@@ -200,7 +209,7 @@ def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, hor
 
     With V = L Lᵀ and w = L⁻¹y the prediction of observation j from those up to k is L[j, :k] w[:k], its covariance
     L[j, k:j] L[j, k:j]ᵀ: one factor gives the filter over every horizon. Means and covariances are those of the mixture
-    over ``draws`` (d, 7) of the strengths. None where no stretch is long enough.
+    over ``draws`` (d, 8) of the strengths. None where no stretch is long enough.
     """
     nees, actual, predicted, apart = [], [], [], 0
     for stretch, first in stretches:

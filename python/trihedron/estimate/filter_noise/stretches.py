@@ -5,14 +5,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from trihedron._core import ReferenceBlocks
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, TRIANGLE_ENDS, Stretch, accumulated, neighbours, walked
-from trihedron.estimate.reference.beside import Beside, Point
+from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.ranges import edges_of
 
 START_RAD = 0.3
 """Prior σ of the attitude error at the start of a stretch: the fit leaves some degrees."""
+PARTS = (np.arange(8) + 0.5) / 8 - 0.5
+"""Parts of a block at which a slow error is averaged."""
 LONGEST, SHORTEST = 300, 12
 """Most and fewest blocks of a stretch: over five minutes parameters drift (temperature), and matrices stay small."""
 
@@ -68,7 +71,8 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
     rows = blocks.rows()[:, 0]
     moments = blocks.moments().reshape(-1, 3, 3, blocks.moments().shape[-1])
     table = {
-        "time": blocks.time_s(), "angle": problem.observed.reshape(-1, 3), "bias": moments[:, :, :, 3],
+        "time": blocks.time_s(), "angle": problem.observed.reshape(-1, 3) + _within_blocks(blocks, point),
+        "bias": moments[:, :, :, 3],
         "columns": problem.columns.reshape(len(rows), 3, -1), "attitude": blocks.attitude(),
         "white": rows.max() / np.maximum(rows, 1), "power": np.pad(vibration, (0, len(rows) - m)),
     }  # fmt: skip
@@ -76,6 +80,17 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
         replace(_angle_stretch(table, slice(a, b), n * side.grid.step_s, problem.centre), quietest=quietest)
         for a, b in runs(is_good[:m] & seen[:m])
     ]
+
+
+def _within_blocks(blocks: ReferenceBlocks, point: Point) -> FloatArray:
+    """(m, 3) means of the estimated slow error over the blocks less its values at their middles, which `Beside.problem`
+    adds to the observations: with them an observation contains the whole mean of the error."""
+    time = blocks.time_s()
+    if point.slow is None:
+        return np.zeros((len(time), 3))
+    parts = np.array([point.slow.at(time + part * BLOCK_S) for part in PARTS]).mean(axis=0)
+    world, body = parts - point.slow.at(time)
+    return np.asarray(world + np.einsum("mij,mj->mi", blocks.attitude(), body))
 
 
 def _angle_stretch(table: dict[str, FloatArray], at: slice, h: float, centre: FloatArray) -> Stretch:
