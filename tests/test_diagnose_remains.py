@@ -98,6 +98,23 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1, abs=1.0), what
 
 
+def test_losses_in_most_moves_are_found_beside_each_other():
+    recording, truth = simulated(seed=2, n_poses=20, grade="tactical")
+    rng = np.random.default_rng(2)
+    moving = np.concatenate([np.arange(s.start + 20, s.stop - 20) for s in truth.segments if s.kind == "move"])
+    gone = np.concatenate([k + np.arange(rng.integers(1, 3)) for k in rng.choice(moving, 14, replace=False)])
+    kept = np.setdiff1d(np.arange(recording.n_samples), gone)
+    log = replace(
+        recording, accelerometer=recording.accelerometer[kept], gyroscope=recording.gyroscope[kept],
+        time_s=recording.time_s[: len(kept)],
+    )  # fmt: skip
+    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert [one.id for one in found.effects][:1] == ["dropped-samples"]
+    lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
+    # Two of them are lost where hardly anything turns.
+    assert 0.8 * len(gone) <= lost.value <= len(gone)
+
+
 @cache
 def session(lean_rad, scatter_rad_s, decay_rad_s=0.0, seed=1):
     """Poses that lean by ``lean_rad`` within seconds of being set down, gyro biases drawn anew in each, of which

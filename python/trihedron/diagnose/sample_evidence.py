@@ -108,15 +108,13 @@ def _mends(before: Fit, after: Fit, begins: frozenset[int] | None) -> bool:
     """Whether corrected readings (samples inserted, timestamps made even) are predicted better when held out.
 
     Where only the moves that begin at some poses were changed, the misfit of gravity and velocity after these must
-    fall, in units of the dispersion of the other moves: after a jolt that looks like a loss it does not.
+    fall, in units of the dispersion of the other moves: after a jolt that looks like a loss it does not. The others may
+    have lost samples too, and decide over the rest of the session.
     """
     was, now = predict_held_out(before), predict_held_out(after)
-    stays = np.maximum(now.per_row, 1.0)
-    gain = float(((was.per_row - now.per_row) * now.n_rows / stays).sum())
-    if gain <= 0.0 or not (now.per_row < VISIBLE * was.per_row).any():
-        return False
     if begins is None:
-        return True
+        gain = float(((was.per_row - now.per_row) * now.n_rows / np.maximum(now.per_row, 1.0)).sum())
+        return gain > 0.0 and bool((now.per_row < VISIBLE * was.per_row).any())
     (there, others), (there_after, _) = (_of_moves(*pair, begins) for pair in ((before, was), (after, now)))
     # The upper quartile: up to a quarter of the other moves may have lost samples too.
     usual = max(float(np.quantile(others, 0.75) / chdtri(1, 0.25)) if len(others) else 1.0, 1.0)

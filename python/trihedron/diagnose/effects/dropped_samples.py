@@ -96,6 +96,13 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
     return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)
 
 
+def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
+    """Observations of the recording with samples inserted."""
+    if not losses:
+        return obs
+    return replace(observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging), jitter_s=obs.jitter_s)
+
+
 def moved(n: int, losses: dict[int, int]) -> IntArray:
     """(n,) places of samples once ``losses`` (counts after samples) are inserted."""
     extra = np.zeros(n, dtype=np.intp)
@@ -155,8 +162,8 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
 
     The joint of the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the
     move determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
-    session is fitted without the moves that seem to have lost most, half of all at the most, so that a loss cannot bias
-    it. Computed once per set of observations.
+    session is fitted with those inserted that the motion alone decides, and without the moves that seem to have other
+    losses, half of all at the most, so that a loss cannot bias it. Computed once per set of observations.
     """
     if context.obs not in _KNOWN:
         losses = list(find_losses(context.obs))
@@ -164,16 +171,35 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
             clear = [one for one in losses if one.is_certain]
             _KNOWN[context.obs] = clear, {one.sample: 0.5 + UNSETTLED * one.count for one in clear}
         else:
-            _KNOWN[context.obs] = _by_gravity(context, losses)
+            counted = _by_gravity(context, losses)
+            # Two losses close together are one joint that fits neither: the second shows once the first is inserted.
+            more = _beside(context.obs, counted[0])
+            _KNOWN[context.obs] = _by_gravity(context, [*counted[0], *more]) if more else counted
     return _KNOWN[context.obs]
+
+
+def _beside(obs: Observations, known: list[Loss]) -> list[Loss]:
+    """Losses that show once the ``known`` ones are inserted."""
+    counts = {one.sample: one.count for one in known}
+    place = moved(obs.recording.n_samples, counts)
+    found = (
+        [
+            replace(one, sample=int(np.searchsorted(place, one.sample, side="right")) - 1)
+            for one in find_losses(_with_losses(obs, counts))
+        ]
+        if known
+        else []
+    )
+    return [one for one in found if one.sample not in counts]
 
 
 def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[int, float]]:
     obs = context.obs
-    by_gain = dict.fromkeys(loss.move for loss in sorted(losses, key=lambda one: -one.gain))
-    touched = set(list(by_gain)[: obs.n_moves // 2])
-    clean = _of_moves_that_agree(obs.without_moves(touched), context.fitted.state, context.fitted.prior)
-    misfit = (move_residuals(obs, clean) ** 2).sum(axis=1)
+    doubtful = [one for one in sorted(losses, key=lambda one: -one.gain) if not one.is_certain]
+    touched = set(list(dict.fromkeys(one.move for one in doubtful))[: obs.n_moves // 2])
+    whole = _with_losses(obs, {one.sample: one.count for one in losses if one.is_certain})
+    clean = _of_moves_that_agree(whole.without_moves(touched), context.fitted.state, context.fitted.prior)
+    misfit = (move_residuals(whole, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
     counted: list[Loss] = []
     sigmas: dict[int, float] = {}
@@ -200,17 +226,29 @@ class _Move:
         return float((move_residuals(whole, self.state) ** 2).sum())
 
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
-        """Losses with the counts that gravity determines, the clearest first; those that do not reduce the misfit are
-        left out."""
-        own: list[Loss] = []
-        for one in sorted(losses, key=lambda one: -one.gain):
-            tried = [*own, one]
-            for k in reversed(range(len(tried))):  # the new one, then those beside it
-                tried[k] = self._best(tried, k)
-            best = self.misfit(tried)
-            if self.misfit(own) - best >= MIN_FALL * max(best / 5.0, self.usual):
-                own = tried
+        """Losses with the counts that gravity determines; those that do not reduce the misfit are left out.
+
+        Those that the motion alone decides are refined together: one without the other has a wrong count.
+        """
+        own = self._refined([one for one in losses if one.is_certain])
+        for one in sorted((one for one in losses if not one.is_certain), key=lambda one: -one.gain):
+            tried = self._refined([*own, one])
+            own = tried if self._is_better(tried, own) else own
+        for one in sorted(own, key=lambda one: one.gain):
+            fewer = self._refined([other for other in own if other.sample != one.sample])
+            own = own if self._is_better(own, fewer) else fewer
         return own
+
+    def _refined(self, own: list[Loss]) -> list[Loss]:
+        """The losses with their best counts, the last one first."""
+        out = list(own)
+        for k in reversed(range(len(out))):
+            out[k] = self._best(out, k)
+        return out
+
+    def _is_better(self, more: Sequence[Loss], fewer: Sequence[Loss]) -> bool:
+        best = self.misfit(more)
+        return self.misfit(fewer) - best >= MIN_FALL * max(best / 5.0, self.usual)
 
     def _best(self, own: list[Loss], k: int) -> Loss:
         best, least = own[k], self.misfit(own)
@@ -278,10 +316,6 @@ class DroppedSamples(DirectEffect):
             has_more=len(losses) > MOST_NAMED, more=len(losses) - MOST_NAMED,
         )  # fmt: skip
 
-        def reweigh(old: Observations) -> Observations:
-            recording, segments = insert_samples(old.recording, old.segments, counts)
-            return replace(observe(recording, segments, old.averaging), jitter_s=old.jitter_s)
-
         where = Where(
             (),
             tuple(dict.fromkeys(obs.move_names([loss.move for loss in losses]))),
@@ -292,5 +326,6 @@ class DroppedSamples(DirectEffect):
         p = float(np.exp(-0.5 * clearest)) * n_intervals * most_lost(obs.recording.rate_hz)
         return Evidence(
             p, gain, parameters, statement, "timing", where,
-            reweigh=reweigh, begins=frozenset(obs.move_poses[[loss.move for loss in losses], 0].tolist()),
+            reweigh=lambda old: _with_losses(old, counts),
+            begins=frozenset(obs.move_poses[[loss.move for loss in losses], 0].tolist()),
         )  # fmt: skip
