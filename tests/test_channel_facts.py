@@ -112,6 +112,17 @@ def test_a_log_at_rest_on_its_limit_and_one_that_is_merely_coarse_are_told_apart
     assert Recording(np.arange(6000) / 100.0, coarse, None, 100.0).facts.of("accelerometer").limits == ()
 
 
+def test_equal_extremes_of_readings_on_no_grid_are_limits():
+    rng = np.random.default_rng(3)
+    poses = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0.6, 0.5], [0.3, -0.8, 0.5]]) * 9.81
+    force = np.repeat(poses, 300, axis=0) + rng.normal(0.0, 0.02, (1800, 3))
+    recording = Recording(np.arange(1800) / 100.0, np.clip(force, -9.79, 9.79), None, 100.0)
+    assert {(w.axis, w.value) for w in recording.facts.accelerometer.limits} == {
+        (0, 9.79), (0, -9.79), (1, 9.79), (2, -9.79)
+    }  # fmt: skip
+    assert not replace(recording, accelerometer=force).facts.accelerometer.limits
+
+
 @pytest.mark.parametrize("sigma", [0.05, 0.3, 0.7, 3.0])
 def test_swings_of_one_height_end_on_no_limit(sigma):
     # Never static: what looks like noise is motion, and a thousand peaks end on one code.

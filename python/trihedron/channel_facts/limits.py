@@ -251,6 +251,9 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
         return False
     is_word = is_end_of_word(end.value, end.step)
     is_known = is_word or any(_is_same_code(end, other) for other in lasting if other is not end)
+    # Without an LSB no two extremes are alike by chance.
+    if is_known and end.step <= 0.0 and end.lasts:
+        return True
     is_peak = is_cut(end, is_known=is_known, is_word=is_word)
     return is_peak or is_cut_noise(end) or _chance([end]) < BY_CHANCE
 
