@@ -98,9 +98,17 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
 
 def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
     """Observations of the recording with samples inserted."""
+    return replace(observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging), jitter_s=obs.jitter_s)
+
+
+def _same_moves(obs: Observations, losses: dict[int, int]) -> Observations:
+    """The observations with samples inserted, of the same moves: others may have been left out of them before."""
     if not losses:
         return obs
-    return replace(observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging), jitter_s=obs.jitter_s)
+    whole, known = _with_losses(obs, losses), {(int(a), int(b)) for a, b in obs.move_poses}
+    other = {m for m, (a, b) in enumerate(whole.move_poses) if (int(a), int(b)) not in known}
+    whole = whole.without_moves(other)
+    return whole if whole.n_moves == obs.n_moves else obs
 
 
 def moved(n: int, losses: dict[int, int]) -> IntArray:
@@ -181,15 +189,13 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
 def _beside(obs: Observations, known: list[Loss]) -> list[Loss]:
     """Losses that show once the ``known`` ones are inserted."""
     counts = {one.sample: one.count for one in known}
+    whole = _same_moves(obs, counts)
+    if whole is obs:
+        return []
     place = moved(obs.recording.n_samples, counts)
-    found = (
-        [
-            replace(one, sample=int(np.searchsorted(place, one.sample, side="right")) - 1)
-            for one in find_losses(_with_losses(obs, counts))
-        ]
-        if known
-        else []
-    )
+    found = [
+        replace(one, sample=int(np.searchsorted(place, one.sample, side="right")) - 1) for one in find_losses(whole)
+    ]
     return [one for one in found if one.sample not in counts]
 
 
@@ -197,7 +203,7 @@ def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[
     obs = context.obs
     doubtful = [one for one in sorted(losses, key=lambda one: -one.gain) if not one.is_certain]
     touched = set(list(dict.fromkeys(one.move for one in doubtful))[: obs.n_moves // 2])
-    whole = _with_losses(obs, {one.sample: one.count for one in losses if one.is_certain})
+    whole = _same_moves(obs, {one.sample: one.count for one in losses if one.is_certain})
     clean = _of_moves_that_agree(whole.without_moves(touched), context.fitted.state, context.fitted.prior)
     misfit = (move_residuals(whole, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
