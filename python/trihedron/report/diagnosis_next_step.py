@@ -11,6 +11,7 @@ from trihedron.report.diagnosis_numbers import of_another_device
 from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, named_effects, own_serious
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
+from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
 
@@ -32,6 +33,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
+        if imprecise_in_diagnosis(diagnosis):
+            keep = f"Take over the parameters of this log, which are more certain: {_taken_by(model)}."
         return dependent(diagnosis) or (keep if diagnosis.parameters else use)
     if diagnosis.verdict == "not-testable":
         record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"

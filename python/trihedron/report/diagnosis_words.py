@@ -7,6 +7,7 @@ from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
 from trihedron.report.findings.wording import opening
+from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -66,7 +67,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
             f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
-            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
+            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}{imprecise_in_diagnosis(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
         named = named_effects(diagnosis, "recording")
@@ -133,10 +134,11 @@ def _disagree(subjects: list[str]) -> str:
 
 def level_of(diagnosis: Diagnosis) -> Level:
     """The colour of the verdict: bad where the log's own calibration is not to be trusted; consistency is not good
-    where the reference was computed from these readings."""
+    where the reference was computed from these readings, or where the given calibration is imprecise."""
     if own_serious(diagnosis) is not None:
         return "bad"
-    return "usable" if diagnosis.verdict == "consistent" and dependent(diagnosis) else LEVELS[diagnosis.verdict]
+    is_weak = bool(dependent(diagnosis) or imprecise_in_diagnosis(diagnosis))
+    return "usable" if diagnosis.verdict == "consistent" and is_weak else LEVELS[diagnosis.verdict]
 
 
 def dependent(diagnosis: Diagnosis) -> str:
