@@ -8,9 +8,9 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.records import FindingCode
 from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import (
-    GEOMETRY,
     PARAMETERS,
     Change,
     Repeated,
@@ -71,7 +71,8 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = f"Usable: {agree}"
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        word = "Several devices" if any(change.id in GEOMETRY for change in changed) else "Usable with the spread below"
+        is_one = all(finding.code is not FindingCode.SEVERAL_DEVICES for finding in model.findings)
+        word = "Usable with the spread below" if is_one else "Several devices"
         usable = f"{word}: {parameters} changed between {used}"
     usable += _worst(model)
     return Document(

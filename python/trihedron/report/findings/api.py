@@ -294,12 +294,12 @@ _MANY_RECORDINGS = {
     ),
     (Code.SEVERAL_DEVICES, "", WARNING): Words(
         "The {parameter:ids} differs between the recordings: {amount}.",
-        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Recordings of different units; in one unit axes keep their directions, and a scale changes by less than 1 %.",
         "Diagnose the recordings of one unit together; what recordings of different units share is of the design.",
     ),
     (Code.SEVERAL_DEVICES, "calibrated", WARNING): Words(
         "The {parameter:ids} differs between the recordings: {amount}.",
-        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Recordings of different units; in one unit axes keep their directions, and a scale changes by less than 1 %.",
         "Calibrate the recordings of each unit by themselves: common parameters of several units fit none of them.",
     ),
     **{
