@@ -14,6 +14,7 @@ from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
+from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_parameters import common_factor
 from trihedron.files.calibration import read_calibration
 from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of
@@ -270,3 +271,12 @@ def test_a_scale_of_one_axis_two_percent_off_is_of_another_unit_in_every_command
         found = several_devices(pair, changes_among([pair], alpha=0.01))
         assert [one.code for one in found] == [FindingCode.SEVERAL_DEVICES] * is_several
     assert [one.name for one, _ in beyond_one_unit([made(first, covariance), made(other, covariance)])] == ["x"]
+
+
+def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(four_sessions):
+    result = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+    good = result.calibration
+    bad = replace(good, accelerometer=replace(good.accelerometer, b=good.accelerometer.b + 1.0))
+    for calibration, codes in ((good, []), (bad, [FindingCode.WORSE_THAN_UNCALIBRATED])):
+        said = reference_findings(calibration, result.recording, result.segments)
+        assert [one.code for one in said] == codes
