@@ -45,7 +45,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
         left = {one.domain for one in diagnosis.domains if one.disagrees}
         clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
-        again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
+        is_of_moves = "moves" in left <= {"moves", "dynamics"}
+        again = f"Record again{clock if is_of_moves else ''}; what returns belongs to the sensor, what does not "
         again += "to the session."
         checked = of_another_device(diagnosis, model)
         return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"

@@ -35,9 +35,13 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
+MOSTLY = 0.5
+"""Share of the misfit from which an effect is not of little effect."""
 MOST_NAMED = 4
 IN_FULL = ("axis-handedness",)
 """Effects whose statement names what is wrong in the log: a verdict states it."""
+STATED = (*IN_FULL, "disturbed-pose")
+"""Effects that a verdict states by their statement: it says where in the log."""
 NOT_JUDGED = "not judged"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
@@ -62,7 +66,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, IN_FULL)]
+    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, STATED)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
@@ -84,7 +88,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
     tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
-    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in IN_FULL]
+    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in STATED]
     if missing:
         said.append(f"the model lacks {listed(missing)}")
     if surplus:
@@ -99,9 +103,14 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     """The verdict on residuals ``off`` that the effects ``named`` do not explain."""
     text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
-    text += "effect explains it"
+    text += "effect explains"
     if named:
-        text += f" (found, of little effect: {listed(named)})"
+        shares = [one.share for one in diagnosis.effects if one.side in ("", "recording") and one.share is not None]
+        most = sum(shares) if len(shares) == len(named) else 0.0
+        size = f"{100.0 * min(most, 1.0):.0f} % of the misfit" if most > MOSTLY else "of little effect"
+        text += f" {'all of it' if most > MOSTLY else 'it'} (found, {size}: {listed(named)})"
+    else:
+        text += " it"
     if diagnosis.relations:
         # Those of the largest relation first.
         names = list(dict.fromkeys(variable_in_print(name) for one in diagnosis.relations for name in one.depends_on))
