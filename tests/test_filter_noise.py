@@ -214,7 +214,9 @@ def test_what_a_log_lacks_is_said_at_once():
     swing = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.1 * t])
     moving = Recording.from_arrays(t, swing + np.array([0.0, 0.0, G]), swing, gyroscope_unit="counts")
     still = replace(resting(3), accelerometer_unit=AccelerationUnit.COUNTS, gyroscope_unit=RateUnit.COUNTS)
-    with pytest.raises(ValueError, match=r"not static in it for 20 s.*reference.*the static log is in counts"):
+    still = replace(still, source="still.csv")
+    said = r"not static in it for 20 s.*reference.*is in counts.*`trihedron allan still.csv`"
+    with pytest.raises(ValueError, match=said):
         trihedron.filter_noise(moving, static=trihedron.allan(still))
 
 

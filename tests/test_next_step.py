@@ -13,6 +13,7 @@ from trihedron.cli.options import GravitySource, LogSource
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document, FindingList, Section
+from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 
 MY_LOG = "'my log.csv' --rate 50"
 
@@ -154,3 +155,13 @@ def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
         said = next_step_in_words(found)
         assert said.startswith("Against timing jitter") == is_first
         assert ("--extended" in said) == is_first
+
+
+def test_a_calibration_whose_errors_are_far_above_noise_is_replaced_though_its_uncertainty_allows_them():
+    agrees = SimpleNamespace(significant=False, id="accel-scale")
+    found = SimpleNamespace(verdict="consistent", parameters=(agrees,))
+    for chi2, is_kept in ((1.5, True), (700.0, False)):
+        domain = SimpleNamespace(domain="static-accel", chi2_per_dof=chi2)
+        found.stages = (SimpleNamespace(stage="as-given", domains=(domain,)),)
+        assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
+        assert ("26 times noise alone" in imprecise_in_diagnosis(found)) != is_kept

@@ -8,10 +8,13 @@ import pytest
 
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
+from trihedron.api.sessions import several_devices
 from trihedron.cli import main
 from trihedron.estimate.sessions.changes import changes_among
+from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
+from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_parameters import common_factor
 from trihedron.files.calibration import read_calibration
 from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of
@@ -254,3 +257,26 @@ def test_one_factor_on_all_axes_of_a_gyro_is_told_from_a_change_of_one_axis(four
     verified = trihedron.verify(known, log)
     common = common_factor(verified.verification.parameters, "gyro-scale")
     assert (common is not None) is is_common
+
+
+def test_a_scale_of_one_axis_two_percent_off_is_of_another_unit_in_every_command_and_a_common_one_is_not():
+    first, alike, factor = np.zeros(21), np.zeros(21), np.zeros(21)
+    other = first.copy()
+    other[12] = 0.02  # gyro scale X
+    alike[12] = 0.004
+    factor[12:15] = 0.02
+    covariance = np.eye(21) * 1e-8
+    for numbers, is_several in ((other, True), (alike, False), (factor, False)):
+        pair = [made(one, covariance) for one in (first, numbers)]
+        found = several_devices(pair, changes_among([pair], alpha=0.01))
+        assert [one.code for one in found] == [FindingCode.SEVERAL_DEVICES] * is_several
+    assert [one.name for one, _ in beyond_one_unit([made(first, covariance), made(other, covariance)])] == ["x"]
+
+
+def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(four_sessions):
+    result = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+    good = result.calibration
+    bad = replace(good, accelerometer=replace(good.accelerometer, b=good.accelerometer.b + 1.0))
+    for calibration, codes in ((good, []), (bad, [FindingCode.WORSE_THAN_UNCALIBRATED])):
+        said = reference_findings(calibration, result.recording, result.segments)
+        assert [one.code for one in said] == codes

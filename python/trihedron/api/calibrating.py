@@ -32,7 +32,7 @@ from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
 from trihedron.estimate.session.start import GyroClippedError
-from trihedron.estimate.verification import sense_findings
+from trihedron.estimate.verification import reference_findings, sense_findings
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -140,7 +140,8 @@ def calibrate(
             raise InputError("a turntable's speeds belong to poses and moves: leave them, or the reference, out.")
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
-        said = said if found.accelerometer is not None else ()
+        is_fitted = found.accelerometer is not None
+        said = (*said, *reference_findings(by_motion, recording, segments)) if is_fitted else ()
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
     require_poses(recording, segments)
     if method == "faces":

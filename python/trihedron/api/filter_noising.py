@@ -45,11 +45,6 @@ BAND_PART = 0.25
 """Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
 FILE_PART = 1.1
 """Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
-IN_COUNTS = (
-    "the static log is in counts: give the JSON of `trihedron allan LOG` with --calibration FILE, or with --gyro-lsb "
-    "and --accel-lsb, the sizes of a count"
-)
-
 Static = dict[str, StaticNoise]
 
 
@@ -168,7 +163,7 @@ def _no_noise(recording: Recording, segments: Segments | None, static: Noise | s
     if static is not None:
         remedy = "; static values alone are those of `trihedron allan`"
         if isinstance(static, Noise) and not _sensors(static):
-            remedy += f". Beside a reference, too, {IN_COUNTS}"
+            remedy += f". Beside a reference, too, {_in_counts(static)}"
     return (
         f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
         f"beside it (--reference){remedy}."
@@ -229,8 +224,15 @@ def _static(given: Noise | str | os.PathLike[str]) -> Static:
         )
     known = _sensors(given)
     if not known:
-        raise InputError(f"{given.source}: {IN_COUNTS}.")
+        raise InputError(f"{given.source}: {_in_counts(given)}.")
     return known
+
+
+def _in_counts(static: Noise) -> str:
+    return (
+        f"the static log is in counts: give the JSON of `trihedron allan {_name(static)}` with --calibration FILE, or "
+        "with --gyro-lsb and --accel-lsb, the sizes of a count"
+    )
 
 
 def _not_noise(static: Noise | None) -> tuple[Finding, ...]:

@@ -17,6 +17,7 @@ from trihedron.api.sessions_combined import amount_of, combine
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among
+from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
@@ -125,7 +126,7 @@ def calibrate_sessions(
     of_place = (one for one in results[0].findings if one.code is FindingCode.GRAVITY_DEFAULTED)
     findings = (*of_place, *_doubts(results, sessions), *model.findings)
     if by != "device":
-        findings = (*several_devices(model.changes, "calibrated"), *findings)
+        findings = (*several_devices(sessions, model.changes, "calibrated"), *findings)
     model = replace(model, calibration=replace(model.calibration, findings=findings), findings=findings)
     return SessionsResult(model, tuple(results))
 
@@ -170,19 +171,26 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
 
 
 def of_several_units(results: Sequence[CalibrationResult]) -> tuple[Finding, ...]:
-    """Findings where misalignments differ between recordings: in one unit the axes keep their directions."""
+    """Findings where recordings differ by more than those of one unit."""
     alike = [one for k, one in enumerate(results) if _unfit(one, results[:k]) is None]
     if len(alike) < 2:
         return ()
-    return several_devices(changes_among([sessions_of(alike, [""] * len(alike))], alpha=FALSE_ALARM))
+    sessions = sessions_of(alike, [""] * len(alike))
+    return several_devices(sessions, changes_among([sessions], alpha=FALSE_ALARM))
 
 
-def several_devices(changes: Sequence[Change], case: Literal["", "calibrated"] = "") -> tuple[Finding, ...]:
-    """A finding for every misalignment that changed."""
+def several_devices(
+    sessions: Sequence[Session], changes: Sequence[Change], case: Literal["", "calibrated"] = ""
+) -> tuple[Finding, ...]:
+    """A finding for every misalignment that changed, and every scale that changed by more than those of one unit.
+
+    A scale common to all axes is not among them: a unit of measurement or a clock changes it as well.
+    """
+    apart = {*GEOMETRY, *(parameter.id for parameter, _ in beyond_one_unit(sessions))}
     return tuple(
         Finding.of(FindingCode.SEVERAL_DEVICES, case, parameter=one.id, amount=amount_of(one))
         for one in changes
-        if one.significant and one.id in GEOMETRY
+        if one.significant and one.id in apart
     )
 
 

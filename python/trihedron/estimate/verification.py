@@ -177,6 +177,24 @@ def _worse_than_none(
     ]
 
 
+def reference_findings(calibration: Calibration, recording: Recording, segments: Segments) -> Iterator[Finding]:
+    """Finding where a calibration by a reference leaves the static poses of its own log no smaller gravity error."""
+    means, gravity = segments.accelerometer_mean, calibration.gravity_m_s2
+    if means is None or not len(means):
+        return
+    noise, without = _variance(segments.norm_sigma, segments.n_poses), uncalibrated(calibration, None, recording)
+    error, _, sigma = norm_error(calibration.accelerometer, means, noise, gravity)
+    bare, _, _ = norm_error(without.accelerometer, means, noise, gravity)
+    if rms_of(error) >= rms_of(bare):
+        yield Finding.of(
+            FindingCode.WORSE_THAN_UNCALIBRATED,
+            "reference",
+            rms_m_s2=rms_of(error),
+            rms_without_m_s2=rms_of(bare),
+            expected_m_s2=rms_of(sigma),
+        )
+
+
 def sense_findings(calibration: Calibration, recording: Recording, segments: Segments) -> Iterator[Finding]:
     """Finding where the moves of the log itself contradict the sense of the stated turns that a gyro was fitted to."""
     gyro = calibration.gyroscope

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,10 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
+from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
-from trihedron.probability import betaincinv, fdtrc, ndtr
+from trihedron.probability import betaincinv, fdtrc
 from trihedron.records.fleet import EffectCount, FleetLog, FleetSummary, MixedLogs, Outlier
 from trihedron.records.sessions import PARAMETERS, Session
 
@@ -22,9 +22,6 @@ MOST_NAMED = 4
 """Most logs that are named among those that were not compared."""
 FEWEST = 4
 """Fewest devices for outliers: with three, the spread of the others would be from two."""
-ONE_UNIT = 0.01
-"""Largest difference in relative scale, or angle [rad], between two logs of one unit: 0.03 %/K over 30 K; units differ
-by several per cent (data sheets of consumer parts: 3 %)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -227,24 +224,9 @@ def _log_bias(dof: float) -> float:
 
 
 def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
-    """Groups of logs whose scales or axis angles differ significantly by more than ``ONE_UNIT``: not of one device."""
-    fixed = [k for k, parameter in enumerate(PARAMETERS) if not parameter.id.endswith("bias")]
-    found = []
-    for serial, sessions in by_device.items():
-        pairs = list(combinations(sessions, 2))
-        n_tests = max(len(pairs) * sum(k < len(sessions[0].numbers) for k in fixed), 1)
-        worst: tuple[float, int] = (0.0, 0)
-        for a, b in pairs:
-            for k in fixed:
-                if k >= len(a.numbers):
-                    continue
-                away = float(abs(a.numbers[k] - b.numbers[k]))
-                sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], 1e-300)))
-                if ndtr(-(away - ONE_UNIT) / sigma) * n_tests < FALSE_ALARM and away > worst[0]:
-                    worst = away, k
-        if worst[0] > 0.0:
-            found.append(MixedLogs(serial, len(sessions), PARAMETERS[worst[1]], worst[0]))
-    return tuple(found)
+    """Groups of logs that are not of one device."""
+    apart = ((serial, len(sessions), beyond_one_unit(sessions)) for serial, sessions in by_device.items())
+    return tuple(MixedLogs(serial, n, *found[0]) for serial, n, found in apart if found)
 
 
 def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[EffectCount, ...]:

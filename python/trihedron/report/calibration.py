@@ -8,7 +8,7 @@ from trihedron.arrays import AXES, TINY, XYZ, FloatArray
 from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
-from trihedron.report.calibration_charts import correlations, strong_correlations
+from trihedron.report.calibration_charts import correlations, excluded_moves, strong_correlations
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables, undetermined
 from trihedron.report.calibration_pictures import (
     before_words,
@@ -123,7 +123,9 @@ def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
         is_held, floor, rms = len(angles) > 1, move_floor(moved), angles[-1][1]
         beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}{_drift(calibration)}; "
         beside += f"noise alone {plain_number(floor)}°"
-        line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
+        is_out = excluded_moves(moved)
+        without = f" ({is_out.sum()} of {how_many(len(is_out), 'move')} excluded)" if is_out.any() else ""
+        line = Headline(f"tilt error after a rotation{without}", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
     return out
 

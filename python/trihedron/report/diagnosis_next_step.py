@@ -11,6 +11,7 @@ from trihedron.report.diagnosis_numbers import of_another_device
 from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, named_effects, own_serious
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
+from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
 
@@ -32,6 +33,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
+        if imprecise_in_diagnosis(diagnosis):
+            keep = f"Take over the parameters of this log, which are more certain: {_taken_by(model)}."
         return dependent(diagnosis) or (keep if diagnosis.parameters else use)
     if diagnosis.verdict == "not-testable":
         record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
@@ -42,7 +45,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
         left = {one.domain for one in diagnosis.domains if one.disagrees}
         clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
-        again = f"Record again{clock if left == {'moves'} else ''}; what returns belongs to the sensor, what does not "
+        is_of_moves = "moves" in left <= {"moves", "dynamics"}
+        again = f"Record again{clock if is_of_moves else ''}; what returns belongs to the sensor, what does not "
         again += "to the session."
         checked = of_another_device(diagnosis, model)
         return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"

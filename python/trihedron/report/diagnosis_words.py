@@ -7,6 +7,7 @@ from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
 from trihedron.report.findings.wording import opening
+from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -34,9 +35,13 @@ _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
+MOSTLY = 0.5
+"""Share of the misfit from which an effect is not of little effect."""
 MOST_NAMED = 4
 IN_FULL = ("axis-handedness",)
 """Effects whose statement names what is wrong in the log: a verdict states it."""
+STATED = (*IN_FULL, "disturbed-pose")
+"""Effects that a verdict states by their statement: it says where in the log."""
 NOT_JUDGED = "not judged"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
@@ -61,12 +66,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, IN_FULL)]
+    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, STATED)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         return (
             f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
-            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
+            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}{imprecise_in_diagnosis(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
         named = named_effects(diagnosis, "recording")
@@ -83,7 +88,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
     tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
-    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in IN_FULL]
+    said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in STATED]
     if missing:
         said.append(f"the model lacks {listed(missing)}")
     if surplus:
@@ -98,9 +103,14 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     """The verdict on residuals ``off`` that the effects ``named`` do not explain."""
     text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
-    text += "effect explains it"
+    text += "effect explains"
     if named:
-        text += f" (found, of little effect: {listed(named)})"
+        shares = [one.share for one in diagnosis.effects if one.side in ("", "recording") and one.share is not None]
+        most = sum(shares) if len(shares) == len(named) else 0.0
+        size = f"{100.0 * min(most, 1.0):.0f} % of the misfit" if most > MOSTLY else "of little effect"
+        text += f" {'all of it' if most > MOSTLY else 'it'} (found, {size}: {listed(named)})"
+    else:
+        text += " it"
     if diagnosis.relations:
         # Those of the largest relation first.
         names = list(dict.fromkeys(variable_in_print(name) for one in diagnosis.relations for name in one.depends_on))
@@ -133,10 +143,11 @@ def _disagree(subjects: list[str]) -> str:
 
 def level_of(diagnosis: Diagnosis) -> Level:
     """The colour of the verdict: bad where the log's own calibration is not to be trusted; consistency is not good
-    where the reference was computed from these readings."""
+    where the reference was computed from these readings, or where the given calibration is imprecise."""
     if own_serious(diagnosis) is not None:
         return "bad"
-    return "usable" if diagnosis.verdict == "consistent" and dependent(diagnosis) else LEVELS[diagnosis.verdict]
+    is_weak = bool(dependent(diagnosis) or imprecise_in_diagnosis(diagnosis))
+    return "usable" if diagnosis.verdict == "consistent" and is_weak else LEVELS[diagnosis.verdict]
 
 
 def dependent(diagnosis: Diagnosis) -> str:

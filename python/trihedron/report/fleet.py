@@ -20,12 +20,11 @@ from trihedron.report.fleet_next_step import (
     MOST_NAMED,
     OPEN,
     files_of,
-    first_of,
     is_usable,
     next_step_of_fleet,
 )
 from trihedron.report.names import axis_in_print, finding_in_print, id_in_print, label_of
-from trihedron.report.numbers import how_many, listed, plain_number, shown
+from trihedron.report.numbers import first_of, how_many, listed, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
 VERDICTS = {

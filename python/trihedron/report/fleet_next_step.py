@@ -4,7 +4,7 @@ from trihedron.records.finding import FindingCode
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import finding_in_print, id_in_print
-from trihedron.report.numbers import capital
+from trihedron.report.numbers import capital, first_of
 
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
@@ -55,9 +55,3 @@ def _called(log: FleetLog, summary: FleetSummary) -> str:
 def _why(log: FleetLog) -> str:
     why = finding_in_print(log.serious[0]) if log.serious else "not calibrated"
     return f" ({why})"
-
-
-def first_of(names: list[str]) -> str:
-    """``a, b and 7 more``."""
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 
-from trihedron.report.numbers import listed
+from trihedron.report.numbers import first_of, listed
 
 LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
@@ -60,6 +60,8 @@ FINDINGS = {
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = ("left-handed", "turntable")
 """Warnings whose first clause says in a few words which axis or value it is."""
+PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
+"""A sentence about one pose or move begins with its number."""
 SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)
 
 
@@ -80,15 +82,19 @@ def finding_in_print(code: str) -> str:
     return FINDINGS.get(code) or id_in_print(code)
 
 
-def warnings_in_print(code: str, sentences: Sequence[str]) -> str:
-    """Warnings of one code by name, with the sensors that their sentences name, or else their number:
-    ``clipping (accelerometer and gyro)``, ``outlier pose (3)``; one of ``IN_FULL`` by its sentence."""
+def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str]) -> str:
+    """Warnings of one code, ``sentences`` their first clauses of ``seen``, by name, with the sensors, poses or moves
+    that they name, or else their number: ``clipping (accelerometer and gyro)``, ``outlier poses 3, 7``; one of
+    ``IN_FULL`` by its sentence."""
     if code in IN_FULL and len(sentences) == 1:
         return sentences[0]
     name = finding_in_print(code)
     named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
     if named and not SENSOR.search(name):
         return f"{name} ({listed(sorted(named))})"
+    places = [found for one in seen for found in PLACE.findall(one)]
+    if places and name.endswith((" pose", " move")):
+        return f"{name}{'s' if len(places) > 1 else ''} {first_of(places)}"
     return name if len(sentences) == 1 else f"{name} ({len(sentences)})"
 
 

@@ -149,3 +149,13 @@ def each_with_sigma(values: Iterable[float], sigmas: Iterable[float], factor: fl
 def capital(text: str) -> str:
     """The text with its first letter in upper case; a symbol (χ², σ) stays as it is."""
     return (text[:1].upper() if text[:1].isascii() else text[:1]) + text[1:]
+
+
+MOST_NAMED = 4
+"""Most names in a sentence."""
+
+
+def first_of(names: list[str]) -> str:
+    """``a, b and 7 more``."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more

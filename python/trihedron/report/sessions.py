@@ -8,9 +8,9 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.records import FindingCode
 from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import (
-    GEOMETRY,
     PARAMETERS,
     Change,
     Repeated,
@@ -24,9 +24,10 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark,
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.imprecise_calibration import FAR_ABOVE
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
-from trihedron.report.verification import FAR_ABOVE, USES
+from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
@@ -70,7 +71,8 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = f"Usable: {agree}"
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        word = "Several devices" if any(change.id in GEOMETRY for change in changed) else "Usable with the spread below"
+        is_one = all(finding.code is not FindingCode.SEVERAL_DEVICES for finding in model.findings)
+        word = "Usable with the spread below" if is_one else "Several devices"
         usable = f"{word}: {parameters} changed between {used}"
     usable += _worst(model)
     return Document(

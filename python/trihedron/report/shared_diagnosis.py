@@ -52,7 +52,7 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
     if not (wrong or found.effects):
         wrong.append("CONSISTENT: no recording misses an effect by itself.")
     if found.findings:
-        wrong.insert(0, "The recordings look like those of different units: their axes differ in direction.")
+        wrong.insert(0, "The recordings look like those of different units: their axes or scales differ.")
     return Document(
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),

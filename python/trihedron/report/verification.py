@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
@@ -12,6 +12,7 @@ from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.imprecise_calibration import imprecise_in_verification
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
@@ -54,12 +55,8 @@ def verification_report(
         headlines=headlines_of(v),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         next_step=use_in_words(v, "the calibration"),
-        stated_level="usable" if _of_uncertainty(v) else None,
+        stated_level="usable" if imprecise_in_verification(v) else None,
     )
-
-
-FAR_ABOVE = 3.0
-"""Error over noise alone from which "within uncertainty" says more of the uncertainty than of the sensor."""
 
 
 def above_noise(v: Verification) -> list[Finding]:
@@ -70,8 +67,8 @@ def above_noise(v: Verification) -> list[Finding]:
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
-    word = "Not contradicted" if _of_uncertainty(v) or _is_untested(v) else "Verified"
-    verified = f"{word}: errors are within noise and uncertainty{_of_uncertainty(v)}"
+    word = "Not contradicted" if imprecise_in_verification(v) or _is_untested(v) else "Verified"
+    verified = f"{word}: errors are within noise and uncertainty{imprecise_in_verification(v)}"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
 
@@ -80,23 +77,13 @@ def _is_untested(v: Verification) -> bool:
     return any(finding.code is FindingCode.NOT_TESTED for finding in v.findings)
 
 
-def _of_uncertainty(v: Verification) -> str:
-    """How many times noise alone the errors are, where they are far above it and the calibration is as uncertain."""
-    pairs = [("gravity error in static poses", v.norm_rms, v.norm_noise)]
-    if len(v.angle_deg):
-        pairs.append(("tilt error after a rotation", v.angle_rms_deg, v.angle_noise_deg))
-    times = [(name, rms / max(rms_of(noise), TINY)) for name, rms, noise in pairs]
-    far = [f"{name} is {plain_number(one, 2)} times noise alone" for name, one in times if one > FAR_ABOVE]
-    return f", but {listed(far)}: the calibration is that uncertain" if far else ""
-
-
 def use_in_words(v: Verification, what: str) -> str:
     """Advice about errors above noise; else to use the calibration, unless it is rejected."""
     above = above_noise(v)
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
-    if use and _of_uncertainty(v):
+    if use and imprecise_in_verification(v):
         look = "See what the errors are: `trihedron diagnose LOG --calibration FILE`."
         use = f"{look} Where they are acceptable: u{use[1:]}"
     if above and v.is_passed:

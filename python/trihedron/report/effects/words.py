@@ -224,7 +224,8 @@ SESSION = {
         "a disturbed pose: it was not static",
         "repeat that pose",
         {
-            "moved": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it or exclude it.",
+            "moved": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it, or cut its rows out "
+            "of the log.",
             "not-still": "Disturbed poses ({is_timed:?at {disturbed_s:each}|}{are_both:?; |}"
             "{is_restless:?not still: {restless:&, }|}).",
         },

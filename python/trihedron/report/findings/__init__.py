@@ -46,12 +46,12 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     warned: dict[str, list[str]] = {}
     for one in by_weight(findings):
         if one.severity is Severity.WARNING:
-            warned.setdefault(one.code.value, []).append(opening(one.seen))
+            warned.setdefault(one.code.value, []).append(one.seen)
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
         return good
-    named = [warnings_in_print(code, sentences) for code, sentences in warned.items()]
+    named = [warnings_in_print(code, [*map(opening, seen)], seen) for code, seen in warned.items()]
     total = sum(map(len, warned.values()))
     return f"{usable}, with {how_many(total, 'warning')}: {listed(named)}."
 

@@ -89,6 +89,12 @@ _VERIFIED = {
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
+    (Code.WORSE_THAN_UNCALIBRATED, "reference", WARNING): Words(
+        "The accelerometer is not improved: the gravity error in static poses is {rms_m_s2:.3g mm/s²} rms with this "
+        "calibration, uncertain by {expected_m_s2:.2g mm/s²}, and {rms_without_m_s2:.3g mm/s²} without.",
+        "Motion determines the accelerometer less accurately than the uncorrected readings are.",
+        "Use the gyro alone; calibrate the accelerometer in 18 or more static poses (`trihedron plan`).",
+    ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
@@ -294,12 +300,12 @@ _MANY_RECORDINGS = {
     ),
     (Code.SEVERAL_DEVICES, "", WARNING): Words(
         "The {parameter:ids} differs between the recordings: {amount}.",
-        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Recordings of different units; in one unit axes keep their directions, and a scale changes by less than 1 %.",
         "Diagnose the recordings of one unit together; what recordings of different units share is of the design.",
     ),
     (Code.SEVERAL_DEVICES, "calibrated", WARNING): Words(
         "The {parameter:ids} differs between the recordings: {amount}.",
-        "Recordings of different units; in one unit the axes keep their directions from session to session.",
+        "Recordings of different units; in one unit axes keep their directions, and a scale changes by less than 1 %.",
         "Calibrate the recordings of each unit by themselves: common parameters of several units fit none of them.",
     ),
     **{

@@ -42,7 +42,7 @@ ENTRIES = {
         "{sensor} {axis_name:axis} stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
         "chance.",
         "A frozen channel, clipping, or a bus that answers with an old value.",
-        "Leave that stretch out.",
+        "Cut these rows out of the log and run again.",
         numbers=("axis", "sample"),
         or_severity=SERIOUS,
     ),
