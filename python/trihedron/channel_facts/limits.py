@@ -254,8 +254,7 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
     # Without an LSB no two extremes are alike by chance.
     if is_known and end.step <= 0.0 and end.lasts:
         return True
-    is_peak = is_cut(end, is_known=is_known, is_word=is_word)
-    return is_peak or is_cut_noise(end) or _chance([end]) < BY_CHANCE
+    return is_cut(end, is_known=is_known, is_word=is_word) or is_cut_noise(end) or _chance([end]) < BY_CHANCE
 
 
 def _is_same_code(one: End, other: End) -> bool:
