@@ -43,7 +43,7 @@ def findings_of(
     assert observability is not None
     yield from audit_moves(measured)
     yield from handedness(S, solution.S_a, recording)
-    yield from observability_findings(observability, gyroscope.covariance[:9, :9], S)
+    yield from observability_findings(observability, gyroscope.covariance[:9, :9], S, measured)
     if not solution.is_converged:
         yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
     yield from _outlier_findings(outliers, measured, seen)
@@ -301,19 +301,28 @@ def _advice(covariance: FloatArray, size: float) -> Words:
     return words("turns-about", turns=[(axes, *how) for how, axes in turns.items()])
 
 
-def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> Iterator[Finding]:
-    """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or an empty list."""
-    advice = observability.advice
-    missing = observability.n_parameters - observability.rank
-    if missing > 0:
-        yield Finding.of(
-            FindingCode.NOT_OBSERVABLE,
-            "moves-rank",
-            rank=observability.rank,
-            n_parameters=observability.n_parameters,
-            weakest=observability.weakest,
-            advice=advice,
-        )
+def observability_findings(
+    observability: Observability, covariance: FloatArray, S: FloatArray, measured: MoveMeasurements
+) -> Iterator[Finding]:
+    """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or none; with slower ones where most clipped."""
+    advice, lost = observability.advice, int(np.count_nonzero(measured.is_lost))
+    rank, weakest = observability.rank, observability.weakest
+    if rank < observability.n_parameters:
+        n, n_moves = observability.n_parameters, measured.n_moves
+        if 2 * lost > n_moves:
+            yield Finding.of(
+                FindingCode.NOT_OBSERVABLE,
+                "moves-clipped",
+                rank=rank,
+                n_parameters=n,
+                weakest=weakest,
+                left_out=lost,
+                n_moves=n_moves,
+            )
+        else:
+            yield Finding.of(
+                FindingCode.NOT_OBSERVABLE, "moves-rank", rank=rank, n_parameters=n, weakest=weakest, advice=advice
+            )
         return
     worst = worst_sigma(covariance, S)
     if worst > HARDLY_SEEN:

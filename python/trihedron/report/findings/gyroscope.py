@@ -134,6 +134,12 @@ _MOVES = {
         _SAME_GRAVITY,
         "{advice:sentences}",
     ),
+    (Code.NOT_OBSERVABLE, "moves-clipped", SERIOUS): Words(
+        "the gyro clipped in {left_out} of {n_moves} moves, which are excluded: the others determine {rank} of "
+        "{n_parameters} gyro parameters; least certain: {weakest}.",
+        "the sensor was turned faster than its range limit.",
+        "Turn with rates below about half the range limit, or set a wider range.",
+    ),
     **dict.fromkeys(
         ((Code.NOT_OBSERVABLE, "moves-weak", SERIOUS), (Code.WEAKLY_OBSERVABLE, "moves", WARNING)),
         Words("the moves hardly determine the {weakest}: see its σ in S.", _SAME_GRAVITY, "{advice:sentences}"),
