@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from trihedron import calibrate, segment
 from trihedron.channel_facts.limits import find_limits, new_readings
 from trihedron.records import FindingCode, Recording
+from trihedron.segment.means import left_by_rounding
 
 G = 9.80665
 RATE = 100.0
@@ -137,3 +139,19 @@ def test_the_error_of_a_rounded_mean_is_what_is_said_of_it(noise):
     # 120 errors; rounding alone makes them uniform, whose mean square scatters by 0.082, white noise by 0.13; the noise
     # itself is known to a tenth, on which the error hangs steeply: a third.
     assert 0.55 < np.mean(z**2) < 1.5
+
+
+def test_the_rounding_error_of_a_mean_follows_from_the_variance_of_its_readings():
+    codes, place = np.arange(-6, 7), np.linspace(-0.5, 0.5, 201)[:, None]
+    seen, error = [], []
+    for sigma in np.geomspace(0.02, 0.6, 80):
+        share = ndtr((codes + 0.5 - place) / sigma) - ndtr((codes - 0.5 - place) / sigma)
+        mean = share @ codes
+        seen.append(share @ codes**2 - mean**2)
+        error.append(mean - place[:, 0])
+    seen, error = np.concatenate(seen), np.concatenate(error)
+    assert np.abs(error[seen >= 0.25]).max() < 0.02
+    for low in np.arange(0.01, 0.24, 0.01):
+        near = (seen >= low) & (seen < low + 0.01)
+        stated = np.sqrt(left_by_rounding(np.array([low + 0.005]))[0])
+        assert 0.95 < stated / np.sqrt(np.mean(error[near] ** 2)) < 1.3, low
