@@ -99,6 +99,8 @@ class Segments(Presented):
         Unit vectors in raw units along which |f| grows fastest, and the standard error of the mean along them, NaN
         where only those of the axes are known: a settling body rotates gravity, which leaves |f| unchanged. None where
         the vertical is unknown.
+    accelerometer_settling : (n_poses, 3) or None
+        What the means would read beyond, because the accelerometer settles after rotations; None where it does not.
 
     Examples
     --------
@@ -122,6 +124,7 @@ class Segments(Presented):
     whole: Segments | None = None
     accelerometer_up: FloatArray | None = None
     accelerometer_sigma_up: FloatArray | None = None
+    accelerometer_settling: FloatArray | None = None
 
     def __post_init__(self) -> None:
         all_of("poses", self.poses, Pose)
@@ -135,7 +138,7 @@ class Segments(Presented):
                 object.__setattr__(self, field.name, numbers_of(field.name, value))
         n = len(self.poses)
         for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean",
-                     "accelerometer_up"):  # fmt: skip
+                     "accelerometer_up", "accelerometer_settling"):  # fmt: skip
             value = getattr(self, name)
             if value is not None and value.shape != (n, 3):
                 raise ValueError(f"{name} must have shape ({n}, 3), got {value.shape}")

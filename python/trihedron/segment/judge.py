@@ -11,9 +11,10 @@ from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import Channels
 from trihedron.segment.floor import RangeEnd, is_cut
-from trihedron.segment.means import PoseMeans, rounding_bias_variance
+from trihedron.segment.means import rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import Run, means_of
+from trihedron.segment.settling import Settling
 
 CREEP_CHANCE = 1e-3
 """Probability that any steady pose of a log is called settling though none is."""
@@ -160,18 +161,14 @@ def judge_vibration(sigma: FloatArray, mean: FloatArray) -> list[Finding]:
     return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)] if share > LARGEST_NOISE_G else []
 
 
-def judge_bias(means: PoseMeans) -> list[Finding]:
-    """A bias that settles after moves: its size at their end, time constant, p-value."""
-    one = means.settling
-    if one is None:
-        return []
-    size, sigma = 1e3 * one.size, 1e3 * one.sigma
-    return [
-        Finding.of(
-            FindingCode.BIAS_SETTLING, x_mg=size[0], y_mg=size[1], z_mg=size[2], sigma_mg=sigma.max(), tau_s=one.tau_s,
-            mean_mg=float(np.linalg.norm(size)) * one.share, p_value=one.p_value, wait_s=3.0 * one.tau_s,
-        )
-    ]  # fmt: skip
+def judge_settling(one: Settling, gravity: float) -> Finding:
+    """The share of a change of force that comes late, and its part in the means; ``gravity`` is the reading of |g|."""
+    share, sigma = 100.0 * one.share, 100.0 * one.sigma
+    return Finding.of(
+        FindingCode.BIAS_SETTLING, x_percent=share[0], y_percent=share[1], z_percent=share[2],
+        sigma_percent=sigma.max(), tau_s=one.tau_s, p_value=one.p_value, wait_s=3.0 * one.tau_s,
+        mean_mg=1e3 / gravity * float(np.sqrt(np.mean(np.sum(one.mean**2, axis=1)))),
+    )  # fmt: skip
 
 
 def _start_s(recording: Recording, pose: Pose) -> float:

@@ -17,7 +17,7 @@ from trihedron.records.progress import Progress
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity, range_ends
-from trihedron.segment.judge import judge_bias, judge_log, judge_runs, judge_vibration, without_cut
+from trihedron.segment.judge import judge_log, judge_runs, judge_settling, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
@@ -33,9 +33,10 @@ from trihedron.segment.runs import (
     whole_windows,
     without_approaches,
 )  # fmt: skip
+from trihedron.segment.settling import find_settling
 from trihedron.segment.shaken import find_vibrating
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
-from trihedron.units import AccelerationUnit, rate_to_si
+from trihedron.units import AccelerationUnit, acceleration_to_si, rate_to_si
 
 LONG_S = 4.0
 """Duration of a quiet range whose central half still shows noise over seconds."""
@@ -133,19 +134,26 @@ def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
 def _describe(
     recording: Recording, channels: Channels, activity: Activity, runs: list[Run], turning: BoolArray
 ) -> Segments:
+    has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
+    gravity = _gravity_reading(recording, channels)
+    settling = find_settling(channels, runs, gravity, has_unit=has_unit)
+    if settling is not None:
+        channels = settling.channels
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
     noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
     moves = tuple(_move(k, *near) for k, near in enumerate(pairwise(zip(poses, runs, strict=True))))
     means = average_poses(recording, channels, runs, poses, noise)
+    means = means if settling is None else settling.without(means)
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
-    found += judge_bias(means)
+    found += [] if settling is None or gravity is None else [judge_settling(settling, gravity)]
     if recording.accelerometer is not None:
         found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
-    return _assemble(recording, poses, moves, sigma, means, tuple(found))
+    segments = _assemble(recording, poses, moves, sigma, means, tuple(found))
+    return segments if settling is None else replace(segments, accelerometer_settling=settling.mean)
 
 
 def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Pose:

@@ -103,11 +103,15 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
         means[f"{name}_mean"], means[f"{name}_sigma_mean"] = found
     t, sources = recording.time_s, np.array([source for _, _, source in spans])
     up, error_up = segments.accelerometer_up, segments.accelerometer_sigma_up
+    settling, mean = segments.accelerometer_settling, means["accelerometer_mean"]
+    if settling is not None and mean is not None:
+        settling = np.where(sources[:, None] >= 0, settling[sources], 0.0)
+        means["accelerometer_mean"] = mean - settling
     return replace(
         segments, poses=poses, moves=moves, n_averaged=np.array([b - a for a, b, _ in spans]),
         time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
         duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
-        accelerometer_up=None if up is None else up[sources],
+        accelerometer_up=None if up is None else up[sources], accelerometer_settling=settling,
         accelerometer_sigma_up=None if error_up is None else np.where(same, error_up[sources], np.nan),
         **means,  # type: ignore[arg-type]
     )  # fmt: skip

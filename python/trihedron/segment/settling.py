@@ -1,0 +1,209 @@
+"""An accelerometer that settles after rotations: a part of every change of force comes late (docs/segmentation.md,
+section 4)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.probability import fdtrc
+from trihedron.segment.channels import Channels
+from trihedron.segment.means import PoseMeans, along_verticals, upright
+from trihedron.segment.runs import Run, means_of
+from trihedron.session.drift import TYPICAL
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+TIME_CONSTANTS_S = 0.7 * 2.0 ** np.arange(0.0, 4.1, 0.5)
+"""Up to 11.2 s. Faster ones are over before a pose counts as static, slower ones are a drift."""
+FINER = 2.0 ** np.array([-0.36, -0.25, -0.16, -0.09, -0.04, 0.04, 0.09, 0.16, 0.25, 0.36])
+"""Factors on the likeliest: strong settling shows its time constant to a percent."""
+FALSE_ALARM = 1e-3
+"""Probability, over all time constants, that a sound accelerometer is found to settle."""
+FEWEST_POSES = 9
+"""Three components, and twice as many poses that show how much the decay scatters from pose to pose."""
+FEWEST_ON_QUADRIC = 18
+"""Poses from which the means count beside the shapes: nine parameters and three, and six that show their scatter."""
+FEWEST_BLOCKS = 4
+"""Blocks of a pose: fewer have no shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """The ``share`` (3,) of a change of force that comes late, by axis, with ``sigma`` (3,), time constant ``tau_s``,
+    and ``p_value`` that none does.
+
+    It adds ``mean`` (h, 3) to the means of the poses, raw, known to the columns ``error`` (h, 3, k), one standard
+    uncertainty each; ``channels`` are the blocks without it.
+    """
+
+    share: FloatArray
+    sigma: FloatArray
+    tau_s: float
+    p_value: float
+    mean: FloatArray
+    error: FloatArray
+    channels: Channels
+
+    def without(self, means: PoseMeans) -> PoseMeans:
+        """The means of the poses as they would be long after every move."""
+        mean, sigma, of_axes = means.mean.copy(), means.sigma.copy(), slice(0, 3)
+        mean[:, of_axes] -= self.mean
+        sigma[:, of_axes] = np.hypot(sigma[:, of_axes], np.linalg.norm(self.error, axis=2))
+        if means.up is None or means.sigma_up is None:
+            return replace(means, mean=mean, sigma=sigma)
+        along = np.linalg.norm(np.einsum("hi,hik->hk", means.up, self.error), axis=1)
+        return replace(means, mean=mean, sigma=sigma, sigma_up=np.hypot(means.sigma_up, along))
+
+
+def find_settling(channels: Channels, runs: list[Run], gravity: float | None, *, has_unit: bool) -> Settling | None:
+    """The decay after rotations, averaged over time constants by their likelihood, if any is significant; ``gravity``
+    is the raw reading of |g|.
+
+    Along the vertical the tilt of a yielding support does not show, and noise of any colour has no relation to the
+    rotation before: its decay is zero on average. Beside it a drift of the usual size of parts that warm up is an
+    unknown.
+    """
+    if gravity is None or len(runs) < FEWEST_POSES:
+        return None
+    force = channels.mean[:, ~channels.is_gyroscope]
+    mean = means_of(force, [run.quiet_ranges() for run in runs])
+    up = upright(mean, has_unit=has_unit)
+    if up is None:
+        return None
+    present = np.isfinite(force).all(axis=1)
+    path = force[np.maximum.accumulate(np.where(present, np.arange(len(force)), present.argmax()))]
+    begins, upward = [run.outer_first for run in runs], along_verticals(channels, runs, up).mean[:, 0]
+    lasts_s = (runs[-1].last - runs[0].first) * channels.step_s
+    drift = TYPICAL[0] / STANDARD_GRAVITY_M_S2 * gravity / lasts_s
+
+    def tried(tau: float) -> Tried | None:
+        # How far the delayed force is behind at the end of a move.
+        behind = _core.simulate_first_order(path, channels.step_s, (tau,) * 3)[begins] - mean
+        return _with_time_constant(channels, runs, (mean, up, upward, behind), tau, drift)
+
+    found = [one for tau in TIME_CONSTANTS_S if (one := tried(float(tau))) is not None]
+    p_value = min((one.p_value for one in found), default=1.0)
+    if p_value * len(TIME_CONSTANTS_S) >= FALSE_ALARM:
+        return None
+    best = max(found, key=lambda one: one.log_likelihood).tau_s
+    found += [one for factor in FINER if (one := tried(float(best * factor))) is not None]
+    return _averaged(channels, runs, sorted(found, key=lambda one: one.tau_s), p_value)
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """One time constant: share and its covariance, p of none by the shapes of the poses, log-likelihood; ``behind``
+    (h, 3), raw, when a pose begins, ``late`` (h, 3) on average over it."""
+
+    tau_s: float
+    behind: FloatArray
+    late: FloatArray
+    share: FloatArray
+    covariance: FloatArray
+    p_value: float
+    log_likelihood: float
+
+
+def _decays(channels: Channels, run: Run, tau: float) -> tuple[IntArray, FloatArray]:
+    """Valid blocks of a pose, and the decay there since the move before."""
+    blocks = np.concatenate([np.arange(a, b) for a, b in run.quiet_ranges()])
+    blocks = blocks[channels.is_valid[blocks]]
+    return blocks, np.exp(-(blocks - run.outer_first) * channels.step_s / tau)
+
+
+def _with_time_constant(
+    channels: Channels, runs: list[Run], readings: tuple[FloatArray, ...], tau: float, drift: float
+) -> Tried | None:
+    """Share by the change inside the poses, beside a ``drift`` per second (one sigma), and by the means of the poses,
+    beside S and b; either group has the noise that it shows."""
+    mean, up, upward, behind = readings
+    y, length, slope, over_pose = np.zeros((4, len(runs)))
+    for i, run in enumerate(runs):
+        blocks, decay = _decays(channels, run, tau)
+        if len(blocks) == 0:
+            continue
+        over_pose[i] = decay.mean()
+        change = decay - over_pose[i]
+        size = np.linalg.norm(change)
+        if len(blocks) >= FEWEST_BLOCKS and not run.is_unsteady and size > 0.0:
+            length[i] = size
+            y[i], slope[i] = change @ upward[blocks] / size, change @ blocks * channels.step_s / size
+    used, late = length > 0.0, over_pose[:, None] * behind
+    n, dof = int(used.sum()), int(used.sum()) - 3
+    if n < FEWEST_POSES:
+        return None
+    settles, drifts = (up * behind * length[:, None])[used], (up * slope[:, None])[used]
+    noise = float(np.sqrt(_squares_beside(y[used], settles) / dof))
+    if noise <= 0.0 or np.linalg.matrix_rank(settles) < 3:
+        return None
+    # The drift's prior is three more rows.
+    rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift * np.eye(3)])])
+    of_rows = np.append(y[used], np.zeros(3))
+    left, without = (_squares_beside(of_rows, columns) for columns in (rows, rows[:, 3:]))
+    p_value = fdtrc(3, dof, (without - left) / 3.0 / (left / dof))
+    groups = [(of_rows, rows, left / dof, n)]
+    steady = used | ~np.array([run.is_unsteady for run in runs])
+    if steady.sum() >= FEWEST_ON_QUADRIC:
+        norm, quadric, along = _on_quadric(mean[steady])
+        columns = np.hstack([-along * late[steady], quadric])
+        groups.append((norm, columns, _squares_beside(norm, columns) / (len(norm) - 12), len(norm)))
+    # Each group's own unknowns beside the share are projected out.
+    whitened = [
+        [_beside(part, columns[:, 3:]) / np.sqrt(s2) for part in (columns[:, :3], of)] for of, columns, s2, _ in groups
+    ]
+    design, reading = (np.concatenate(parts) for parts in zip(*whitened, strict=True))
+    inverse = np.linalg.pinv(design)
+    share = inverse @ reading
+    likelihood = -0.5 * sum(
+        k * np.log(s2 * np.sum((of - columns @ share) ** 2))
+        for (columns, of), (_, _, s2, k) in zip(whitened, groups, strict=True)
+    )
+    return Tried(tau, behind, late, share, inverse @ inverse.T, p_value, float(likelihood))
+
+
+def _on_quadric(mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means (h, 3) as rows of the ellipsoid of gravity, 1 = q·(x², xy, x), scaled to errors along the vertical, raw:
+    left side (h,), nine columns, and verticals (h, 3)."""
+    centre, scale = 0.5 * (mean.max(axis=0) + mean.min(axis=0)), float(np.ptp(mean, axis=0).max())
+    x = (mean - centre) / scale
+    columns = np.hstack([x**2, x * np.roll(x, 1, axis=1), x])
+    q = np.linalg.lstsq(columns, np.ones(len(x)), rcond=None)[0]
+    gradient = 2.0 * q[:3] * x + q[3:6] * np.roll(x, 1, axis=1) + np.roll(q[3:6] * x, -1, axis=1) + q[6:]
+    size = np.linalg.norm(gradient, axis=1, keepdims=True)
+    return scale / size[:, 0], scale / size * columns, gradient / size
+
+
+def _beside(values: FloatArray, columns: FloatArray) -> FloatArray:
+    """What is left of ``values`` beside ``columns``."""
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])
+
+
+def _squares_beside(values: FloatArray, columns: FloatArray) -> float:
+    return float((_beside(values, columns) ** 2).sum())
+
+
+def _averaged(channels: Channels, runs: list[Run], tried: list[Tried], p_value: float) -> Settling:
+    """The average over time constants, equally likely on a logarithmic scale.
+
+    The share is common to all poses: as an error of each alone it would average out, so each has n/3 times its
+    variance, n poses over three components.
+    """
+    weight = np.exp(np.array([one.log_likelihood for one in tried]) - max(one.log_likelihood for one in tried))
+    weight *= np.gradient(np.log([one.tau_s for one in tried]))
+    weight /= weight.sum()
+    means, blocks = np.array([one.late * one.share for one in tried]), channels.mean.copy()
+    mean, error = np.tensordot(weight, means, 1), []
+    for one, own, of_mean in zip(tried, weight, means, strict=True):
+        columns = [one.late[:, :, None] * np.linalg.cholesky(one.covariance), (of_mean - mean)[:, :, None]]
+        error += [np.sqrt(own * len(runs) / 3.0) * column for column in columns]
+        for i, run in enumerate(runs):
+            rows, decay = _decays(channels, run, one.tau_s)
+            blocks[np.ix_(rows, np.flatnonzero(~channels.is_gyroscope))] -= own * np.outer(
+                decay, one.share * one.behind[i]
+            )
+    best = tried[int(np.argmax(weight))]
+    return Settling(
+        best.share, np.sqrt(np.diagonal(best.covariance)), best.tau_s, p_value, mean, np.concatenate(error, axis=2),
+        replace(channels, mean=blocks),
+    )  # fmt: skip
