@@ -33,8 +33,8 @@ class Settling:
     """The ``share`` (3,) of a change of force that comes late, by axis, with ``sigma`` (3,), time constant ``tau_s``,
     and ``p_value`` that none does.
 
-    It adds ``mean`` (h, 3) to the means of the poses, raw, known to the columns ``error`` (h, 3, k), one standard
-    uncertainty each; ``channels`` are the blocks without it.
+    It adds ``mean`` (h, 3) to the means of the poses, raw, with ``covariance`` (h, 3, 3); ``channels`` are the blocks
+    without it.
     """
 
     share: FloatArray
@@ -42,18 +42,18 @@ class Settling:
     tau_s: float
     p_value: float
     mean: FloatArray
-    error: FloatArray
+    covariance: FloatArray
     channels: Channels
 
     def without(self, means: PoseMeans) -> PoseMeans:
         """The means of the poses as they would be long after every move."""
         mean, sigma, of_axes = means.mean.copy(), means.sigma.copy(), slice(0, 3)
         mean[:, of_axes] -= self.mean
-        sigma[:, of_axes] = np.hypot(sigma[:, of_axes], np.linalg.norm(self.error, axis=2))
-        if means.up is None or means.sigma_up is None:
-            return replace(means, mean=mean, sigma=sigma)
-        along = np.linalg.norm(np.einsum("hi,hik->hk", means.up, self.error), axis=1)
-        return replace(means, mean=mean, sigma=sigma, sigma_up=np.hypot(means.sigma_up, along))
+        sigma[:, of_axes] = np.sqrt(sigma[:, of_axes] ** 2 + np.diagonal(self.covariance, axis1=1, axis2=2))
+        along = means.sigma_up
+        if means.up is not None and along is not None:
+            along = np.sqrt(along**2 + np.einsum("hi,hij,hj->h", means.up, self.covariance, means.up))
+        return replace(means, mean=mean, sigma=sigma, sigma_up=along)
 
 
 def find_settling(channels: Channels, runs: list[Run], gravity: float | None, *, has_unit: bool) -> Settling | None:
@@ -80,7 +80,7 @@ def find_settling(channels: Channels, runs: list[Run], gravity: float | None, *,
     def tried(tau: float) -> Tried | None:
         # How far the delayed force is behind at the end of a move.
         behind = _core.simulate_first_order(path, channels.step_s, (tau,) * 3)[begins] - mean
-        return _with_time_constant(channels, runs, (mean, up, upward, behind), tau, drift)
+        return _with_time_constant(tau, _amplitudes(channels, runs, upward, tau), behind, mean, up, drift)
 
     found = [one for tau in TIME_CONSTANTS_S if (one := tried(float(tau))) is not None]
     p_value = min((one.p_value for one in found), default=1.0)
@@ -112,13 +112,10 @@ def _decays(channels: Channels, run: Run, tau: float) -> tuple[IntArray, FloatAr
     return blocks, np.exp(-(blocks - run.outer_first) * channels.step_s / tau)
 
 
-def _with_time_constant(
-    channels: Channels, runs: list[Run], readings: tuple[FloatArray, ...], tau: float, drift: float
-) -> Tried | None:
-    """Share by the change inside the poses, beside a ``drift`` per second (one sigma), and by the means of the poses,
-    beside S and b; either group has the noise that it shows."""
-    mean, up, upward, behind = readings
-    y, length, slope, over_pose = np.zeros((4, len(runs)))
+def _amplitudes(channels: Channels, runs: list[Run], upward: FloatArray, tau: float) -> FloatArray:
+    """(4, h) of every pose: the amplitude of a decay of unit length in its blocks ``upward`` (m,), about the mean; that
+    of a decay from 1, 0 where the pose shows no shape; that of a slope of 1 per second; the mean of a decay from 1."""
+    reading, length, slope, over_pose = out = np.zeros((4, len(runs)))
     for i, run in enumerate(runs):
         blocks, decay = _decays(channels, run, tau)
         if len(blocks) == 0:
@@ -128,38 +125,48 @@ def _with_time_constant(
         size = np.linalg.norm(change)
         if len(blocks) >= FEWEST_BLOCKS and not run.is_unsteady and size > 0.0:
             length[i] = size
-            y[i], slope[i] = change @ upward[blocks] / size, change @ blocks * channels.step_s / size
+            reading[i], slope[i] = change @ upward[blocks] / size, change @ blocks * channels.step_s / size
+    return out
+
+
+def _with_time_constant(
+    tau: float, shapes: FloatArray, behind: FloatArray, mean: FloatArray, up: FloatArray, drift: float
+) -> Tried | None:
+    """Share by the ``shapes`` (4, h) of the poses, beside a ``drift`` per second (one sigma), and by their means (h, 3)
+    beside S and b; either group has the variance that it shows."""
+    reading, length, slope, over_pose = shapes
     used, late = length > 0.0, over_pose[:, None] * behind
     n, dof = int(used.sum()), int(used.sum()) - 3
     if n < FEWEST_POSES:
         return None
     settles, drifts = (up * behind * length[:, None])[used], (up * slope[:, None])[used]
-    noise = float(np.sqrt(_squares_beside(y[used], settles) / dof))
+    noise = float(np.sqrt(_squares_beside(reading[used], settles) / dof))
     if noise <= 0.0 or np.linalg.matrix_rank(settles) < 3:
         return None
     # The drift's prior is three more rows.
     rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift * np.eye(3)])])
-    of_rows = np.append(y[used], np.zeros(3))
-    left, without = (_squares_beside(of_rows, columns) for columns in (rows, rows[:, 3:]))
+    y = np.append(reading[used], np.zeros(3))
+    left, without = (_squares_beside(y, columns) for columns in (rows, rows[:, 3:]))
     p_value = fdtrc(3, dof, (without - left) / 3.0 / (left / dof))
-    groups = [(of_rows, rows, left / dof, n)]
-    steady = used | ~np.array([run.is_unsteady for run in runs])
-    if steady.sum() >= FEWEST_ON_QUADRIC:
-        norm, quadric, along = _on_quadric(mean[steady])
-        columns = np.hstack([-along * late[steady], quadric])
-        groups.append((norm, columns, _squares_beside(norm, columns) / (len(norm) - 12), len(norm)))
-    # Each group's own unknowns beside the share are projected out.
+    groups = [(y, rows, left / dof)]
+    if n >= FEWEST_ON_QUADRIC:
+        norm, quadric, along = _on_quadric(mean[used])
+        columns = np.hstack([-along * late[used], quadric])
+        groups.append((norm, columns, _squares_beside(norm, columns) / (n - columns.shape[1])))
+    # Drifts, S and b, the unknowns of one group alone, are projected out.
     whitened = [
-        [_beside(part, columns[:, 3:]) / np.sqrt(s2) for part in (columns[:, :3], of)] for of, columns, s2, _ in groups
+        _beside(np.column_stack([columns[:, :3], values]), columns[:, 3:]) / np.sqrt(variance)
+        for values, columns, variance in groups
     ]
-    design, reading = (np.concatenate(parts) for parts in zip(*whitened, strict=True))
-    inverse = np.linalg.pinv(design)
-    share = inverse @ reading
-    likelihood = -0.5 * sum(
-        k * np.log(s2 * np.sum((of - columns @ share) ** 2))
-        for (columns, of), (_, _, s2, k) in zip(whitened, groups, strict=True)
-    )
-    return Tried(tau, behind, late, share, inverse @ inverse.T, p_value, float(likelihood))
+    together = np.vstack(whitened)
+    inverse = np.linalg.pinv(together[:, :3])
+    share = inverse @ together[:, 3]
+    left_over = [
+        variance * np.sum((one[:, 3] - one[:, :3] @ share) ** 2)
+        for one, (_, _, variance) in zip(whitened, groups, strict=True)
+    ]
+    log_likelihood = -0.5 * n * float(np.sum(np.log(left_over)))
+    return Tried(tau, behind, late, share, inverse @ inverse.T, p_value, log_likelihood)
 
 
 def _on_quadric(mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -189,21 +196,18 @@ def _averaged(channels: Channels, runs: list[Run], tried: list[Tried], p_value: 
     The share is common to all poses: as an error of each alone it would average out, so each has n/3 times its
     variance, n poses over three components.
     """
-    weight = np.exp(np.array([one.log_likelihood for one in tried]) - max(one.log_likelihood for one in tried))
-    weight *= np.gradient(np.log([one.tau_s for one in tried]))
+    likelihood = np.array([one.log_likelihood for one in tried])
+    weight = np.exp(likelihood - likelihood.max()) * np.gradient(np.log([one.tau_s for one in tried]))
     weight /= weight.sum()
-    means, blocks = np.array([one.late * one.share for one in tried]), channels.mean.copy()
-    mean, error = np.tensordot(weight, means, 1), []
-    for one, own, of_mean in zip(tried, weight, means, strict=True):
-        columns = [one.late[:, :, None] * np.linalg.cholesky(one.covariance), (of_mean - mean)[:, :, None]]
-        error += [np.sqrt(own * len(runs) / 3.0) * column for column in columns]
+    added, blocks = np.array([one.late * one.share for one in tried]), channels.mean.copy()
+    mean, axes = np.tensordot(weight, added, 1), np.flatnonzero(~channels.is_gyroscope)
+    covariance = np.zeros((*mean.shape, 3))
+    for one, own, away in zip(tried, weight, added - mean, strict=True):
+        of_share = one.late[:, :, None] * one.covariance * one.late[:, None, :]
+        covariance += own * len(runs) / 3.0 * (of_share + away[:, :, None] * away[:, None, :])
         for i, run in enumerate(runs):
             rows, decay = _decays(channels, run, one.tau_s)
-            blocks[np.ix_(rows, np.flatnonzero(~channels.is_gyroscope))] -= own * np.outer(
-                decay, one.share * one.behind[i]
-            )
+            blocks[np.ix_(rows, axes)] -= own * np.outer(decay, one.share * one.behind[i])
     best = tried[int(np.argmax(weight))]
-    return Settling(
-        best.share, np.sqrt(np.diagonal(best.covariance)), best.tau_s, p_value, mean, np.concatenate(error, axis=2),
-        replace(channels, mean=blocks),
-    )  # fmt: skip
+    sigma = np.sqrt(np.diagonal(best.covariance))
+    return Settling(best.share, sigma, best.tau_s, p_value, mean, covariance, replace(channels, mean=blocks))
