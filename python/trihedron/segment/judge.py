@@ -11,7 +11,7 @@ from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import Channels
 from trihedron.segment.floor import RangeEnd, is_cut
-from trihedron.segment.means import rounding_bias_variance
+from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import Run, means_of
 from trihedron.segment.settling import Settling
@@ -161,9 +161,10 @@ def judge_vibration(sigma: FloatArray, mean: FloatArray) -> list[Finding]:
     return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)] if share > LARGEST_NOISE_G else []
 
 
-def judge_settling(one: Settling, gravity: float) -> Finding:
-    """The share of a change of force that comes late, and its part in the means; ``gravity`` is the reading of |g|."""
-    share, sigma = 100.0 * one.share, 100.0 * one.sigma
+def judge_settling(one: Settling, means: PoseMeans) -> Finding:
+    """The share of a change of force that comes late, and its part in the means, in which it is no longer."""
+    share, sigma, force = 100.0 * one.share, 100.0 * one.sigma, means.mean[:, :3]
+    gravity = float(np.max(np.ptp(force, axis=0))) / 2.0
     return Finding.of(
         FindingCode.BIAS_SETTLING, x_percent=share[0], y_percent=share[1], z_percent=share[2],
         sigma_percent=sigma.max(), tau_s=one.tau_s, p_value=one.p_value, wait_s=3.0 * one.tau_s,

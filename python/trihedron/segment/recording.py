@@ -135,8 +135,7 @@ def _describe(
     recording: Recording, channels: Channels, activity: Activity, runs: list[Run], turning: BoolArray
 ) -> Segments:
     has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
-    gravity = _gravity_reading(recording, channels)
-    settling = find_settling(channels, runs, gravity, has_unit=has_unit)
+    settling = find_settling(channels, runs, has_unit=has_unit)
     if settling is not None:
         channels = settling.channels
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
@@ -149,7 +148,8 @@ def _describe(
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
-    found += [] if settling is None or gravity is None else [judge_settling(settling, gravity)]
+    if settling is not None:
+        found.append(judge_settling(settling, means))
     if recording.accelerometer is not None:
         found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
     segments = _assemble(recording, poses, moves, sigma, means, tuple(found))

@@ -11,8 +11,6 @@ from trihedron.probability import fdtrc
 from trihedron.segment.channels import Channels
 from trihedron.segment.means import PoseMeans, along_verticals, upright
 from trihedron.segment.runs import Run, means_of
-from trihedron.session.drift import TYPICAL
-from trihedron.units import STANDARD_GRAVITY_M_S2
 
 TIME_CONSTANTS_S = 0.7 * 2.0 ** np.arange(0.0, 4.1, 0.5)
 """Up to 11.2 s. Faster ones are over before a pose counts as static, slower ones are a drift."""
@@ -56,15 +54,13 @@ class Settling:
         return replace(means, mean=mean, sigma=sigma, sigma_up=along)
 
 
-def find_settling(channels: Channels, runs: list[Run], gravity: float | None, *, has_unit: bool) -> Settling | None:
-    """The decay after rotations, averaged over time constants by their likelihood, if any is significant; ``gravity``
-    is the raw reading of |g|.
+def find_settling(channels: Channels, runs: list[Run], *, has_unit: bool) -> Settling | None:
+    """The decay after rotations, averaged over time constants by their likelihood, if any is significant.
 
-    Along the vertical the tilt of a yielding support does not show, and noise of any colour has no relation to the
-    rotation before: its decay is zero on average. Beside it a drift of the usual size of parts that warm up is an
-    unknown.
+    Along the vertical the tilt of a yielding support does not show; noise of any colour, and a drift, have no relation
+    to the rotation before: their decay is zero on average.
     """
-    if gravity is None or len(runs) < FEWEST_POSES:
+    if channels.is_gyroscope.all() or len(runs) < FEWEST_POSES:
         return None
     force = channels.mean[:, ~channels.is_gyroscope]
     mean = means_of(force, [run.quiet_ranges() for run in runs])
@@ -74,13 +70,11 @@ def find_settling(channels: Channels, runs: list[Run], gravity: float | None, *,
     present = np.isfinite(force).all(axis=1)
     path = force[np.maximum.accumulate(np.where(present, np.arange(len(force)), present.argmax()))]
     begins, upward = [run.outer_first for run in runs], along_verticals(channels, runs, up).mean[:, 0]
-    lasts_s = (runs[-1].last - runs[0].first) * channels.step_s
-    drift = TYPICAL[0] / STANDARD_GRAVITY_M_S2 * gravity / lasts_s
 
     def tried(tau: float) -> Tried | None:
         # How far the delayed force is behind at the end of a move.
         behind = _core.simulate_first_order(path, channels.step_s, (tau,) * 3)[begins] - mean
-        return _with_time_constant(tau, _amplitudes(channels, runs, upward, tau), behind, mean, up, drift)
+        return _with_time_constant(tau, _amplitudes(channels, runs, upward, tau), behind, mean, up)
 
     found = [one for tau in TIME_CONSTANTS_S if (one := tried(float(tau))) is not None]
     p_value = min((one.p_value for one in found), default=1.0)
@@ -113,9 +107,9 @@ def _decays(channels: Channels, run: Run, tau: float) -> tuple[IntArray, FloatAr
 
 
 def _amplitudes(channels: Channels, runs: list[Run], upward: FloatArray, tau: float) -> FloatArray:
-    """(4, h) of every pose: the amplitude of a decay of unit length in its blocks ``upward`` (m,), about the mean; that
-    of a decay from 1, 0 where the pose shows no shape; that of a slope of 1 per second; the mean of a decay from 1."""
-    reading, length, slope, over_pose = out = np.zeros((4, len(runs)))
+    """(3, h) of every pose: the amplitude of a decay of unit length in its blocks ``upward`` (m,), about the mean; that
+    of a decay from 1, 0 where the pose shows no shape; the mean of a decay from 1."""
+    reading, length, over_pose = out = np.zeros((3, len(runs)))
     for i, run in enumerate(runs):
         blocks, decay = _decays(channels, run, tau)
         if len(blocks) == 0:
@@ -124,36 +118,31 @@ def _amplitudes(channels: Channels, runs: list[Run], upward: FloatArray, tau: fl
         change = decay - over_pose[i]
         size = np.linalg.norm(change)
         if len(blocks) >= FEWEST_BLOCKS and not run.is_unsteady and size > 0.0:
-            length[i] = size
-            reading[i], slope[i] = change @ upward[blocks] / size, change @ blocks * channels.step_s / size
+            length[i], reading[i] = size, change @ upward[blocks] / size
     return out
 
 
 def _with_time_constant(
-    tau: float, shapes: FloatArray, behind: FloatArray, mean: FloatArray, up: FloatArray, drift: float
+    tau: float, shapes: FloatArray, behind: FloatArray, mean: FloatArray, up: FloatArray
 ) -> Tried | None:
-    """Share by the ``shapes`` (4, h) of the poses, beside a ``drift`` per second (one sigma), and by their means (h, 3)
-    beside S and b; either group has the variance that it shows."""
-    reading, length, slope, over_pose = shapes
+    """Share by the ``shapes`` (3, h) of the poses, and by their means (h, 3) beside S and b; either group has the
+    variance that it shows."""
+    reading, length, over_pose = shapes
     used, late = length > 0.0, over_pose[:, None] * behind
-    n, dof = int(used.sum()), int(used.sum()) - 3
+    n = int(used.sum())
     if n < FEWEST_POSES:
         return None
-    settles, drifts = (up * behind * length[:, None])[used], (up * slope[:, None])[used]
-    noise = float(np.sqrt(_squares_beside(reading[used], settles) / dof))
-    if noise <= 0.0 or np.linalg.matrix_rank(settles) < 3:
+    y, settles = reading[used], (up * behind * length[:, None])[used]
+    left = _squares_beside(y, settles)
+    if left <= 0.0 or np.linalg.matrix_rank(settles) < 3:
         return None
-    # The drift's prior is three more rows.
-    rows = np.vstack([np.hstack([settles, drifts]), np.hstack([np.zeros((3, 3)), noise / drift * np.eye(3)])])
-    y = np.append(reading[used], np.zeros(3))
-    left, without = (_squares_beside(y, columns) for columns in (rows, rows[:, 3:]))
-    p_value = fdtrc(3, dof, (without - left) / 3.0 / (left / dof))
-    groups = [(y, rows, left / dof)]
+    groups = [(y, settles, left / (n - 3))]
+    p_value = fdtrc(3, n - 3, (y @ y - left) / 3.0 / groups[0][2])
     if n >= FEWEST_ON_QUADRIC:
         norm, quadric, along = _on_quadric(mean[used])
         columns = np.hstack([-along * late[used], quadric])
         groups.append((norm, columns, _squares_beside(norm, columns) / (n - columns.shape[1])))
-    # Drifts, S and b, the unknowns of one group alone, are projected out.
+    # S and b, the unknowns of one group alone, are projected out.
     whitened = [
         _beside(np.column_stack([columns[:, :3], values]), columns[:, 3:]) / np.sqrt(variance)
         for values, columns, variance in groups
