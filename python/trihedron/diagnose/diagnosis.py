@@ -167,6 +167,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
     named = {one.effect.id for one in observed.seen}
+    if "accel-hysteresis" in answer.ids:
+        settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
     remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
     remaining = with_relations(accounted_for(answer, remaining), found.related)
     if not answer.ids:

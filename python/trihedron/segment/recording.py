@@ -33,7 +33,7 @@ from trihedron.segment.runs import (
     whole_windows,
     without_approaches,
 )  # fmt: skip
-from trihedron.segment.settling import find_settling
+from trihedron.segment.settling import Settling, find_settling
 from trihedron.segment.shaken import find_vibrating
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
 from trihedron.units import AccelerationUnit, acceleration_to_si, rate_to_si
@@ -136,24 +136,37 @@ def _describe(
 ) -> Segments:
     has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
     settling = find_settling(channels, runs, has_unit=has_unit)
-    if settling is not None:
-        channels = settling.channels
+    as_read = _averaged(recording, channels, activity, runs, turning, None)
+    if settling is None:
+        return as_read
+    settled = _averaged(recording, settling.channels, activity, runs, turning, settling)
+    return replace(settled, as_read=replace(as_read, findings=settled.findings))
+
+
+def _averaged(
+    recording: Recording,
+    channels: Channels,
+    activity: Activity,
+    runs: list[Run],
+    turning: BoolArray,
+    settling: Settling | None,
+) -> Segments:
+    """Segments of the ``channels``, which are without the settling if there is any."""
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
     noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
     moves = tuple(_move(k, *near) for k, near in enumerate(pairwise(zip(poses, runs, strict=True))))
     means = average_poses(recording, channels, runs, poses, noise)
-    means = means if settling is None else settling.without(means)
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
     if settling is not None:
+        means = settling.without(means)
         found.append(judge_settling(settling, means))
     if recording.accelerometer is not None:
         found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
-    segments = _assemble(recording, poses, moves, sigma, means, tuple(found))
-    return segments if settling is None else replace(segments, accelerometer_settling=settling.mean)
+    return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 
 def _pose(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Pose:

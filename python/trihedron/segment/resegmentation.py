@@ -19,8 +19,10 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
     A disturbance inside a pose rotates the body; the mean over it contradicts the moves on both sides. Between the
     pieces of a cut pose the gyro carries the attitude like in any move.
 
-    ``whole`` of the result are the poses as they were found, each averaged over all of its samples.
+    ``whole`` of the result are the poses as they were found, each averaged over all of its samples. Means are as they
+    were read: a joint model names settling after rotations, and estimates it beside all other effects.
     """
+    segments = segments if segments.as_read is None else segments.as_read
     shortest = max(int(SHORTEST_PIECE_S * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
     was_disturbed = False
@@ -103,15 +105,11 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
         means[f"{name}_mean"], means[f"{name}_sigma_mean"] = found
     t, sources = recording.time_s, np.array([source for _, _, source in spans])
     up, error_up = segments.accelerometer_up, segments.accelerometer_sigma_up
-    settling, mean = segments.accelerometer_settling, means["accelerometer_mean"]
-    if settling is not None and mean is not None:
-        settling = np.where(sources[:, None] >= 0, settling[sources], 0.0)
-        means["accelerometer_mean"] = mean - settling
     return replace(
         segments, poses=poses, moves=moves, n_averaged=np.array([b - a for a, b, _ in spans]),
         time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
         duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
-        accelerometer_up=None if up is None else up[sources], accelerometer_settling=settling,
+        accelerometer_up=None if up is None else up[sources],
         accelerometer_sigma_up=None if error_up is None else np.where(same, error_up[sources], np.nan),
         **means,  # type: ignore[arg-type]
     )  # fmt: skip

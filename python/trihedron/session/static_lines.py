@@ -42,8 +42,6 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
             if found is None:
                 continue
             fitted, own, integral, has_line = (np.array(of_axes) for of_axes in found)
-            if s == 0 and segments.accelerometer_settling is not None:
-                fitted = fitted - segments.accelerometer_settling[k]
             swing[k, s] = np.where(has_line, integral / recording.rate_hz**2, 0.0)
             new_mean[k] = np.where(has_line, fitted, mean[k])
             new_error[k] = np.where(has_line, colour * own, error[k])
