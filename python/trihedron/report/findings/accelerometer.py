@@ -50,7 +50,7 @@ ENTRIES = {
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
         "The sensor was touched or not static in this pose, or a reading clipped.",
-        "Cut the rows of pose {pose} out of the log (`trihedron segment LOG` lists its times) and run again.",
+        "Cut the outlier poses out of the log (`trihedron segment LOG` lists their times) and run again.",
     ),
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_quadratic:?a quadratic nonlinearity|{is_cubic:?a cubic "

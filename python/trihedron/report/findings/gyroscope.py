@@ -104,7 +104,7 @@ _MOVES = {
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
         "times its noise, and is excluded.",
         "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
-        "Look at this move; repeat it.",
+        "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
