@@ -20,6 +20,8 @@ _HELD = "\u00a0"
 _COMMAND = re.compile(r"\(?`[^`]+`[.,;:)]*")
 _WORD_END = re.compile(rf"{_HELD}(?=(?:[^']*'[^']*')*[^']*$)")
 """A space of a command outside quotes."""
+_OPTION = re.compile(rf"({_HELD}--?\w[\w-]*){_HELD}(?!-)")
+"""An option, with the space before its value."""
 _SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])(?=(?:[^`]*`[^`]*`)*[^`]*$)")
 """A space between sentences, not inside a command."""
 _COMMON_POWER = re.compile(r"^\((.+) ± (.+)\)(e\S+)$")
@@ -118,7 +120,7 @@ def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
 
 def _continued(line: str, indent: str, width: int) -> list[str]:
     """The lines of a command longer than the width, each but the last with a backslash at its end."""
-    first, *words = _WORD_END.split(line)
+    first, *words = _WORD_END.split(_OPTION.sub(r"\1 ", line))
     lines = [first]
     for k, word in enumerate(words, start=1):
         is_last = k == len(words)
