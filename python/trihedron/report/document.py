@@ -23,6 +23,7 @@ CONSEQUENCE = (
     FindingCode.GRAVITY_MISSING,
     FindingCode.STUCK_VALUES,
     FindingCode.UNIT_CONTRADICTED,
+    FindingCode.SCALE_NOT_NOMINAL,
     FindingCode.TURNTABLE,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,

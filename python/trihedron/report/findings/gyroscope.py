@@ -55,6 +55,13 @@ _MOVES = {
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
+    (Code.SCALE_NOT_NOMINAL, "gyro-common", WARNING): Words(
+        "all three gyro scales are {excess:+.2g %} off in {unit:unit}; they agree within {spread:.1g %} (1 σ), and "
+        "data sheets allow about {nominal:.1g %}, axis by axis.",
+        "the sampling rate or the timestamps are off by that factor, which looks like the sensor's sensitivity.",
+        "If the log did not last as long as its timestamps say (a clock tells), they or the rate are wrong by "
+        "{excess:abs .2g %}: record again, or give --columns time=none and --rate.",
+    ),
     (Code.LEFT_HANDED, "gyro", WARNING): Words(
         "the gyro's axes as logged form a left-handed triad (det S < 0).",
         "a turn was stated in the wrong sense; or one documented gyro axis is reversed, or two are exchanged.",
