@@ -39,6 +39,11 @@ ENTRIES = {
         _FACES_OR_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
+    (Code.NOT_OBSERVABLE, "poses-uncertain", SERIOUS): Words(
+        "The orientations suffice, but the reading of a pose is uncertain by {measured_g:.2g %} of gravity.",
+        "Too coarse a resolution (few digits, or counts taken for another unit), or a sensor that is not still.",
+        "Write more digits or choose a smaller range, check the unit, and put the sensor down in every pose.",
+    ),
     (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
         "In some orientations gravity is predicted to {worst_prediction_g:.2g %} only (1 σ; measured in one pose to "
         "{measured_g:.2g %}); least certain: {weakest}.",
