@@ -311,7 +311,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         )
         for part, colour, name in kinds:
             if part.any():
-                tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                tips = [said(f"{logs[i].serial}: {logs[i].name}", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
