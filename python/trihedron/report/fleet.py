@@ -292,6 +292,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
     x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    called = [f"{log.serial}: {log.name}" for log in logs]
     good = np.array([log.is_trustworthy for log in logs], dtype=bool)
     panels = []
     apart = numbers - np.median(numbers, axis=0)
@@ -311,7 +312,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         )
         for part, colour, name in kinds:
             if part.any():
-                tips = [said(f"{logs[i].serial}: {logs[i].name}", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                tips = [said(called[i], values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
