@@ -75,7 +75,8 @@ def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_
 def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_without_problems(tmp_path, capsys):
     log, report = tmp_path / "log.csv", tmp_path / "report.txt"
     assert main(["simulate", "table-turns", "-o", str(log), "--report", str(report)]) == 0
-    command = re.search(r"`(trihedron calibrate [^`]*)`", " ".join(report.read_text().split()))[1]
+    # A command longer than a line is continued as a shell reads it.
+    command = re.search(r"`(trihedron calibrate [^`]*)`", report.read_text().replace("\\\n", ""))[1]
     capsys.readouterr()
     assert main([*shlex.split(command)[1:-1], str(tmp_path / "calibration.json")]) == 0
     assert "OK: no problems found." in capsys.readouterr().out

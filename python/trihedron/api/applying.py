@@ -171,9 +171,11 @@ def static_force(force: FloatArray | None, rate_hz: float, calibration: Calibrat
     sensor = calibration.accelerometer
     means = (windows.quiet_mean("accelerometer") - sensor.b) @ np.linalg.inv(sensor.S).T
     errors, _, model = norm_error(sensor, means, np.zeros((len(means), 3)), gravity)
-    sigma = math.hypot(median(model), TO_SIGMA * median(np.abs(errors - median(errors))))
+    scatter = TO_SIGMA * median(np.abs(errors - median(errors)))
+    sigma = math.hypot(median(model), scatter)
     off, share = abs(norm - gravity), abs(norm / gravity - 1.0)
-    case = "far" if share > FAR_FROM_GRAVITY else "off" if share > OFF_GRAVITY and off > SIGMAS * sigma else ""
+    case = "scatter" if scatter > OFF_GRAVITY * gravity else ""
+    case = "far" if share > FAR_FROM_GRAVITY else "off" if share > OFF_GRAVITY and off > SIGMAS * sigma else case
     said = Finding.of(
         FindingCode.STATIC_FORCE,
         case,

@@ -279,7 +279,7 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
         open_ones = [one for one in uncertain if one.now is None]
         after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
         count = f"{len(open_ones)} of {len(uncertain)} parameters"
-        return f"Not yet determined: {count}, {after.sensor} {after.name} the worst."
+        return f"No uncertainty yet of {count}: a combination is open, {after.sensor} {after.name} most."
     then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 
@@ -300,7 +300,8 @@ def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
 def _doubts(calibration: Calibration | None) -> tuple[str, ...]:
     if calibration is None:
         return ()
-    return tuple(f.seen for f in calibration.findings if f.severity is Severity.SERIOUS and f.code not in _NOT_THE_FIT)
+    grave = [f for f in calibration.findings if f.severity is Severity.SERIOUS or f.code is FindingCode.OUTLIER_POSE]
+    return tuple(f.seen for f in grave if f.code not in _NOT_THE_FIT)
 
 
 def _noise(recording: Recording, segments: Segments, matrix: FloatArray, calibration: Calibration | None) -> str:

@@ -60,6 +60,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         missing = bool(named_effects(diagnosis, "recording")) and (is_carried or not is_file)
         news = [*(["the parameters that differ"] if differs else []), *(["the missing effects"] if missing else [])]
         said = listed(news or ["the noise and sampling of this log"])
+        surplus = named_effects(diagnosis, "model")
+        said += f", without {listed(surplus)}" if surplus else ""
         by = STORED if is_file and missing else _taken_by(model)
         steps.append(f"{of_another_device(diagnosis, model)}Take over {said}: {by}.")
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")

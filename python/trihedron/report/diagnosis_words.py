@@ -102,13 +102,15 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     """The verdict on residuals ``off`` that the effects ``named`` do not explain."""
-    text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
-    text += "effect explains"
+    at = next((one.where.segments for one in diagnosis.remaining if one.disagrees and one.where.segments), ())
+    most_in = f" (most in {listed([*at])})" if 0 < len(at) < MOST_NAMED else ""
+    text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model{most_in}, and no "
+    text += "known effect explains"
     if named:
         shares = [one.share for one in diagnosis.effects if one.side in ("", "recording") and one.share is not None]
         most = sum(shares) if len(shares) == len(named) else 0.0
-        size = f"{100.0 * min(most, 1.0):.0f} % of the misfit" if most > MOSTLY else "of little effect"
-        text += f" {'all of it' if most > MOSTLY else 'it'} (found, {size}: {listed(named)})"
+        whole, size = ("all of it", "most of the misfit") if most > MOSTLY else ("it", "of little effect")
+        text += f" {whole} (found, {size}: {listed(named)})"
     else:
         text += " it"
     if diagnosis.relations:

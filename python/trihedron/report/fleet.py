@@ -42,7 +42,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     bad = [log for log in summary.logs if log.status != "done"]
     n_done = n - len(bad)
     mixed = {one.serial for one in summary.mixed}
-    n_devices = how_many(len({log.serial for log in summary.logs} - mixed), "device")
+    n_devices = how_many(len({log.serial for log in summary.logs}), "device") + (" or more" if mixed else "")
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
@@ -103,7 +103,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections=tuple(sections),
         lead=lead,
         headlines=_headlines(summary),
-        next_step="" if mixed else next_step_of_fleet(summary, strays, moved),
+        next_step=next_step_of_fleet(summary, strays, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or strays or moved) else None,
     )
 
@@ -174,8 +174,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
 
 def _mixed(summary: FleetSummary) -> list[Block]:
     rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
-    said = "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
-    said += "folder; until then these logs are compared with nothing."
+    said = "Scales and directions of axes of one unit repeat within 1 %; these logs are compared with nothing."
     head = ("taken for one device", "logs", "parameter", "differs by")
     return [Paragraph(said), Table(head, tuple(rows), "Logs too unlike")]
 
@@ -293,6 +292,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
     x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    called = [f"{log.serial}: {log.name}" for log in logs]
     good = np.array([log.is_trustworthy for log in logs], dtype=bool)
     panels = []
     apart = numbers - np.median(numbers, axis=0)
@@ -312,7 +312,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         )
         for part, colour, name in kinds:
             if part.any():
-                tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                tips = [said(called[i], values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))

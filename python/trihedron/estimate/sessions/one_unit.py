@@ -7,11 +7,7 @@ import numpy as np
 
 from trihedron.defaults import FALSE_ALARM
 from trihedron.probability import ndtr
-from trihedron.records.sessions import PARAMETERS, Parameter, Session
-
-ONE_UNIT = 0.01
-"""Largest difference in relative scale, or angle [rad], between two logs of one unit: 0.03 %/K over 30 K; units differ
-by several per cent (data sheets of consumer parts: 3 %)."""
+from trihedron.records.sessions import ONE_UNIT, PARAMETERS, Parameter, Session
 
 
 def beyond_one_unit(sessions: Sequence[Session]) -> tuple[tuple[Parameter, float], ...]:

@@ -150,6 +150,13 @@ _USE = {
         "another one.",
         "Check it on this log: `trihedron verify FILE LOG`.",
     ),
+    (Code.STATIC_FORCE, "scatter", WARNING): Words(
+        f"{_FORCE} and differs from stretch to stretch by {{sigma_m_s2:.2g}} m/s² (1 σ); gravity is "
+        "{gravity_m_s2:.5g} m/s².",
+        "The calibration is of another sensor or range, or the sensor was not still.",
+        "Test it on this log: `trihedron verify FILE LOG`.",
+        numbers=("share",),
+    ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
         f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",
         "The calibration is of another sensor, or the log in another unit or range than it was made for.",
