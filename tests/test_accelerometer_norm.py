@@ -11,7 +11,7 @@ from trihedron.estimate.accelerometer import bending
 from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
-from trihedron.estimate.verification import norm_error
+from trihedron.estimate.gravity_error import norm_error
 from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
