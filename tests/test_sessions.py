@@ -11,7 +11,6 @@ from hand_made_sessions import G, Instrument, recorded
 from trihedron.api.sessions import several_devices
 from trihedron.cli import main
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.estimate.verification import reference_findings
@@ -270,7 +269,6 @@ def test_a_scale_of_one_axis_two_percent_off_is_of_another_unit_in_every_command
         pair = [made(one, covariance) for one in (first, numbers)]
         found = several_devices(pair, changes_among([pair], alpha=0.01))
         assert [one.code for one in found] == [FindingCode.SEVERAL_DEVICES] * is_several
-    assert [one.name for one, _ in beyond_one_unit([made(first, covariance), made(other, covariance)])] == ["x"]
 
 
 def test_errors_within_a_wide_uncertainty_and_above_those_of_the_own_calibration_are_no_verification(four_sessions):

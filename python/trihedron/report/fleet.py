@@ -174,7 +174,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
 
 def _mixed(summary: FleetSummary) -> list[Block]:
     rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
-    said = "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
+    said = "Axes of one unit keep their directions, and its scales repeat within 1 %. Name devices with --serial, or give each a "
     said += "folder; until then these logs are compared with nothing."
     head = ("taken for one device", "logs", "parameter", "differs by")
     return [Paragraph(said), Table(head, tuple(rows), "Logs too unlike")]
