@@ -309,7 +309,7 @@ def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
 
 def _drawn_in_words(effect: AcceptedEffect) -> str:
     if rest_panels(effect):
-        return "the bias of the log (dots: means of neighbouring stretches) and the curve that it follows"
+        return "the bias of the log (dots: means of neighbouring intervals) and the curve that it follows"
     if not effect.curves:
         return "the residual without effects, and the part of it that all effects together explain"
     beside = any(len(one.data) for one in effect.curves)

@@ -28,10 +28,12 @@ noise, flicker, walk or ramp beside an independent temperature (walk, cycle or c
 
 @dataclass(frozen=True)
 class WarmUp:
-    """A bias that changes by ``size`` over the log, as 1 - exp(-t/``time_s``)."""
+    """A bias that changes by ``size`` over the log, as 1 - exp(-t/``time_s``); ``rise`` is twice the rise of the
+    log-likelihood."""
 
     size: float
     time_s: float
+    rise: float
 
     def at(self, t: FloatArray) -> FloatArray:
         """(n,) bias relative to its final value, at times (n,) [s] after the first reading."""
@@ -57,9 +59,8 @@ def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:
             likelihood, weight = _fitted(white[:, [0, 1, 2, 3 + k]])
             tried.append((constant + likelihood, weight, float(time)))
     best, weight, time = max(tried)
-    if 2.0 * (best - max(without)) < EARNED:
-        return None
-    return WarmUp(-weight, time * MEANS * n / rate_hz)
+    rise = 2.0 * (best - max(without))
+    return WarmUp(-weight, time * MEANS * n / rate_hz, rise) if rise > EARNED else None
 
 
 CYCLES = np.arange(1.5, 16.1, 0.125)
@@ -71,11 +72,13 @@ none reaches 40."""
 
 @dataclass(frozen=True)
 class Wave:
-    """A sinusoid of ``period_s`` with a ``cosine`` and a ``sine`` part."""
+    """A sinusoid of ``period_s`` with a ``cosine`` and a ``sine`` part; ``rise`` is twice the rise of the
+    log-likelihood."""
 
     period_s: float
     cosine: float
     sine: float
+    rise: float
 
     @property
     def amplitude(self) -> float:
@@ -114,9 +117,8 @@ def wave(x: FloatArray, rate_hz: float) -> Wave | None:
         without.append(constant - 0.5 * len(t) * float(np.log(max(left, 1e-300))))
         tried.append((constant - 0.5 * len(t) * float(np.log(least)), float(CYCLES[k]), *map(float, parts[:, k])))
     best, cycles, cosine_part, sine_part = max(tried)
-    if 2.0 * (best - max(without)) < EARNED_BY_WAVE:
-        return None
-    return Wave(MEANS * n / rate_hz / cycles, cosine_part, sine_part)
+    rise = 2.0 * (best - max(without))
+    return Wave(MEANS * n / rate_hz / cycles, cosine_part, sine_part, rise) if rise > EARNED_BY_WAVE else None
 
 
 def _fitted(white: FloatArray) -> tuple[float, float]:

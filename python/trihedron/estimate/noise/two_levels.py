@@ -33,11 +33,13 @@ ROUNDS = 25
 
 @dataclass(frozen=True)
 class TwoLevels:
-    """Levels ``size`` apart, ``n_switches`` in the log, each held for ``held_s`` on average."""
+    """Levels ``size`` apart, ``n_switches`` in the log, each held for ``held_s`` on average; ``rise`` is twice the rise
+    of the log-likelihood above the best Gaussian process."""
 
     size: float
     n_switches: int
     held_s: float
+    rise: float
 
 
 def two_levels(x: FloatArray, rate_hz: float) -> TwoLevels | None:
@@ -52,10 +54,11 @@ def two_levels(x: FloatArray, rate_hz: float) -> TwoLevels | None:
         return None
     likelihood, levels, is_high = _switching((y - y.mean()) / scale)
     n_switches = int(np.count_nonzero(np.diff(is_high)))
-    if n_switches < FEWEST or 2.0 * (likelihood - _gaussian((y - y.mean()) / scale)) < EARNED:
+    rise = 2.0 * (likelihood - _gaussian((y - y.mean()) / scale))
+    if n_switches < FEWEST or rise < EARNED:
         return None
     duration_s = len(x) / rate_hz
-    return TwoLevels(scale * abs(float(levels[1] - levels[0])), n_switches, duration_s / (n_switches + 1))
+    return TwoLevels(scale * abs(float(levels[1] - levels[0])), n_switches, duration_s / (n_switches + 1), rise)
 
 
 def _switching(y: FloatArray) -> tuple[float, FloatArray, BoolArray]:

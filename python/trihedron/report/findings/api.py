@@ -126,7 +126,7 @@ _VERIFIED = {
     ),
 }
 
-_FORCE = "In quiet stretches the corrected |f| is {norm_m_s2:.5g} m/s²"
+_FORCE = "In quiet intervals the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
         "The gyro was excluded: the calibration contains no gyro.",
