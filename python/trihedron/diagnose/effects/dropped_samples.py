@@ -163,11 +163,11 @@ class _Move:
         best, least = own[k], self.misfit(own)
         for direction in (-1, 1):
             while 1 <= best.count + direction <= most_lost(self.obs.recording.rate_hz):
-                moved = replace(best, count=best.count + direction)
-                value = self.misfit([*own[:k], moved, *own[k + 1 :]])
+                other = replace(best, count=best.count + direction)
+                value = self.misfit([*own[:k], other, *own[k + 1 :]])
                 if value >= least:
                     break
-                best, least = moved, value
+                best, least = other, value
         return best
 
     def sigma(self, own: list[Loss], one: Loss) -> float:
