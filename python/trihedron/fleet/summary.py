@@ -56,7 +56,9 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
     logs = tuple(_log(row) for row in rows)
     comparable, passed_over = _comparable(rows)
     sessions = [_session(row) for row in comparable]
-    by_device = _by_device(sessions)
+    by_device: dict[str, list[Session]] = {}
+    for session in sessions:
+        by_device.setdefault(session.group, []).append(session)
     changes = changes_among(list(by_device.values()), alpha=FALSE_ALARM)
     mixed = _not_one_unit(by_device, changes)
     if mixed:
@@ -148,13 +150,6 @@ def _session(row: dict[str, Any]) -> Session:
         np.array(row["bias_drift_variance"], dtype=np.float64),
         row.get("start_epoch_s") or 0.0,
     )
-
-
-def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
-    out: dict[str, list[Session]] = {}
-    for session in sessions:
-        out.setdefault(session.group, []).append(session)
-    return out
 
 
 def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...], Outlier | None]:

@@ -21,7 +21,7 @@ TIMES = np.geomspace(0.02, 0.5, 15)
 EARNED = 30.0
 """Least rise of twice the log-likelihood. In noise of known strength it is n log(1 + F/(n - 4)) of n means, F an F(1,
 n - 4) variate: over 15 time constants and 30 strengths of a walk chance reaches 30 in 6e-5 of logs (Bonferroni).
-Simulated (benches/static_screening.py): 2e-4 at the most, in a walk; flicker and Gauss-Markov noise less."""
+Simulated (benches/static_screening.py): 3e-4 at the most, in a walk; flicker and Gauss-Markov noise less."""
 MOSTLY = 0.5
 """Share of a random walk's power beyond which temperature, not noise, is the larger part of it. Of 6000 axes of white
 noise, flicker, walk or ramp beside an independent temperature (walk, cycle or cooling) none reaches 0.41."""
