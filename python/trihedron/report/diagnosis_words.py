@@ -69,7 +69,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, STATED)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
-        but = "".join(f"; yet {_clause(opening(one.seen))}" for one in imprecise(findings_of(diagnosis))[:1])
+        but = "".join(f"; but {_clause(opening(one.seen))}" for one in imprecise(findings_of(diagnosis))[:1])
         return (
             f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
             f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}{but}."

@@ -26,7 +26,6 @@ CONSEQUENCE = (
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
     FindingCode.NOT_TESTED,
-    FindingCode.CALIBRATION_IMPRECISE,
     FindingCode.SEVERAL_DEVICES,
     FindingCode.POSES_VIBRATE,
     FindingCode.GYROSCOPE_LEFT_OUT,
