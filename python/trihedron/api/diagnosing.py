@@ -165,7 +165,8 @@ def _of_poses(
         from trihedron.api.diagnosing_with_simulation import compared_with_model
 
         given = replace(known, gravity_m_s2=gravity)
-        found = compared_with_model(found, given, simulated, (recording_used, segments_used, used), alpha)
+        found, more = compared_with_model(found, given, simulated, (recording_used, segments_used, used), alpha)
+        findings += more
         updated, used = used, given
     return DiagnosisResult(
         **vars(found),

@@ -91,7 +91,7 @@ def begins_with(step: str, action: str) -> bool:
 
 
 def concerns_whole(finding: Finding) -> bool:
-    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck stretches aside."""
+    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck intervals aside."""
     is_stretch = finding.code is FindingCode.STUCK_VALUES and finding.severity is not Severity.SERIOUS
     return finding.code in CONSEQUENCE and not is_stretch
 

@@ -26,6 +26,7 @@ MEANING = {
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
     "calibration-doubted": "warnings of single calibrations",
+    "calibration-imprecise": "errors larger than by the log's own calibration",
     "calibration-shift": "parameters differ",
     "effect-not-applied": "effect not compensated",
     "effects-modelled": "residuals that no effect explains",

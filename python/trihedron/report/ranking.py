@@ -11,9 +11,15 @@ from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.findings import by_weight, findings_block
-from trihedron.report.imprecise_calibration import imprecise_in_verification
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import above_noise, headlines_of, parameters_table, use_in_words, verified_in_words
+from trihedron.report.verification import (
+    above_noise,
+    headlines_of,
+    imprecise,
+    parameters_table,
+    use_in_words,
+    verified_in_words,
+)
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 ROW_PX = 34
@@ -70,8 +76,7 @@ def said_of(one: Ranked) -> str:
     said = [_mistake(found) for found in one.suspicions]
     if not said:
         said = [f.seen.rstrip(".") for f in by_weight(one.verification.findings) if f.severity is not Severity.NOTE][:2]
-    why = imprecise_in_verification(one.verification) or (", but another fits better" if one.is_clearly_behind else "")
-    said = said or [f"nothing found{why}"]
+    said = said or [f"nothing found{', but another fits better' if one.is_clearly_behind else ''}"]
     if one.without_bias:
         said.append(f"its file has no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
     return "; ".join(said)
@@ -117,7 +122,7 @@ def _order(ranking: Ranking) -> Table:
 def _judged(one: Ranked) -> str:
     if one.is_rejected or above_noise(one.verification):
         return "rejected" if one.is_rejected else "doubtful"
-    return "imprecise" if imprecise_in_verification(one.verification) else "verified"
+    return "imprecise" if imprecise(one.verification.findings) else "verified"
 
 
 def _with_interval(rms: float, interval: tuple[float, float], factor: float) -> str:

@@ -100,7 +100,7 @@ def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
                 for axis, of, error in zip(AXES, mean.T, sigma.T, strict=True)
             }
     rows = tuple((str(k + 1), *(cells[k] for cells in columns.values())) for k in range(segments.n_poses))
-    words = "Mean readings ± their standard error; disturbed stretches excluded"
+    words = "Mean readings ± their standard error; disturbed intervals excluded"
     return Table(("pose", *columns), rows, words if recording else f"{words}; in the unit of the log")
 
 
@@ -117,8 +117,8 @@ def signals_chart(recording: Recording, segments: Segments | None = None) -> Cha
     poses = () if segments is None else segments.poses
     spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses if not pose.is_unsteady]
     spans += [_span(recording, pose.start, pose.stop - 1, SHAKEN, "soft") for pose in poses if pose.is_unsteady]
-    bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
-    return _signals(recording, (*spans, *bumps))
+    disturbed = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
+    return _signals(recording, (*spans, *disturbed))
 
 
 def state_of(pose: Pose) -> str:
