@@ -164,8 +164,7 @@ def _averaged(
     if settling is not None:
         means = settling.without(means)
         found.append(judge_settling(settling, means))
-    if recording.accelerometer is not None:
-        found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
+    found += judge_vibration(recording, channels, sigma, means, poses)
     return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 

@@ -44,8 +44,10 @@ def signals(context: Context) -> list[Signal]:
     w, u = context.rate.T, context.force.T / context.fitted.state.gravity
     products, history, warming = _products("u", u, "g^2"), _history(context), _warming(context)
     rates: list[Column] = [(f"w_{AXES[a]}", w[a], "rad/s") for a in range(3)]
+    scale = _over_time("u", u, context.elapsed, "g")
     out = [
         *_each("accelerometer", HISTORY, history), *_each("accelerometer", "temperature", warming),
+        *_each("accelerometer", "scale", scale),
         *_each("accelerometer", "force", products), *_each("accelerometer", "rate", rates, is_motion=True),
         *_each("accelerometer", "rate products", [("|w|^2", (w**2).sum(axis=0), "(rad/s)^2")], is_motion=True),
     ]  # fmt: skip
@@ -58,7 +60,9 @@ def signals(context: Context) -> list[Signal]:
         previous = [(f"previous u_{AXES[a]}", before[a], "g") for a in range(3)]
         mixed = [(f"w_{AXES[a]} f_{AXES[b]}", w[a] * u[b], "rad/s g") for a in range(3) for b in range(3)]
         size = [("|w|", np.linalg.norm(w, axis=0), "rad/s")]
+        drifting = _over_time("w", w, context.elapsed, "rad/s")
         out += [
+            *_each("gyroscope", "scale", drifting, is_motion=True),
             *_each("gyroscope", "force", [*products, *own]), *_each("gyroscope", "previous pose", previous),
             *_each("gyroscope", HISTORY, history), *_each("gyroscope", "temperature", warming),
             *_each("gyroscope", "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
@@ -78,6 +82,11 @@ def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:
     return [
         (f"{symbol}_{AXES[a]} {symbol}_{AXES[b]}", values[a] * values[b], unit) for a, b in combinations(range(3), 2)
     ]
+
+
+def _over_time(symbol: str, values: FloatArray, elapsed: FloatArray, unit: str) -> list[Column]:
+    """The elapsed share of the session times each component of ``values`` (3, points): a scale that drifts."""
+    return [(f"{symbol}_{AXES[a]} over time", values[a] * (elapsed - elapsed.mean()), unit) for a in range(3)]
 
 
 def _history(context: Context) -> list[Column]:

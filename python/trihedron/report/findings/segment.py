@@ -15,7 +15,7 @@ ENTRIES = {
         "The accelerometer settles after rotations: {x_percent:.3f}, {y_percent:.3f}, {z_percent:.3f} % (each ± "
         "{sigma_percent:.3f}) of a change of force on X, Y, Z come late, with a time constant of about {tau_s:.1f} s. "
         "The means of the poses, off by {mean_mg:.2f} mg rms, were corrected.",
-        "The package or its adhesive creeps after a change of load.",
+        "The package or its adhesive yields after a change of load.",
         "S and b are those of the settled sensor: wait about {wait_s:.0f} s after a rotation before a reading counts.",
         numbers=("p_value",),
     ),
@@ -50,6 +50,12 @@ ENTRIES = {
         "sensor's noise.",
         "Motors run, as in a flight or a drive.",
         "Record static poses with the motors off; for noise in motion: `trihedron noise LOG --reference MOTION`.",
+    ),
+    (Code.POSES_VIBRATE, "held", WARNING): Words(
+        "the sensor was not still in its poses; the gyro's means scatter as by noise of {density:.2g °/s}/√Hz, "
+        "more than any sensor's.",
+        "The sensor was held in the hand or stood on a support that shakes.",
+        "Put the sensor down in every pose and record again: the motion makes S and b less certain.",
     ),
     (Code.SLOW_TURN, "", NOTE): Words(
         "{turning_s:.1f} s are static to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} "
