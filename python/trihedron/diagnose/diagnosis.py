@@ -167,6 +167,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
     named = {one.effect.id for one in observed.seen}
+    if "accel-hysteresis" in answer.ids:
+        settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
     remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
     remaining = with_relations(accounted_for(answer, remaining), found.related)
     if not answer.ids:
@@ -191,7 +193,7 @@ def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[F
     a bias settles inside the poses, with p-values: the noise of their means had absorbed it."""
     context = Context(predicted)
     biases = [one for one in predicted.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
-    shown: dict[Domain, float] = {"static-accel": biases[0].numbers["p_value"]} if biases else {}
+    shown: dict[Domain, float] = {"within-static": biases[0].numbers["p_value"]} if biases else {}
     found, limit = settling(context), threshold(alpha)
     if found is not None and found.of_bias >= limit:
         shown["static-gyro"] = math.exp(-0.5 * found.of_bias)
@@ -205,8 +207,8 @@ def _all_domains(
 ) -> tuple[DomainTest, ...]:
     """Every domain's test; ``settles`` p-values of biases that settle, ``rejected`` ids of effects that did not improve
     the prediction of held-out moves: jolts look like lost samples."""
-    rows = _disagreeing(judge_rows(context.fitted, alpha), settles)
-    return (*rows, judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, rejected))
+    rows, inside = judge_rows(context.fitted, alpha), judge_within_poses(context.obs, alpha)
+    return (*_disagreeing((*rows, inside), settles), _judge_timing(context, alpha, rejected))
 
 
 def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, float]) -> tuple[DomainTest, ...]:
