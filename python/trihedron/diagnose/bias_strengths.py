@@ -122,7 +122,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
-    price = price_of_choice(other.unavailable(model.context) for other in catalogue())
+    price = price_of_choice(model, catalogue())
     return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, price, is_large)
 
 

@@ -12,18 +12,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
-from trihedron.diagnose.candidates import NEAR, Tried, all_beside, as_fits_best, candidates_beside
+from trihedron.diagnose.candidates import (
+    N_RIVALS,
+    NEAR,
+    WORTH_FITTING,
+    Tried,
+    all_beside,
+    as_fits_best,
+    candidates_beside,
+    with_best,
+)
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
+from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
 from trihedron.diagnose.relations.search import Related, related
-from trihedron.threads import side_by_side
 
-WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
-"""Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
-best score on: one step predicts a large effect poorly."""
-N_RIVALS = 3
-"""Rivals fitted in full."""
 N_SENSORS = 2
 """Processes that may be replaced by effects: one of either sensor."""
 MOST_EFFECTS = 4
@@ -98,7 +101,7 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
         return None
     for process in bias_strengths(model, alpha)[0]:
         standing = explain_as_much(process, model, tried)
-        larger, chosen = _with_best(model, standing) if standing else (model, None)
+        larger, chosen = with_best(model, standing) if standing else (model, None)
         if chosen is None:
             continue
         bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
@@ -115,12 +118,12 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
 def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
     """Add effects one at a time until none scores above the threshold; one that lowers no held-out rms is dropped."""
     limit, judged = threshold(alpha), state.judged
-    tried, missing = candidates_beside(judged.model, exclude)
+    tried, missing = candidates_beside(judged.model, catalogue(), exclude)
     for _ in range(MOST_STEPS):
         standing = [one for one in tried if one.score > limit and one.term.effect.id not in state.dropped]
         if not standing or sum(not t.effect.is_local for t in judged.model.terms) >= MOST_EFFECTS:
             break
-        larger, chosen = _with_best(judged.model, standing)
+        larger, chosen = with_best(judged.model, standing)
         if chosen is None:
             break
         if not larger.is_shown(judged.model, len(larger.terms) - 1):
@@ -130,7 +133,7 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         others = [one for one in standing if one.term.effect is not chosen.effect]
         state.rivals[chosen.effect.id] = others[:N_RIVALS]
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
-        tried, missing = candidates_beside(judged.model, exclude)
+        tried, missing = candidates_beside(judged.model, catalogue(), exclude)
     if judged is not state.judged:
         state.tried.clear()  # these were tried beside another hypothesis
     state.tried.update({one.term.effect.id: one for one in reversed(tried)})
@@ -200,27 +203,6 @@ class _State:
     against: dict[str, str] = field(default_factory=dict)
     tried: dict[str, Tried] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
-
-
-def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
-    """The hypothesis with the best of the candidates near the first, each fitted in full."""
-    first = standing[0].score
-    near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
-    best: tuple[float, Hypothesis, Term] | None = None
-    for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
-        value, covariance = larger.value(len(larger.terms) - 1)
-        if not term.effect.is_plausible(term.variant, value, covariance):
-            continue
-        score = 2.0 * larger.log_evidence - term.cost
-        if best is None or score > best[0]:
-            best = score, larger, term
-    return (model, None) if best is None else best[1:]
-
-
-def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term, known = as_fits_best(model, tried), model.fitted
-    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
-    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 def _pruned(model: Hypothesis, limit: float) -> _Judged:

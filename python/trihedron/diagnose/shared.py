@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, terms_beside
+from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, offered_beside, price_of_choice, terms_of
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import DirectEffect, Effect
@@ -175,8 +175,11 @@ def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
 
 def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Joint]:
     """Effects that can be added to the hypotheses of all recordings, best first, one shape each."""
-    ids = {one.id for one in catalogue() if not may_be_shared(one)} | set(exclude)
-    found = [{_key(t): t for t in terms_beside(m, ids)[0]} for m in models]
+    sought = [one for one in catalogue() if may_be_shared(one)]
+    found = []
+    for model in models:
+        offered, price = offered_beside(model, sought, exclude)[0], price_of_choice(model, catalogue())
+        found.append({_key(t): t for effect in offered for t in terms_of(model, effect, price)})
     common = [key for key in found[0] if all(key in one for one in found)]
     if not common:
         return []

@@ -64,7 +64,7 @@ class Variant:
 
 
 class Effect:
-    id: ClassVar[str]
+    id: str = ""
     mechanism: ClassVar[str] = ""
     """Name of an effect from a user's own file; the texts of the built-in effects are in ``report/effects``."""
     experiment: ClassVar[str] = ""
