@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.session.solve import Distortion
@@ -53,10 +52,10 @@ def wald_p(value: FloatArray, covariance: FloatArray) -> float:
     return max(chdtrc(len(value), max(wald, 0.0)), TINY)
 
 
-def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
+def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
-    offered, missing = offered_beside(model, catalogue(), ())
-    price = price_of_choice(model, catalogue())
+    offered, missing = offered_beside(model, effects, ())
+    price = price_of_choice(model, effects)
     terms = [term for effect in offered for term in terms_of(model, effect, price)]
     return _best_of_each(terms, model.at_its_strengths(terms, PRIOR_SCALES), model.log_evidence), missing
 

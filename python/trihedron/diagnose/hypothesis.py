@@ -202,7 +202,7 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], TINY)))
+        gain = float(np.log(max(rms_before[d], TINY) / max(rms_after[d], TINY)))
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
         before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2

@@ -6,7 +6,7 @@ the shapes and effects tried. It is accepted above the threshold that the false-
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from trihedron.diagnose.candidates import (
 )
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
+from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
 from trihedron.diagnose.relations.search import Related, related
 
@@ -71,22 +72,24 @@ def threshold(alpha: float) -> float:
     return float(-2.0 * np.log(2.0 * alpha))
 
 
-def search(base: Hypothesis, alpha: float) -> Found:
-    """The effects of a session: the best is added repeatedly, then each is removed or exchanged if that is better."""
-    found = _sought(_State(_Judged(base, ())), alpha)
+def search(base: Hypothesis, alpha: float, effects: Sequence[Effect] | None = None) -> Found:
+    """The effects of a session: the best of the catalogue, or of ``effects``, is added repeatedly, then each is removed
+    or exchanged if that is better."""
+    effects = catalogue() if effects is None else effects
+    found = _sought(_State(_Judged(base, ())), alpha, effects)
     for _ in range(N_SENSORS):
         instead = _instead_of_a_process(found, alpha)
         if instead is None:
             break
-        found = _sought(instead, alpha)
+        found = _sought(instead, alpha, effects)
     return found
 
 
-def _sought(state: _State, alpha: float) -> Found:
-    drifts = {one.id for one in catalogue() if isinstance(one, BiasProcess)}
-    mechanisms = _added(state, alpha, drifts)
+def _sought(state: _State, alpha: float, effects: Sequence[Effect]) -> Found:
+    drifts = {one.id for one in effects if isinstance(one, BiasProcess)}
+    mechanisms = _added(state, alpha, effects, drifts)
     # Every hypothesis contains bias drift as a walk: a smooth curve is tried after the effects that explain more.
-    return _concluded(_added(mechanisms, alpha, {one.id for one in catalogue()} - drifts), alpha)
+    return _concluded(_added(mechanisms, alpha, effects, {one.id for one in effects} - drifts), alpha, effects)
 
 
 def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
@@ -115,10 +118,10 @@ def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
     return None
 
 
-def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
+def _added(state: _State, alpha: float, effects: Sequence[Effect], exclude: Collection[str]) -> _State:
     """Add effects one at a time until none scores above the threshold; one that lowers no held-out rms is dropped."""
     limit, judged = threshold(alpha), state.judged
-    tried, missing = candidates_beside(judged.model, catalogue(), exclude)
+    tried, missing = candidates_beside(judged.model, effects, exclude)
     for _ in range(MOST_STEPS):
         standing = [one for one in tried if one.score > limit and one.term.effect.id not in state.dropped]
         if not standing or sum(not t.effect.is_local for t in judged.model.terms) >= MOST_EFFECTS:
@@ -133,7 +136,7 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         others = [one for one in standing if one.term.effect is not chosen.effect]
         state.rivals[chosen.effect.id] = others[:N_RIVALS]
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
-        tried, missing = candidates_beside(judged.model, catalogue(), exclude)
+        tried, missing = candidates_beside(judged.model, effects, exclude)
     if judged is not state.judged:
         state.tried.clear()  # these were tried beside another hypothesis
     state.tried.update({one.term.effect.id: one for one in reversed(tried)})
@@ -141,7 +144,7 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
     return replace(state, judged=judged)
 
 
-def _concluded(state: _State, alpha: float) -> Found:
+def _concluded(state: _State, alpha: float, effects: Sequence[Effect]) -> Found:
     """Exchange every effect for the best of its rivals, and score all candidates beside the answer."""
     judged = state.judged
     if len(judged.model.terms) > 1:
@@ -151,7 +154,7 @@ def _concluded(state: _State, alpha: float) -> Found:
         judged = _pruned(swapped, threshold(alpha))
     judged, beside = _beside_relations(judged, threshold(alpha))
     model = judged.model
-    tried, missing = all_beside(model)
+    tried, missing = all_beside(model, effects)
     # Results with noise strengths refitted replace those at the strengths of the answer.
     beside_it = {one.term.effect.id: one for one in tried} | (state.tried if model is state.judged.model else {})
     held = {term.effect.id for term in model.terms}
