@@ -18,8 +18,8 @@ from trihedron.diagnose.bias_strengths import bias_strengths
 from trihedron.diagnose.candidates import wald_p
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
-from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, per_axis_parameters
+from trihedron.diagnose.effects.bias_process import BiasDrift
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records, hypothesis
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves, residuals_before_after
@@ -133,17 +133,16 @@ def _judged(
         rivals = ("accel-thermal-scale",) if term.effect.id == "accel-thermal-bias" else ()
         p_value, held = wald_p(value, covariance), held_out_records(found.without[k], known)
         effect, statement = by_id()[term.effect.id], term.effect.statement(parameters)
-        if isinstance(effect, BiasProcess):
+        if isinstance(effect, BiasDrift):
             along = np.asarray(term.distortion.rate)[: obs.n_poses]
             sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
-            parameters = per_axis_parameters("range", np.ptp(along @ value, axis=0), np.sqrt(2.0) * sigma, effect.unit)
-            sizes = [one.value for one in parameters]
-            statement = effect.reported("static-counts" if unit == "counts" else "static", range=sizes)
+            span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
+            parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
         made.append(effect_record(effect, parameters, statement, p_value, found.scores[k], held, rivals, curves))
         candidates.append(Candidate(effect.id, p_value, True, "", found.scores[k], parameters))
     for one in walks:
         drift = kinds[1]
-        assert isinstance(drift, BiasProcess)
+        assert isinstance(drift, BiasDrift)
         parameters, statement = drift.of_strength(one.size, one.std)
         curves = bias_curves(known.context, GYRO, known.fitted.bias(GYRO), one.std, [shown])
         held = held_out_records(one.without, known)
