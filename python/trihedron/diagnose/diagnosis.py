@@ -14,7 +14,6 @@ from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds, that
 from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
@@ -25,7 +24,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidde
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
-from trihedron.diagnose.search import Found, search, threshold
+from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
@@ -38,7 +37,6 @@ from trihedron.records.finding import FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
-from trihedron.session.noise import strengths_of_all
 
 
 def diagnose_recording(
@@ -149,13 +147,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
     domains = _all_domains(plain.context, alpha, settles, observed.rejected)
     notify(0.3, "letting effects compete")
-    bare, found = _searched(observed, alpha)
-    # Effects hidden by another effect, or mistaken for it, are tested once more.
-    sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
-    more, _ = look(observed, found.model.context, alpha, start, sought)
-    if len(more.seen) > len(observed.seen):
-        observed = more
-        bare, found = _searched(observed, alpha)
+    bare = hypothesis(observed.obs, observed.fitted.state, prior)
+    found = search(bare, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
     related = that_poses_bear(found.related.model)
@@ -166,24 +159,11 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     answer = Answer(
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
-    named = {one.effect.id for one in observed.seen}
-    remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
+    remaining = _all_domains(judged.context, alpha, settles, observed.rejected)
     remaining = with_relations(accounted_for(answer, remaining), found.related)
     if not answer.ids:
         domains = remaining  # nothing was added to the linear model: one judgement of it
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
-
-
-LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
-
-
-def _searched(observed: Observed, alpha: float) -> tuple[Hypothesis, Found]:
-    obs, prior = observed.obs, observed.fitted.prior
-    first = hypothesis(obs, observed.fitted.state, prior)
-    # Two starts, low and high noise strengths: the evidence may have an optimum at each.
-    loud = hypothesis(obs, first.fitted.state, prior, strengths=LOUD)
-    bare = max(first, loud, key=lambda one: one.log_evidence)
-    return bare, search(bare, alpha)
 
 
 def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:

@@ -196,8 +196,6 @@ class Evidence:
 class DirectEffect(Effect):
     """An effect detected by a test on the samples, with evidence of its own, not by columns over poses."""
 
-    is_sought_again: ClassVar[bool] = False
-    """Whether the test is repeated after the search: another effect may have hidden it or been mistaken for it."""
     is_proof: ClassVar[bool] = False
     """Whether the samples alone prove it (a range limit); otherwise its correction must improve held-out moves."""
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, ndtr, stdtrit
+from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -68,28 +68,10 @@ class TableEffect(DirectEffect):
         return None if is_there else why_not("no-table-turns")
 
 
-FEWEST_TO_SCATTER = 3
-"""Rotations from which their scatter is used."""
 LEAST_SINE = 0.3
 """Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
 ORDINARY_DEG = 0.05
 """Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
-
-
-def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
-    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise.
-
-    Neighbouring rotations share a pose, and a scatter of four values has an uncertainty of 40 %. It is widened so that
-    two standard errors of a t distribution cover as much as those of a normal one.
-    """
-    share = weights / weights.sum()
-    by_noise = float(np.sqrt((share**2 * noise**2).sum()))
-    n = len(values)
-    if n < FEWEST_TO_SCATTER:
-        return by_noise
-    variance = float((share * (values - (share * values).sum()) ** 2).sum()) * n / (n - 1)
-    wider = float(stdtrit(n - 1, ndtr(2.0)) / 2.0)
-    return max(by_noise, wider * float(np.sqrt(variance * (share**2).sum())))
 
 
 class TableTilt(TableEffect):
@@ -99,33 +81,33 @@ class TableTilt(TableEffect):
 
     def find(self, context: Context) -> Evidence | None:
         state, obs = context.fitted.state, context.obs
-        chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
+        found = []
         for turn in table_turns(context):
             before, after = obs.move_poses[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
-            if half < LEAST_SINE:
-                continue
-            change = state.up[after] - state.up[before]
-            variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
-            sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
-            chi2 += float(change @ change) / sigma**2
-            dof += 2
-            tilts.append(float(np.linalg.norm(change)) / (2.0 * half))
-            weights.append(half**2)
-            noises.append(sigma / (2.0 * half))
-        if dof == 0:
+            if half >= LEAST_SINE:
+                variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
+                sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
+                found.append((np.linalg.norm(state.up[after] - state.up[before]), sigma, 2.0 * half))
+        if not found:
             return None
-        p = float(chdtrc(dof, chi2))
-        tilt = float(np.degrees(np.average(tilts, weights=weights)))
-        scatter = _error_of_mean(np.degrees(tilts), np.array(weights), np.degrees(noises))
-        if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * scatter:
+        change, sigmas, gain = np.array(found).T
+        chi2, weights = float(((change / sigmas) ** 2).sum()), gain**2 / (gain**2).sum()
+        p, tilts = float(chdtrc(2 * len(found), chi2)), np.degrees(change / gain)
+        tilt = float(weights @ tilts)
+        # The larger of the errors by noise and by scatter, in which neighbouring rotations share a pose.
+        noise = np.degrees(sigmas / gain)
+        error = float(np.sqrt((weights**2) @ np.maximum(noise**2, (tilts - tilt) ** 2)))
+        if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * error:
             return None
         return Evidence(
-            p, chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
+            p, chi2, (EffectParameter("tilt", tilt, max(error, 1e-4), "deg"),),
             self.reported("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip
 
 
+LEAST_RAD = 1e-3
+"""Error of an angle by the stop and the feet, a twentieth of a degree."""
 OFF_SIGMA = 4.0
 """Deviation in sigma from which a rotation is named: by chance one of 16 000."""
 
@@ -137,7 +119,7 @@ class TurnAngleError(TableEffect):
 
     def find(self, context: Context) -> Evidence | None:
         turns = table_turns(context)
-        errors, sigmas = _without_common_scale(context, turns)
+        errors, sigmas = np.array([turn.error_rad for turn in turns]), _sigmas(context, turns)
         z = errors / sigmas
         chi2 = float((z**2).sum())
         p = float(chdtrc(len(z), chi2))
@@ -160,36 +142,20 @@ class TurnAngleError(TableEffect):
         )  # fmt: skip
 
 
-def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[FloatArray, FloatArray]:
-    """Errors of the rotations without the part that one scale error per body axis explains, and their noise [rad].
-
-    A scale error grows with the angle and is the same for every rotation about an axis. The weighted median of error
-    over angle is robust against single wrong rotations.
-    """
-    noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
-    quantum, scatter = context.obs.recording.facts.of("gyroscope").step, context.obs.segments.gyroscope_sigma
+def _sigmas(context: Context, turns: list[TableTurn]) -> FloatArray:
+    """Standard errors of the angles [rad]: by noise, by the scale of the gyro, which the session determines, and by
+    rates inside one LSB that noise does not dither, which have one error throughout."""
+    obs, S = context.obs, context.fitted.state.gyro_S
+    quantum, scatter = obs.recording.facts.of("gyroscope").step, obs.segments.gyroscope_sigma
     assert scatter is not None
-    is_hidden = undithered_axes(quantum, scatter)
-    steps = np.where(is_hidden, quantum, 0.0) * np.linalg.norm(context.fitted.state.gyro_S, axis=0)
-    rounding = np.sqrt(UNIFORM) * float(steps.max())
-    axes = np.array(
-        [int(np.abs(context.fitted.state.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
-    )
-    errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
-    sigmas = np.zeros(len(turns))
-    for k, turn in enumerate(turns):
-        where = context.moves[turn.move]
-        duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
-        # Inside one LSB that noise does not dither, the rate has one error throughout.
-        hidden = rounding * duration
-        sigmas[k] = np.sqrt(noise**2 * duration + hidden**2 + 1e-6)
-    for axis in range(3):
-        rows = axes == axis
-        if rows.sum() < 2:
-            continue
-        ratio, weight = errors[rows] / angles[rows], np.abs(angles[rows])
-        order = np.argsort(ratio)
-        heavy = np.cumsum(weight[order])
-        common = float(ratio[order][np.searchsorted(heavy, 0.5 * heavy[-1])])
-        errors[rows] -= common * angles[rows]
-    return errors, sigmas
+    steps = np.where(undithered_axes(quantum, scatter), quantum, 0.0) * np.linalg.norm(S, axis=0)
+    of_scale, density = context.fitted.covariance()[9:18, 9:18], context.noise_density[1].mean()
+    out = []
+    for turn in turns:
+        up = context.fitted.state.up[obs.move_poses[turn.move][0]]
+        slope = np.outer(up, np.linalg.solve(S, turn.angle_rad * up)).ravel()
+        time_s = context.time_s[context.moves[turn.move]]
+        lasts_s = float(time_s[-1] - time_s[0])
+        hidden = UNIFORM * (float(steps.max()) * lasts_s) ** 2
+        out.append(density**2 * lasts_s + hidden + slope @ of_scale @ slope + LEAST_RAD**2)
+    return np.sqrt(out)
