@@ -145,7 +145,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
-    domains = _all_domains(plain.context, alpha, settles, observed.rejected)
+    of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.rejected)
+    domains = (*_disagreeing(judge_rows(plain.fitted, alpha), settles), *of_samples)
     notify(0.3, "letting effects compete")
     bare = hypothesis(observed.obs, observed.fitted.state, prior)
     found = search(bare, alpha)
@@ -159,8 +160,8 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     answer = Answer(
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
-    remaining = _all_domains(judged.context, alpha, settles, observed.rejected)
-    remaining = with_relations(accounted_for(answer, remaining), found.related)
+    rows = _disagreeing(judge_rows(judged.fitted, alpha), settles)
+    remaining = with_relations((*rows, *_explained(answer, of_samples)), found.related)
     if not answer.ids:
         domains = remaining  # nothing was added to the linear model: one judgement of it
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
@@ -180,15 +181,6 @@ def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[F
     return predicted, shown
 
 
-def _all_domains(
-    context: Context, alpha: float, settles: Mapping[Domain, float], rejected: Collection[str]
-) -> tuple[DomainTest, ...]:
-    """Every domain's test; ``settles`` p-values of biases that settle, ``rejected`` ids of effects that did not improve
-    the prediction of held-out moves: jolts look like lost samples."""
-    rows = _disagreeing(judge_rows(context.fitted, alpha), settles)
-    return (*rows, judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, rejected))
-
-
 def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, float]) -> tuple[DomainTest, ...]:
     """The domains, where those of another test's ``p_values`` disagree: noise of any strength had absorbed it."""
     return tuple(
@@ -200,7 +192,10 @@ def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, floa
 
 
 def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:
-    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests."""
+    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests.
+
+    ``rejected`` ids of effects that did not improve the prediction of held-out moves: jolts look like lost samples.
+    """
     value, spread, n = common_time_variance(context.obs)
     if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
@@ -218,21 +213,17 @@ def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> 
 
 # The verdict: which domains could be tested, which disagree still, and one word.
 
-SAMPLE_DOMAINS = ("within-static", "timing")
-"""Domains of the samples themselves, to which no parameter of the model is fitted."""
 POSE_DOMAINS = ("static-accel", "moves", "dynamics")
 """Domains that compare the model with gravity or zero velocity: without them nothing can contradict it."""
 LEAST_DOF = 1.0
 """Degrees of freedom below which the fit has used up a domain's rows."""
 
 
-def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """The domains, where those of the samples agree once an accepted effect explains their disagreement."""
+def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainTest]:
+    """The domains of the samples, which agree once an accepted effect explains their disagreement."""
     explained = {one.evidence.domain for one in answer.seen}
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
-    return tuple(
-        replace(d, disagrees=False) if d.domain in explained and d.domain in SAMPLE_DOMAINS else d for d in remaining
-    )
+    return [replace(d, disagrees=False) if d.domain in explained else d for d in of_samples]
 
 
 def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, offered_beside, price_of_choice, terms_of
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
@@ -49,17 +49,19 @@ class Information:
         return cls(gain - 0.5 * float(slope @ np.linalg.solve(posterior, slope)) + float(odds), slope, precision)
 
     @property
-    def known(self) -> tuple[FloatArray, FloatArray]:
-        """Eigenvalues and eigenvectors of the precision for the directions that this recording determines."""
-        values, vectors = np.linalg.eigh(self.precision)
-        keeps = values > KNOWN * max(float(values[-1]), TINY)
-        return values[keeps], vectors[:, keeps]
+    def inverse(self) -> FloatArray:
+        """Inverse of the precision over the directions that this recording determines."""
+        return np.asarray(np.linalg.pinv(self.precision, rcond=KNOWN, hermitian=True))
+
+    @property
+    def rank(self) -> int:
+        """Number of these directions."""
+        return round(float(np.trace(self.inverse @ self.precision)))
 
     @property
     def peak(self) -> float:
-        """``slope·precision⁻¹·slope`` over the determined directions."""
-        values, vectors = self.known
-        return float(((vectors.T @ self.slope) ** 2 / values).sum())
+        """``slope·precision⁻¹·slope`` over these directions."""
+        return float(self.slope @ self.inverse @ self.slope)
 
 
 def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatArray, FloatArray]:
@@ -75,7 +77,7 @@ def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatAr
 def agreement(parts: Sequence[Information]) -> float:
     """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
     whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
-    dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
+    dof = sum(one.rank for one in parts) - whole.rank
     return chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0)) if dof > 0 else 1.0
 
 

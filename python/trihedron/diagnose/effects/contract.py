@@ -88,8 +88,6 @@ class Effect:
     confounded_with: ClassVar[tuple[str, ...]] = ()
     """Ids of parameters whose value depends on the reference point of the effect: the bias at the session's mean
     temperature is not the bias at 25 °C."""
-    drifts_as: ClassVar[str] = ""
-    """Id of the effect that replaces it where its channel is not logged: without a temperature it is a bias drift."""
     is_of_true_motion: ClassVar[bool] = False
     """Whether its columns are functions of the true motion, not of the reading: derivatives of the reading invert a
     low-pass."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -74,6 +74,18 @@ ORDINARY_DEG = 0.05
 """Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
 
 
+def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
+    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise, as
+    neighbouring rotations share a pose. Two standard errors cover as much as those of a normal distribution."""
+    share, n = weights / weights.sum(), len(values)
+    by_noise = float(np.sqrt(share**2 @ noise**2))
+    if n < 2:
+        return by_noise
+    variance = float(share @ (values - share @ values) ** 2) * n / (n - 1)
+    wider = float(stdtrit(n - 1, ndtr(2.0)) / 2.0)
+    return max(by_noise, wider * float(np.sqrt(variance * (share @ share))))
+
+
 class TableTilt(TableEffect):
     """Rotating on a tilted table turns the vertical about the table's normal; it returns only after a full turn."""
 
@@ -95,9 +107,7 @@ class TableTilt(TableEffect):
         chi2, weights = float(((change / sigmas) ** 2).sum()), gain**2 / (gain**2).sum()
         p, tilts = float(chdtrc(2 * len(found), chi2)), np.degrees(change / gain)
         tilt = float(weights @ tilts)
-        # The larger of the errors by noise and by scatter, in which neighbouring rotations share a pose.
-        noise = np.degrees(sigmas / gain)
-        error = float(np.sqrt((weights**2) @ np.maximum(noise**2, (tilts - tilt) ** 2)))
+        error = _error_of_mean(tilts, gain**2, np.degrees(sigmas / gain))
         if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * error:
             return None
         return Evidence(

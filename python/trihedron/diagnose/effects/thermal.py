@@ -44,13 +44,11 @@ class ThermalScale(Thermal):
 class AccelThermalScale(ThermalScale):
     id, sensor = "accel-thermal-scale", ACCELEROMETER
     confounded_with = ("accel-bias", "accel-scale")
-    drifts_as = "accel-bias-drift"
 
 
 class GyroThermalScale(ThermalScale):
     id, sensor = "gyro-thermal-scale", GYRO
     confounded_with = ("gyro-bias", "gyro-scale")
-    drifts_as = "gyro-bias-drift"
 
 
 class ThermalBias(Thermal):
@@ -99,10 +97,8 @@ def _varies(speed: FloatArray) -> bool:
 class AccelThermalBias(ThermalBias):
     id, sensor = "accel-thermal-bias", ACCELEROMETER
     confounded_with = ("accel-bias",)
-    drifts_as = "accel-bias-drift"
 
 
 class GyroThermalBias(ThermalBias):
     id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
-    drifts_as = "gyro-bias-drift"
