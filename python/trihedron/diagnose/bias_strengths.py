@@ -14,11 +14,9 @@ from trihedron.diagnose.candidates import NEAR, Tried, price_of_choice
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
-from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.model import STATIC_ACCEL
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
@@ -76,20 +74,6 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
                 likelier = max(both, key=lambda one: one.gain)
                 named.append(replace(likelier, gain=gain, score=gain, without=without))
     return sorted(named, key=lambda one: -one.gain), asked
-
-
-def that_poses_bear(model: Hypothesis) -> Hypothesis:
-    """The hypothesis, with biases of the accelerometer bounded to what the part's own noise explains where held-out
-    poses are predicted better so, by more than the standard error of their rms.
-
-    Biases that differ from pose to pose explain any error of rotations, more cheaply than a larger noise of these; but
-    then S and b are fitted to the rotations, at the cost of the poses.
-    """
-    bounded = again(model, model.terms, _bounded(model.obs, model.within, {(0, True), (0, False)}))
-    plain, free = (
-        physical_rms(one.fitted, one.prediction.innovation).get(STATIC_ACCEL, 0.0) for one in (bounded, model)
-    )
-    return bounded if free > plain * (1.0 + 1.0 / np.sqrt(2.0 * max(model.obs.n_poses, 1))) else model
 
 
 def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds:

@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
-from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds, that_poses_bear
+from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
@@ -152,11 +152,10 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     found = search(bare, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
-    related = that_poses_bear(found.related.model)
-    biases, asked = bias_strengths(related, alpha)
+    biases, asked = bias_strengths(found.related.model, alpha)
     notify(0.9, "checking the unexplained part")
     judged = again(found.model, found.model.terms, noise_bounds(found.model.obs, tuple(one.effect for one in biases)))
-    numbers = with_shapes(renewed(again(found.model, found.model.terms, related.within)))
+    numbers = with_shapes(renewed(found.model))
     answer = Answer(
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip

@@ -149,6 +149,8 @@ class _Search:
             model, without = self._pruned(swapped)
         model, without, beside = self._beside_relations(model, without)
         tried, missing = all_beside(model, self.effects)
+        # Results with noise strengths refitted replace those at the strengths of the answer.
+        tried += candidates_beside(model, self.effects, ())[0]
         held = {term.effect.id for term in model.terms}
         return Found(
             model, beside, {one.term.effect.id: one for one in tried},

@@ -129,7 +129,7 @@ class TurnAngleError(TableEffect):
 
     def find(self, context: Context) -> Evidence | None:
         turns = table_turns(context)
-        errors, sigmas = np.array([turn.error_rad for turn in turns]), _sigmas(context, turns)
+        errors, sigmas = _without_common_scale(context, turns)
         z = errors / sigmas
         chi2 = float((z**2).sum())
         p = float(chdtrc(len(z), chi2))
@@ -152,20 +152,31 @@ class TurnAngleError(TableEffect):
         )  # fmt: skip
 
 
-def _sigmas(context: Context, turns: list[TableTurn]) -> FloatArray:
-    """Standard errors of the angles [rad]: by noise, by the scale of the gyro, which the session determines, and by
-    rates inside one LSB that noise does not dither, which have one error throughout."""
-    obs, S = context.obs, context.fitted.state.gyro_S
-    quantum, scatter = obs.recording.facts.of("gyroscope").step, obs.segments.gyroscope_sigma
+def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[FloatArray, FloatArray]:
+    """Errors of the rotations without the part that one scale error per body axis explains, and their noise [rad].
+
+    A scale error grows with the angle and is the same for every rotation about an axis. The weighted median of error
+    over angle is robust against single wrong rotations.
+    """
+    noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
+    quantum, scatter = context.obs.recording.facts.of("gyroscope").step, context.obs.segments.gyroscope_sigma
     assert scatter is not None
-    steps = np.where(undithered_axes(quantum, scatter), quantum, 0.0) * np.linalg.norm(S, axis=0)
-    of_scale, density = context.fitted.covariance()[9:18, 9:18], context.noise_density[1].mean()
-    out = []
-    for turn in turns:
-        up = context.fitted.state.up[obs.move_poses[turn.move][0]]
-        slope = np.outer(up, np.linalg.solve(S, turn.angle_rad * up)).ravel()
-        time_s = context.time_s[context.moves[turn.move]]
-        lasts_s = float(time_s[-1] - time_s[0])
-        hidden = UNIFORM * (float(steps.max()) * lasts_s) ** 2
-        out.append(density**2 * lasts_s + hidden + slope @ of_scale @ slope + LEAST_RAD**2)
-    return np.sqrt(out)
+    steps = np.where(undithered_axes(quantum, scatter), quantum, 0.0) * np.linalg.norm(
+        context.fitted.state.gyro_S, axis=0
+    )
+    up, moves = context.fitted.state.up, [context.moves[turn.move] for turn in turns]
+    axes = np.abs([up[context.obs.move_poses[turn.move][0]] for turn in turns]).argmax(axis=1)
+    errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
+    lasts_s = np.array([context.time_s[where.stop - 1] - context.time_s[where.start] for where in moves])
+    # Inside one LSB that noise does not dither, the rate has one error throughout.
+    sigmas = np.sqrt(noise**2 * lasts_s + UNIFORM * (float(steps.max()) * lasts_s) ** 2 + LEAST_RAD**2)
+    for axis in range(3):
+        rows = axes == axis
+        if rows.sum() < 2:
+            continue
+        ratio, weight = errors[rows] / angles[rows], np.abs(angles[rows])
+        order = np.argsort(ratio)
+        heavy = np.cumsum(weight[order])
+        common = float(ratio[order][np.searchsorted(heavy, 0.5 * heavy[-1])])
+        errors[rows] -= common * angles[rows]
+    return errors, sigmas
