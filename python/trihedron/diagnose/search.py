@@ -147,7 +147,7 @@ class _Search:
         swapped, rivals, against = self._swapped(model, without)
         if swapped is not model:
             model, without = self._pruned(swapped)
-        model, without, beside = self._beside_relations(model, without)
+        beside = related(model, self.limit)
         tried, missing = all_beside(model, self.effects)
         # Results with noise strengths refitted replace those at the strengths of the answer.
         tried += candidates_beside(model, self.effects, ())[0]
@@ -196,23 +196,3 @@ class _Search:
             )
             against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
         return model, rivals, against
-
-    def _beside_relations(
-        self, model: Hypothesis, without: tuple[Hypothesis, ...]
-    ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
-        """Relations without a mechanism; an effect that does not score beside them is dropped where relations in its
-        place explain clearly more than it does."""
-        best = related(model, self.limit)
-        alone = best.score - sum(one.score for one in best.relations)
-        for k, fewer in enumerate(without if best.relations else ()):
-            terms = best.model.terms
-            least = again(best.model, [*terms[:k], *terms[k + 1 :]])
-            beside = 2.0 * (best.model.log_evidence - least.log_evidence) - terms[k].cost
-            if beside > self.limit and not best.has_own_likelihood:
-                continue
-            other = related(fewer, self.limit)
-            if other.names == best.names:
-                beside = best.score - other.score
-            if other.relations and other.score > alone + NEAR and beside <= self.limit:
-                return self._beside_relations(*self._pruned(fewer))
-        return model, without, best

@@ -213,12 +213,9 @@ def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: st
     return tuple(EffectParameter(name, float(v), float(s), unit) for name, v, s in named)
 
 
-def force_only(columns: FloatArray) -> Distortion:
-    return Distortion(columns, None)
-
-
-def rate_only(columns: FloatArray) -> Distortion:
-    return Distortion(None, columns)
+def acting_on(sensor: int, columns: FloatArray) -> Distortion:
+    """Columns (points, 3, k) that a sensor (0 accelerometer, 1 gyro) alone reads."""
+    return Distortion(None, columns) if sensor else Distortion(columns, None)
 
 
 def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
@@ -229,4 +226,4 @@ def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
         for one in values
     ]
     whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
-    return rate_only(whole) if sensor else force_only(whole)
+    return acting_on(sensor, whole)

@@ -9,7 +9,7 @@ from trihedron.diagnose.effects.contract import (
     DirectEffect,
     Evidence,
     Variant,
-    force_only,
+    acting_on,
     per_axis,
 )
 from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
@@ -150,7 +150,7 @@ class DisturbedPose(DirectEffect):
             (name,) = context.obs.pose_names([int(i)])
             # Numbered as in the recording, from 1: an earlier pose may have been cut at a disturbance.
             shape = {"pose": (float(name.removeprefix("pose ")) if name.startswith("pose ") else i + 1.0, "number")}
-            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
+            out.append(Variant(acting_on(0, columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
         return out
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:

@@ -8,7 +8,7 @@ from trihedron.diagnose.candidates import candidates_beside, with_best
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import Dependence, dependences
-from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
+from trihedron.diagnose.relations.telegraph import telegraphs
 from trihedron.records.domains import Domain
 
 MOST_RELATIONS = 3
@@ -32,35 +32,22 @@ class Follows:
 
 @dataclass(frozen=True, eq=False)
 class Related:
-    """The hypothesis with all its relations; ``score`` is twice the log-evidence of the whole, less the penalties of
-    its terms."""
+    """The hypothesis with all its relations."""
 
     model: Hypothesis
     relations: tuple[Follows, ...]
-    score: float
-
-    @property
-    def has_own_likelihood(self) -> bool:
-        """Whether a score is not that of the evidence."""
-        return any(one.effect.family == TELEGRAPH for one in self.relations)
-
-    @property
-    def names(self) -> set[str]:
-        return {one.effect.id for one in self.relations}
 
 
 def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
     found: list[Follows] = []
-    score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
     while len(found) < MOST_RELATIONS and model.context.moves:
         best = max(_leading(model, {one.effect.id for one in found}), key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
             break
         found.append(best)
         model = again(model, [*model.terms, best.term])
-        score += best.score
-    return Related(model, tuple(found), score)
+    return Related(model, tuple(found))
 
 
 def _leading(model: Hypothesis, known: set[str]) -> list[Follows]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, rate_only
+from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
 from trihedron.records.domains import Domain
 
 ALL_AXES = (0, 1, 2)
@@ -57,7 +57,7 @@ class Dependence(Effect):
             columns = np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1)
             names = tuple(f"{AXES[a]}: {name}" for a in axes for name in self.names)
             units, label = self.units * len(axes), "".join(AXES[a] for a in axes)
-            out.append(Variant((rate_only if self.sensor else force_only)(columns), names, units, label=label))
+            out.append(Variant(acting_on(self.sensor, columns), names, units, label=label))
         return out
 
 
