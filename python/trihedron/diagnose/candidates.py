@@ -111,8 +111,7 @@ def terms_of(model: Hypothesis, effect: Effect, price: float) -> list[Term]:
     context, places = model.context, {(t.effect.id, t.variant.label) for t in model.terms}
     variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
     cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
-    # A shape that represents a family, a filter of any order, needs odds of twenty to one beside plain ones.
-    return [Term(effect, v, effect.sizes(context, v), cost + NEAR * v.is_family) for v in variants]
+    return [Term(effect, v, effect.sizes(context, v), cost) for v in variants]
 
 
 def price_of_choice(model: Hypothesis, effects: Sequence[Effect]) -> float:

@@ -30,8 +30,6 @@ from trihedron.diagnose.relations.search import Related, related
 
 N_SENSORS = 2
 """Processes that may be replaced by effects: one of either sensor."""
-MOST_EFFECTS = 4
-"""Largest number of mechanisms in one session; disturbed poses do not count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +105,6 @@ class _Search:
 
     def _with_one_more(self, model: Hypothesis, exclude: Collection[str]) -> Hypothesis | None:
         """The hypothesis with the best effect that lowers a held-out rms, or none."""
-        if sum(not term.effect.is_local for term in model.terms) >= MOST_EFFECTS:
-            return None
         tried, _ = candidates_beside(model, self.effects, {*exclude, *self.dropped})
         standing = [one for one in tried if one.score > self.limit]
         while standing:
@@ -147,7 +143,7 @@ class _Search:
         swapped, rivals, against = self._swapped(model, without)
         if swapped is not model:
             model, without = self._pruned(swapped)
-        beside = related(model, self.limit)
+        model, without, beside = self._beside_relations(model, without)
         tried, missing = all_beside(model, self.effects)
         # Results with noise strengths refitted replace those at the strengths of the answer.
         tried += candidates_beside(model, self.effects, ())[0]
@@ -196,3 +192,13 @@ class _Search:
             )
             against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
         return model, rivals, against
+
+    def _beside_relations(
+        self, model: Hypothesis, without: tuple[Hypothesis, ...]
+    ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
+        """Relations without a mechanism; an effect stays where it scores beside those that are found without it."""
+        best = related(model, self.limit)
+        for fewer in without if best.relations else ():
+            if best.score - related(fewer, self.limit).score <= self.limit:
+                return self._beside_relations(*self._pruned(fewer))
+        return model, without, best

@@ -17,7 +17,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import DirectEffect, Effect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
-from trihedron.diagnose.search import MOST_EFFECTS, threshold
+from trihedron.diagnose.search import threshold
 from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
@@ -146,7 +146,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
     names: set[str] = set()
     while True:
         tried = _tried(held.models, names)
-        if not tried or tried[0].score <= limit or held.n_added >= MOST_EFFECTS:
+        if not tried or tried[0].score <= limit:
             return held, tried
         best = tried[0]
         names.add(best.effect.id)

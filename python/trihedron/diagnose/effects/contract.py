@@ -49,8 +49,7 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape parameters it was computed with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; the score corrects for their number.
-    ``scale`` converts a linear parameter to the reported unit. ``is_family`` marks a shape that represents a family (a
-    filter of any order and damping): a plain mechanism that explains as much is preferred.
+    ``scale`` converts a linear parameter to the reported unit.
     """
 
     distortion: Distortion
@@ -60,7 +59,6 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
-    is_family: bool = False
 
 
 class Effect:

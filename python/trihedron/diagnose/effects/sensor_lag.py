@@ -77,7 +77,7 @@ def _second_order(context: Context, sensor: int, time_s: float, label: str) -> V
     twice = context.shifted(values, step) - 2.0 * values + context.shifted(values, -step)
     column = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
     distortion = acting_on(sensor, column[:, :, None])
-    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s, is_family=True)
+    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s)
 
 
 class AccelGyroTimeOffset(Effect):

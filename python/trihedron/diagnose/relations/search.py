@@ -32,22 +32,26 @@ class Follows:
 
 @dataclass(frozen=True, eq=False)
 class Related:
-    """The hypothesis with all its relations."""
+    """The hypothesis with all its relations; ``score`` is twice the log-evidence of the whole, less the penalties of
+    its terms."""
 
     model: Hypothesis
     relations: tuple[Follows, ...]
+    score: float
 
 
 def related(model: Hypothesis, limit: float) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
     found: list[Follows] = []
+    score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
     while len(found) < MOST_RELATIONS and model.context.moves:
         best = max(_leading(model, {one.effect.id for one in found}), key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
             break
         found.append(best)
         model = again(model, [*model.terms, best.term])
-    return Related(model, tuple(found))
+        score += best.score
+    return Related(model, tuple(found), score)
 
 
 def _leading(model: Hypothesis, known: set[str]) -> list[Follows]:
