@@ -96,6 +96,11 @@ class StaticPieces:
     segments: Segments
     orientation: IntArray
 
+    def about_orientations(self, values: FloatArray) -> FloatArray:
+        """Values (n, ...) minus their mean in every orientation."""
+        level = np.array([values[self.orientation == k].mean(axis=0) for k in range(self.orientation.max() + 1)])
+        return np.asarray(values - level[self.orientation])
+
 
 @dataclass(frozen=True, eq=False)
 class _Side:
@@ -113,7 +118,7 @@ def _judged(
 ) -> _Side:
     plain = _session(obs, pieces, model, gravity_m_s2, sensor)
     kinds = [by_id()[f"{SENSORS[sensor].prefix}-{name}"] for name in ("thermal-bias", "bias-drift")]
-    found = search(plain, alpha, kinds if sensor == GYRO else [_as_rate(one) for one in kinds])
+    found = search(plain, alpha, [_aside(one, sensor, pieces) for one in kinds])
     known, terms = found.model, found.model.terms
     # What a curve of temperature or time leaves changes slowly too: no further cause is named for it.
     processes = [] if terms else bias_strengths(known, alpha)[0]
@@ -133,26 +138,36 @@ def _judged(
         rivals = ("accel-thermal-scale",) if term.effect.id == "accel-thermal-bias" else ()
         p_value, held = wald_p(value, covariance), held_out_records(found.without[k], known)
         effect, statement = by_id()[term.effect.id], term.effect.statement(parameters)
+        series: dict[str, Any] = {}
         if isinstance(effect, BiasDrift):
             along = np.asarray(term.distortion.rate)[: obs.n_poses]
             sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
             span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
             parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
-        made.append(effect_record(effect, parameters, statement, p_value, found.scores[k], held, rivals, curves))
+            series = _series(obs, along @ value, sigma, unit)
+        said = parameters, statement, p_value, found.scores[k]
+        made.append(effect_record(effect, *said, held, rivals, curves, **series))
         candidates.append(Candidate(effect.id, p_value, True, "", found.scores[k], parameters))
     for one in walks:
         drift = kinds[1]
         assert isinstance(drift, BiasDrift)
         parameters, statement = drift.of_strength(one.size, one.std)
         curves = bias_curves(known.context, GYRO, known.fitted.bias(GYRO), one.std, [shown])
-        held = held_out_records(one.without, known)
-        made.append(effect_record(drift, parameters, statement, one.p_value, one.score, held, (), curves))
+        said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
+        series = _series(obs, known.fitted.bias(GYRO), one.std, unit)
+        made.append(effect_record(drift, *said, held, (), curves, **series))
     named = [
         _of_sensor(one, sensor, unit, explained * gain / max(sum(gains), TINY))
         for one, gain in zip(made, gains, strict=True)
     ]
     tests = [_domain(sensor, x, shown, unit, is_named=bool(named)) for x in (shown.before, shown.after)]
     return _Side(plain, tuple(named), tuple(candidates), *tests)
+
+
+def _series(obs: Observations, path: FloatArray, sigma: FloatArray, unit: str) -> dict[str, Any]:
+    """The curve of a drifting bias, ``path`` (pieces, 3) with standard uncertainties (3,), as the result states it."""
+    times, errors = obs.pose_time_s.tolist(), [[float(s)] * len(path) for s in sigma]
+    return {"curve": {"time_s": times, "value": path.T.tolist(), "sigma": errors, "unit": unit}}
 
 
 def _session(
@@ -164,9 +179,8 @@ def _session(
     raw, means = ((obs.raw_force, obs.pose_force), (obs.raw_rate, obs.pose_rate))[sensor]
     density, sigma = ((obs.force_density, obs.pose_force_sigma), (obs.rate_density, obs.pose_rate_sigma))[sensor]
     assert means is not None
-    level = np.array([means[pieces.orientation == k].mean(axis=0) for k in range(pieces.orientation.max() + 1)])
     aside = replace(
-        obs, raw_rate=raw, pose_rate=means - level[pieces.orientation], pose_rate_sigma=sigma, rate_density=density,
+        obs, raw_rate=raw, pose_rate=pieces.about_orientations(means), pose_rate_sigma=sigma, rate_density=density,
         pose_force=np.tile([0.0, 0.0, gravity_m_s2 / of_gravity[2, 2]], (obs.n_poses, 1)), force_up=None,
     )  # fmt: skip
     mean = np.concatenate([of_gravity[LOWER], np.zeros(3), of_sensor.ravel()])
@@ -174,19 +188,25 @@ def _session(
     return hypothesis(aside, aside.at_means(gravity_m_s2, of_gravity, np.zeros(3), of_sensor), prior)
 
 
-def _as_rate(effect: Effect) -> Effect:
-    """An effect of the accelerometer whose columns are those of the sensor in the gyro's place."""
+def _aside(effect: Effect, sensor: int, pieces: StaticPieces) -> Effect:
+    """An effect whose columns, about their mean in every orientation, are those of the sensor in the gyro's place."""
     kind: Any = type(effect)
 
     def turned(variant: Variant | None) -> Variant | None:
         if variant is None:
             return None
-        return replace(variant, distortion=Distortion(variant.distortion.rate, variant.distortion.force))
+        columns = variant.distortion.rate if sensor == GYRO else variant.distortion.force
+        assert columns is not None
+        return replace(variant, distortion=Distortion(None, pieces.about_orientations(columns)))
+
+    def is_plausible(self: Effect, variant: Variant, *fitted: FloatArray) -> bool:
+        own = variant.distortion if sensor == GYRO else Distortion(variant.distortion.rate, None)
+        return bool(kind.is_plausible(self, replace(variant, distortion=own), *fitted))
 
     own = {
         "variants": lambda self, context: [turned(one) for one in kind.variants(self, context)],
         "reshaped": lambda self, context, variant, value: turned(kind.reshaped(self, context, variant, value)),
-        "is_plausible": lambda self, variant, *fitted: kind.is_plausible(self, turned(variant), *fitted),
+        "is_plausible": is_plausible,
     }
     out: Effect = type(kind.__name__, (kind,), own)()
     return out
