@@ -33,7 +33,7 @@ from trihedron.estimate.filter_noise.beside_reference import (
     independent_or_not,
     informed,
 )
-from trihedron.estimate.filter_noise.strengths import MEDIAN, NU, bounded, fit, whole
+from trihedron.estimate.filter_noise.strengths import bounded, fit, whole
 from trihedron.estimate.filter_noise.stretches import angle_stretches
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
@@ -121,8 +121,8 @@ def from_prior(given):
     for _ in range(given.runs):
         x = np.full(len(free), np.inf)
         while np.any((x < lowest) | (x > highest)):
-            student = np.log(np.abs(rng.standard_t(NU, len(free)))) - MEDIAN
-            x = prior.mean + np.where(prior.may_be_nothing, student, prior.sigma * rng.normal(size=len(free)))
+            cauchy = np.log(np.abs(rng.standard_cauchy(len(free))))
+            x = prior.mean + np.where(prior.may_be_nothing, cauchy, prior.sigma * rng.normal(size=len(free)))
         true = whole(prior, x[free])
         L, _ = stretch.factor(true)
         seen = stretch.columns @ stretch.centre + L @ rng.normal(size=len(L))
@@ -164,8 +164,8 @@ def backwards(path, motion, asked):
         fitted, _ = independent_or_not(taught_by, informed(ANGLE, stretches, ADIS16448), ANGLE)
         # Separate parts: a filter that begins there has no estimate from the other half.
         parts = test if test is held else [(one, 0) for one in test]
-        every = [consistency(parts, fitted, ADIS16448, h) for h in asked.horizons_s]
-        shown = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f}" for c in every if c is not None)
+        every = consistency(parts, fitted, ADIS16448, asked.horizons_s)
+        shown = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f}" for c in every)
         print(f"{path.name.split('.')[0]} {named}: NEES {shown}", flush=True)
 
 

@@ -19,5 +19,3 @@ mod stillness;
 
 #[path = "kernels/allan.rs"]
 mod allan;
-#[path = "kernels/simulate.rs"]
-mod simulate;

@@ -102,16 +102,6 @@ def test_limits_are_told_from_peaks_and_carried_by_the_recording(seed, scale):
     assert Recording(time_s, None, cut(seed, scale=scale), 100.0).facts.of("gyroscope").limits == ()
 
 
-def test_a_log_at_rest_on_its_limit_and_one_that_is_merely_coarse_are_told_apart():
-    rng = np.random.default_rng(8)
-    resting = np.round(rng.normal([0.0, 0.0, 8192.0], 8.0, (6000, 3)))
-    held = np.minimum(resting, 8190.0)
-    limits = Recording(np.arange(6000) / 100.0, held, None, 100.0).facts.of("accelerometer").limits
-    assert [(one.axis, one.value, one.is_high) for one in limits] == [(2, 8190.0, True)]
-    coarse = np.round(resting / 64.0)
-    assert Recording(np.arange(6000) / 100.0, coarse, None, 100.0).facts.of("accelerometer").limits == ()
-
-
 def test_equal_extremes_of_readings_on_no_grid_are_limits():
     rng = np.random.default_rng(3)
     poses = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0.6, 0.5], [0.3, -0.8, 0.5]]) * 9.81

@@ -1,7 +1,6 @@
 """The command line end to end: results, exit status, errors."""
 
 import json
-import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,7 +12,6 @@ import pytest
 from small_session import G, log_text, made_once, rejected, rows_of, simulated, usual
 from trihedron import read, segment
 from trihedron.cli import main
-from trihedron.records import Recording
 from trihedron.simulate import Motion, MoveTo, Pose, hand_session
 
 
@@ -113,12 +111,6 @@ def test_a_reader_that_leaves_early_is_no_error(session):
     assert "Exception" not in done.stderr
 
 
-def test_a_pipe_without_a_writer_is_no_saved_result_and_not_waited_for(tmp_path, capsys):
-    os.mkfifo(tmp_path / "fifo")
-    assert main(["report", str(tmp_path / "fifo")]) == 1
-    assert "no plain file" in capsys.readouterr().err
-
-
 def test_poses_that_do_not_determine_the_answer_end_with_status_two_and_poses_to_add(tmp_path, capsys):
     steps = [Pose(5.0)]
     for angle in 2.0 * np.pi * np.arange(1, 14) / 14:
@@ -184,19 +176,3 @@ def test_gravity_said_twice_or_by_height_alone_is_refused(session, capsys):
     # The log is in counts, in which no gravity is implausible by its readings.
     for another_unit in ("980", "98", "1"):
         assert "m/s²" in rejected(capsys, "calibrate", log, "--gravity", another_unit)
-
-
-def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tmp_path, capsys):
-    two = tmp_path / "two.csv"
-    two.write_text(log_text(rows_of(simulated(Motion((Pose(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Pose(5.0)))))))
-    said = rejected(capsys, "calibrate", two)
-    assert "two.csv" in said
-    assert "poses" in said
-    time_s = np.arange(1500) / 100.0
-    swing = 9.8 * np.sin(np.outer(time_s, [2.1, 3.3, 4.7])) + np.random.default_rng(1).normal(size=(1500, 3))
-    moving = Recording(time_s, swing, 2.0 * np.cos(np.outer(time_s, [2.1, 3.3, 4.7])), 100.0)
-    shaken = tmp_path / "shaken.csv"
-    shaken.write_text(log_text(rows_of(moving)))
-    assert "still" in rejected(capsys, "calibrate", shaken)
-    assert main(["check", str(shaken)]) == 2
-    assert "NOT FIT" in capsys.readouterr().out

@@ -52,6 +52,15 @@ def test_a_bias_that_switches_follows_a_random_telegraph_signal_and_any_other_di
     assert next(one for one in found.domains if one.domain == "static-gyro").disagrees
 
 
+@pytest.mark.parametrize(("sensor", "variable"), [("accelerometer", "u_x over time"), ("gyroscope", "w_x over time")])
+def test_a_scale_that_drifts_is_found_beside_time(sensor, variable):
+    recording, truth = simulated(seed=4)
+    readings = getattr(recording, sensor) * (1.0 + np.linspace(0.0, 0.002, recording.n_samples)[:, None] * [1, 0, 0])
+    found = trihedron.diagnose(replace(recording, **{sensor: readings}), gravity_m_s2=truth.gravity_m_s2)
+    assert found.verdict == "unexplained"
+    assert [one.depends_on for one in found.relations] == [(variable,)]
+
+
 def test_the_error_of_a_mean_of_few_turns_covers_it():
     rng = np.random.default_rng(6)
     inside = 0

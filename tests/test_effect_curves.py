@@ -18,7 +18,6 @@ from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
 from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.records.diagnosis import EffectParameter
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
 from trihedron.report.findings.page import effects_page
@@ -147,26 +146,6 @@ def test_every_reason_is_given_somewhere_and_with_its_places():
                 given[name] = {keyword.arg for keyword in node.keywords}
                 assert places(REASONS[name]) == given[name], f"{path.name}: {name}"
     assert set(given) == set(REASONS)
-
-
-class Own(Effect):
-    """As a user's file adds one, but without an id of its own: it stays out of the catalogue."""
-
-    mechanism = "the readings follow the moon"
-    experiment = "wait a fortnight"
-
-    def variants(self, context):  # noqa: ARG002
-        return []
-
-
-def test_an_effect_of_a_users_own_file_brings_its_own_words():
-    own = Own()
-    own.id = "moon"
-    strongest = (EffectParameter("m_x", 1.0, 0.5, "1"), EffectParameter("m_y", 2.0, 0.1, "m/s^2"))
-    assert own.statement(strongest) == "the readings follow the moon (strongest term m_y: 2 ± 0.1 m/s²)."
-    assert own.separating_experiment() == "wait a fortnight"
-    with pytest.raises(KeyError):
-        own.reported("no such case")
 
 
 def session(seed, n_poses=30):

@@ -19,7 +19,7 @@ from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
 from trihedron.estimate.filter_noise.left_over import of_temperature
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, fit, height, most_likely
-from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, NAMES, Stretch, accumulated, errors_over, walked
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, errors_over, parts_of_walk, walked
 from trihedron.estimate.filter_noise.stretches import bias_steps, velocity_stretches
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import FindingCode, Recording, Severity
@@ -37,10 +37,11 @@ def still(m=60):
     """A stretch of a body that does not turn: means over blocks of a second, nothing constant but the start."""
     time, eye = np.arange(m) + 0.5, np.eye(3)
     steps = bias_steps(time[:, None, None] * eye)
-    noise = accumulated(np.ones(m), BLOCK_ENDS)
+    walk = parts_of_walk(m, is_triangle=False)
+    noise = accumulated(walk, np.ones(m))
     return Stretch(
         time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m),
+        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m), walk,
     )  # fmt: skip
 
 
@@ -52,11 +53,11 @@ def drawn(seed, m=60):
 
 
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
-    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], 5.0).nees.mean() for seed in range(20)]
+    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], [5.0])[0].nees.mean() for seed in range(20)]
     # 20 runs of about five stretches apart: 3 with a standard error of sqrt(6/100) = 0.25.
     assert np.mean(nees) == pytest.approx(3.0, abs=0.8)
     plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0, 0.0])
-    assert errors_over([(drawn(0), 30)], plain[None], 5.0).nees.mean() > 6.0
+    assert errors_over([(drawn(0), 30)], plain[None], [5.0])[0].nees.mean() > 6.0
 
 
 def test_strengths_lie_within_their_intervals():

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.report.findings import verdict_of
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
 from trihedron.report.findings.wording import filled
@@ -129,12 +128,3 @@ def test_the_documents_list_the_catalogue_as_it_is():
 )
 def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_branch(place, value, said):
     assert filled(place, {"x": value}, {}) == said
-
-
-def test_a_verdict_names_the_poses_and_moves_that_stand_out():
-    seen = ["Pose 10 differs by 1 mm/s².", "Move 5 (pose 5 to pose 6) is excluded. Move 8 is excluded."]
-    codes = (FindingCode.OUTLIER_POSE, FindingCode.OUTLIER_MOVE)
-    found = [Finding(code, Severity.WARNING, one) for code, one in zip(codes, seen, strict=True)]
-    said = verdict_of(found, "", "Usable", "")
-    assert "outlier pose 10" in said
-    assert "outlier moves 5, 8" in said

@@ -162,6 +162,10 @@ def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
     assert "The 4 logs of logs are of SEVERAL devices." in str(result)
     assert not fleet_report(result.summary).is_trustworthy
     assert summarise(rows[4:], tmp_path).summary.mixed == ()
+    # One factor for all axes is another unit of measurement or clock, in a fleet as for many recordings.
+    common = one + np.repeat([0.0, 0.05, 0.0], [12, 3, 6])
+    rows = [row("logs", str(k), (one, common)[k % 2] + repeats[k], sigma) for k in range(4)]
+    assert summarise(rows, tmp_path).summary.mixed == ()
 
 
 def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):

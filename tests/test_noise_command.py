@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from noise_series import series
+from noise_coverage import in_time
 from trihedron.api.identifying import allan as noise_of
 from trihedron.cli import main
 from trihedron.records import Calibration, Recording, SensorCalibration
@@ -27,8 +27,8 @@ def log(tmp_path_factory):
     """An hour of six axes at 50 Hz, with header."""
     rng = np.random.default_rng(31)
     n = 180_000
-    gyro = [series(rng, n, RATE, N=2e-4, K=3e-6) for _ in range(3)]
-    accel = [series(rng, n, RATE, N=2e-3, K=3e-5) + (9.81 if axis == 2 else 0.0) for axis in range(3)]
+    gyro = [in_time(rng, n, RATE, N=2e-4, K=3e-6) for _ in range(3)]
+    accel = [in_time(rng, n, RATE, N=2e-3, K=3e-5) + (9.81 if axis == 2 else 0.0) for axis in range(3)]
     path = tmp_path_factory.mktemp("noise") / "log.npz"
     names = ("gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2")
     np.savez(path, t_s=np.arange(n) / RATE, **dict(zip(names, (*gyro, *accel), strict=True)))
@@ -100,7 +100,7 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
         assert axes[0]["terms"]["N"]["value"] == pytest.approx(np.radians(0.05) * 2.0, rel=0.02)
         assert axes[5]["terms"]["N"]["value"] == pytest.approx(3.33e-3 * 9.80665 * 2.0, rel=0.02)
     assert main(["allan", str(path), *said[:4]]) == 0
-    assert "--gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB" in " ".join(capsys.readouterr().out.split())
+    assert "--gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB" in " ".join(capsys.readouterr().out.replace("\\\n", "").split())
     assert main(["allan", str(path), *said[:-1], "3.33"]) == 1
     assert "number and a unit" in capsys.readouterr().err
     # Readings in SI were multiplied, and N was a thousandth.
@@ -116,7 +116,7 @@ def test_lost_rows_become_missing_readings_not_shorter_time():
     n = 60_000
     kept = np.ones(n, dtype=bool)
     kept[20_000:26_000] = False
-    gyro = np.column_stack([series(rng, n, RATE, N=1e-3, K=1e-4) for _ in range(3)])
+    gyro = np.column_stack([in_time(rng, n, RATE, N=1e-3, K=1e-4) for _ in range(3)])
     recording = Recording(np.arange(n)[kept] / RATE, None, gyro[kept], RATE, gyroscope_unit=RateUnit.DEG_S)
     found = noise_of(recording)
     assert found.curve.n_samples == n

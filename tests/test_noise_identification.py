@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from noise_coverage import in_time
-from noise_series import series
 from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
@@ -37,7 +37,7 @@ def codes(noise):
 def test_the_published_setting_is_recovered_near_its_bound_and_absent_terms_have_limits_and_no_value(rate_hz):
     # Four axes of the published setting: 400 Hz, or an eighth of it, 11 000 s.
     rng, n = np.random.default_rng(21), int(11_000 * rate_hz)
-    axes = [identify_noise(series(rng, n, rate_hz, N=2.502e-3, K=6.972e-5), rate_hz).axes[0] for _ in range(4)]
+    axes = [identify_noise(in_time(rng, n, rate_hz, N=2.502e-3, K=6.972e-5), rate_hz).axes[0] for _ in range(4)]
     N = np.array([axis.value("N") for axis in axes]) / 2.502e-3
     K = np.array([axis.value("K") for axis in axes]) / 6.972e-5
     # Bounds for an axis: 0.14 % of N at 50 Hz, 8.1 % of K; four standard errors of the mean and deviation of four.
@@ -53,7 +53,7 @@ def test_the_terms_present_are_found(truth):
     rng = np.random.default_rng(23)
     size = {"Q": 3e-4, "N": 1e-2, "B": 4e-3, "K": 1.2e-3, "R": 6e-4}
     found = [
-        present(identify_noise(series(rng, 1 << 16, RATE, **{s: size[s] for s in truth}), RATE).axes[0])
+        present(identify_noise(in_time(rng, 1 << 16, RATE, **{s: size[s] for s in truth}), RATE).axes[0])
         for _ in range(6)
     ]
     # At 95 % each, four of six or more has a probability of 0.998.
@@ -64,13 +64,8 @@ def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
     rng = np.random.default_rng(25)
     n, tau, sigma = 1 << 17, 10.0, 5e-3
     decay = np.exp(-1.0 / (RATE * tau))
-    drive = sigma * np.sqrt(1 - decay**2) * rng.normal(size=n)
-    process = np.empty(n)
-    value = sigma * rng.normal()
-    for i in range(n):
-        value = decay * value + drive[i]
-        process[i] = value
-    axis = identify_noise(series(rng, n, RATE, N=2e-3) + process, RATE).axes[0]
+    process = lfilter([sigma * np.sqrt(1 - decay**2)], [1.0, -decay], rng.normal(size=n))
+    axis = identify_noise(in_time(rng, n, RATE, N=2e-3) + process, RATE).axes[0]
     assert present(axis) == {"N", "G"}
     assert 4.0 < axis.gauss_markov.correlation_time_s < 25.0
     assert axis.gauss_markov.sigma_process == pytest.approx(sigma, rel=0.25)
@@ -78,7 +73,7 @@ def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
 
 @pytest.fixture(scope="module")
 def quiet():
-    return series(np.random.default_rng(26), 300_000, RATE, N=1e-3, K=3e-5)
+    return in_time(np.random.default_rng(26), 300_000, RATE, N=1e-3, K=3e-5)
 
 
 def test_a_step_is_found_and_does_not_become_a_random_walk(quiet):
@@ -121,7 +116,7 @@ def test_a_log_that_moves_is_not_to_be_trusted(white, tilt, is_moving):
 
 def of_imu(rng, n, walk=1e-4, up=(0.0, 0.0, 9.81)):
     """An accelerometer at rest and its names for identify_noise."""
-    x = np.column_stack([series(rng, n, 10.0, N=1e-3, K=walk) for _ in range(3)]) + up
+    x = np.column_stack([in_time(rng, n, 10.0, N=1e-3, K=walk) for _ in range(3)]) + up
     return x, {"names": ["accel x", "accel y", "accel z"], "units": ["m/s^2"] * 3}
 
 
@@ -226,7 +221,7 @@ def test_scattered_loss_leaves_the_terms_where_they_are(truth):
     rng = np.random.default_rng(65)
     inside = 0
     for _ in range(6):
-        x = series(rng, 60_000, 100.0, **truth)
+        x = in_time(rng, 60_000, 100.0, **truth)
         x[rng.random(len(x)) < 0.3] = np.nan
         noise = identify_noise(x, 100.0)
         assert noise.breaks_s == ()
@@ -240,10 +235,13 @@ def test_scattered_loss_leaves_the_terms_where_they_are(truth):
 def test_the_covariance_of_the_points_is_that_of_simulated_curves(terms):
     rng = np.random.default_rng(51)
     runs = 500
-    curves = [
-        allan_deviation(series(rng, N_READINGS, CURVE_RATE, **terms), CURVE_RATE, CLUSTERS).variance
-        for _ in range(runs)
-    ]
+    others = {s: size for s, size in terms.items() if s != "Q"}
+    curves = []
+    for _ in range(runs):
+        # Quantisation noise as the equation has it: angles rounded in a rate that hardly changes have another.
+        white_angle = terms.get("Q", 0.0) * CURVE_RATE * np.diff(rng.normal(size=N_READINGS + 1))
+        x = white_angle + in_time(rng, N_READINGS, CURVE_RATE, **others)
+        curves.append(allan_deviation(x, CURVE_RATE, CLUSTERS).variance)
     found = np.cov(np.transpose(curves))
     squares = np.array([terms.get(s, 0.0) ** 2 for s in "QNBKR"])
     expected = tabulated(tuple(CLUSTERS.tolist()), N_READINGS, CURVE_RATE).at(squares)
@@ -262,7 +260,7 @@ def test_the_terms_of_a_curve_are_found_and_their_intervals_hold(truth):
     clusters = 2 ** np.arange(15)
     right = inside = 0
     for _ in range(3):
-        curve = allan_deviation(series(rng, 1 << 16, 100.0, **truth), 100.0, clusters)
+        curve = allan_deviation(in_time(rng, 1 << 16, 100.0, **truth), 100.0, clusters)
         axis = identify_curve(curve.tau_s, curve.deviation, 100.0, 1 << 16).axes[0]
         right += {t.value for t in TermName if axis.terms[t].is_present} == set(truth)
         inside += sum(axis.terms[TermName(s)].lower <= v <= axis.terms[TermName(s)].upper for s, v in truth.items())
@@ -273,7 +271,7 @@ def test_the_terms_of_a_curve_are_found_and_their_intervals_hold(truth):
 
 def test_a_filtered_curve_is_quoted_from_above_the_filter():
     rng = np.random.default_rng(53)
-    x = series(rng, 1 << 17, 100.0, N=1e-2, K=1e-3)
+    x = in_time(rng, 1 << 17, 100.0, N=1e-2, K=1e-3)
     x = np.convolve(x, np.full(8, 1 / 8), mode="valid")
     curve = allan_deviation(x, 100.0, 2 ** np.arange(16))
     axis = identify_curve(curve.tau_s, curve.deviation, 100.0, len(x)).axes[0]
@@ -292,7 +290,7 @@ def switched(rng, n, held):
 def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_is_taken_for_them(kind):
     rng, n = np.random.default_rng(7), 65_536
     noise = {"walk": {"K": 0.02}, "flicker": {"B": 0.1}}.get(kind, {})
-    x = series(rng, n, RATE, N=0.1, **noise)
+    x = in_time(rng, n, RATE, N=0.1, **noise)
     if kind == "wave":
         x += 0.2 * np.sin(2.0 * np.pi * 3.2 * np.arange(n) / n)
     if kind == "levels":

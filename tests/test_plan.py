@@ -1,6 +1,5 @@
 """The uncertainties of an experiment before it is made: the manual's problems 3, 4 and 8."""
 
-import json
 import math
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 import trihedron
 from trihedron.api.planning import POSE_SETS
-from trihedron.cli import main
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
 from trihedron.estimate.gyroscope.turns import calibrate_turns
@@ -87,18 +85,3 @@ def test_turns_that_determine_nothing_are_refused_in_words():
         design_turns([0.0], 1.0, 1.0, N)
     with pytest.raises(ValueError, match="must be positive"):
         design_turns([90.0], 1.0, 0.0, N)
-
-
-def test_the_command_says_what_turns_poses_and_moves_are_worth(capsys):
-    assert main(["plan", "--turns", "1440,-1440", "--turn-time", "12", "--json"]) == 0
-    planned = json.loads(capsys.readouterr().out)
-    assert planned["turns"]["n_turns"] == 2
-    assert [pose["rank"] for pose in planned["poses"]][:2] == [6, 9]
-    assert planned["poses"][0]["scale"] is None
-    # Eight half turns: sixteen times the angle of a quarter turn, at √6 times the noise of 2 s.
-    assert main(["plan", "--json"]) == 0
-    quarter = json.loads(capsys.readouterr().out)
-    assert planned["turns"]["scale"] == pytest.approx(quarter["turns"]["scale"] * math.sqrt(6.0) / 16.0, rel=1e-9)
-    assert main(["plan"]) == 0
-    assert "three quarter turns about level axes" in capsys.readouterr().out
-    assert main(["plan", "--turn-time", "-1"]) == 1

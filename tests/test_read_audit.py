@@ -254,6 +254,13 @@ def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     assert list(scale_findings(S, RateUnit.COUNTS)) == []
 
 
+def test_three_gyro_scales_off_by_one_factor_are_a_matter_of_the_timestamps():
+    for factor, scatter, n in ((1.1, (0.5, -0.5, 0.2), 1), (1.1, (9.0, -5.0, 1.0), 0), (1.02, (0.1, -0.1, 0.0), 0)):
+        S = np.diag(factor * (1.0 + 0.01 * np.array(scatter)))
+        found = list(scale_findings(S, RateUnit.RAD_S))
+        assert [one.severity for one in found] == [Severity.WARNING] * n
+
+
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):

@@ -1,12 +1,10 @@
 """What cannot be read is one sentence with file, line and remedy, whatever bytes arrive; what was written is read."""
 
 import gzip
-import io
 import os
 import re
 
 import numpy as np
-import polars as pl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -184,58 +182,9 @@ def test_any_table_of_log_words_under_a_header_is_a_recording_or_a_sentence(tmp_
 
 
 @FEW
-@given(
-    st.lists(st.tuples(*[FINITE] * 6), min_size=3, max_size=30),
-    st.sampled_from(["csv", "tsv", "blanks", "semicolon", "comma-decimals", "gzip", "npz", "npy", "parquet"]),
-)
-def test_what_was_written_is_what_is_read(tmp_path, rows, kind):
-    table = np.array(rows)
-    if np.any(np.all(table == table[0], axis=0)):
-        return  # A constant channel is rejected, and tested to be.
-    names = ["ax", "ay", "az", "gx", "gy", "gz"]
-    buffer = io.BytesIO()
-    if kind == "npz":
-        np.savez(buffer, acc=table[:, :3], gyr=table[:, 3:])
-    elif kind == "npy":
-        fields = np.empty(len(table), dtype=[(name, float) for name in names])
-        for name, column in zip(names, table.T, strict=True):
-            fields[name] = column
-        np.save(buffer, fields)
-    elif kind == "parquet":
-        pl.DataFrame(table, schema=names).write_parquet(buffer)
-    else:
-        separator = {"tsv": "\t", "blanks": "   ", "semicolon": ";", "comma-decimals": ";"}.get(kind, ",")
-        cell = (lambda v: repr(v).replace(".", ",")) if kind == "comma-decimals" else repr
-        lines = [separator.join(names), *(separator.join(cell(float(v)) for v in row) for row in table)]
-        content = ("\n".join(lines) + "\n").encode()
-        buffer.write(gzip.compress(content) if kind == "gzip" else content)
-    recording = read_bytes(tmp_path, buffer.getvalue(), rate_hz=100.0)
-    assert recording is not None
-    np.testing.assert_array_equal(recording.accelerometer, table[:, :3])
-    np.testing.assert_array_equal(recording.gyroscope, table[:, 3:])
-
-
-@FEW
 @given(st.text(alphabet="tagxyz=,0123456789- nope", max_size=30))
 def test_any_mapping_is_a_recording_or_a_sentence(tmp_path, mapping):
     rng = np.random.default_rng(1)
     rows = np.column_stack([np.arange(9) / 100, rng.standard_normal((9, 6))])
     text = "\n".join(",".join(map(str, map(float, row))) for row in rows) + "\n"
     read_bytes(tmp_path, text.encode(), columns=mapping)
-
-
-@pytest.mark.parametrize("seed", range(18))
-def test_any_clock_is_a_recording_or_a_sentence(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    n = 60
-    clocks = [
-        rng.standard_normal(n),
-        np.sort(rng.integers(0, 10, n)).astype(float),
-        rng.integers(0, 2**16, n).astype(float),
-        np.where(rng.random(n) < 0.3, np.nan, np.arange(n)),
-        np.full(n, 1e300) * rng.random(n),
-        np.cumsum(rng.exponential(1.0, n)) * 10.0 ** rng.integers(-12, 12),
-    ]
-    table = np.column_stack([clocks[seed % len(clocks)], rng.standard_normal((n, 6))])
-    text = "t,ax,ay,az,gx,gy,gz\n" + "\n".join(",".join(map(str, map(float, row))) for row in table)
-    read_bytes(tmp_path, text.encode())

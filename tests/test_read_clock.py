@@ -225,12 +225,6 @@ def test_whole_seconds_that_a_hundred_rows_share_are_seconds_beyond_doubt(tmp_pa
     assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
 
 
-@pytest.mark.parametrize("rate_hz", [0.1, 1.0])
-def test_a_named_unit_holds_at_any_rate(tmp_path, rate_hz):
-    recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, 1.0), HEADER.replace("t,", "t_s,")))
-    assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)
-
-
 def test_a_cycle_of_temperature_tells_microseconds_from_nanoseconds(tmp_path):
     n = 8000
     table = np.column_stack([log(2.0, 1e-6, n), 25 + 45 * np.sin(2 * np.pi * np.arange(n) / n)])

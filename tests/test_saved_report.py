@@ -33,7 +33,6 @@ from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.page import to_html
 from trihedron.report.saved import report_of, with_report
 from trihedron.report.text import Style, to_text
-from trihedron.report.verification import verification_report
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
@@ -106,14 +105,6 @@ def test_the_command_lays_out_what_another_one_saved(tmp_path, capsys):
     assert "trihedron plan" in page.read_text(encoding="utf-8"), "how it was made is how it was made first"
     assert main(["report", str(page)]) == 1
     assert "not a saved result" in capsys.readouterr().err
-
-
-def test_moves_of_a_verification_are_counted_from_one_as_in_its_figure():
-    recording, result, _ = usual()
-    checked = trihedron.verify(result, recording, gravity_m_s2=float(G))
-    document = verification_report(checked.verification, checked.segments)
-    moves = next(s for s in document.sections if s.heading == "Poses and moves").blocks[1]
-    assert [row[0] for row in moves.rows] == [str(k + 1) for k in checked.verification.moves]
 
 
 def test_a_domain_agrees_exactly_up_to_the_limit_of_its_figure_and_is_never_named_by_its_id():

@@ -11,7 +11,6 @@ from hand_made_sessions import G, Instrument, recorded
 from trihedron.api.sessions import several_devices
 from trihedron.cli import main
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import beyond_one_unit
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_between, spread_within
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.estimate.verification import reference_findings
@@ -270,7 +269,19 @@ def test_a_scale_of_one_axis_two_percent_off_is_of_another_unit_in_every_command
         pair = [made(one, covariance) for one in (first, numbers)]
         found = several_devices(pair, changes_among([pair], alpha=0.01))
         assert [one.code for one in found] == [FindingCode.SEVERAL_DEVICES] * is_several
-    assert [one.name for one, _ in beyond_one_unit([made(first, covariance), made(other, covariance)])] == ["x"]
+
+
+def test_errors_within_a_wide_uncertainty_and_above_those_of_the_own_calibration_are_no_verification(four_sessions):
+    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G).calibration
+    covariance = known.covariance + np.diag(np.repeat([0.0, 0.05**2, 0.0], [9, 3, 12]))
+    accel = replace(known.accelerometer, b=known.accelerometer.b + 0.05, covariance=covariance[:12, :12])
+    wide = replace(known, accelerometer=accel, covariance=covariance)
+    for calibration, is_less_certain in ((known, False), (wide, True)):
+        verified = trihedron.verify(calibration, four_sessions[1])
+        codes = [one.code for one in verified.findings]
+        assert FindingCode.RESIDUAL_ABOVE_NOISE not in codes
+        assert (FindingCode.CALIBRATION_IMPRECISE in codes) == is_less_certain
+        assert ("Verified:" in str(verified)) != is_less_certain
 
 
 def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(four_sessions):

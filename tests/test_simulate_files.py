@@ -104,6 +104,16 @@ def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, 
     assert "\n" not in str(caught.value)[:60]
 
 
+def test_a_part_whose_log_is_in_si_has_the_steps_of_its_own_adc(tmp_path):
+    text = 'profile = "mpu"\n[session]\nkind = "hand"\n[accelerometer]\nunit = "m/s^2"\n'
+    accel = read_scenario(
+        written(tmp_path, text + "S = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nb = [0, 0, 0]\n")
+    ).accelerometer
+    part = profile_by_name("mpu").accelerometer
+    assert accel.adc.lsb == pytest.approx(part.S[0][0] * part.adc.lsb)
+    assert accel.adc.high == pytest.approx(part.S[0][0] * part.adc.high, rel=0.01)
+
+
 def test_a_unit_of_a_part_without_tolerances_is_the_part():
     part = profile_by_name("ideal")
     for unit, nominal in zip(part.unit(7), (part.accelerometer, part.gyroscope), strict=True):

@@ -114,26 +114,6 @@ fn derivatives_are_those_of_the_residuals_away_from_the_truth() {
     }
 }
 
-#[test]
-fn noiseless_readings_are_explained_and_the_instrument_is_found_from_beside_it() {
-    let (session, truth) = made(false);
-    let none = Distortion::default();
-    let at_truth = residuals(&session, &truth, &truth, &none);
-    // Steps of 20 ms through turns of 1 rad/s: the fourth-order integration and the trapezoid of a smooth move leave
-    // less than a hundredth of the noise; walks carry the true changes of the zeros.
-    let readings = at_truth.rows(0, 6 * N_POSES + 5 * (N_POSES - 1));
-    assert!(readings.amax() < 0.5, "{}", readings.amax());
-    let start = beside(&truth, session.layout(0), 0);
-    let strong = Strengths {
-        corner_s: [1e-2, 1e-2],
-        ..STRENGTHS
-    };
-    let found = fit(&session, start, strong, &none).expect("fit");
-    assert!(found.stop.is_converged());
-    let relative = (found.state.rate_scale - truth.rate_scale).norm() / truth.rate_scale.norm();
-    assert!(relative < 1e-3, "{relative}");
-}
-
 /// Cost of a fit, at the weights of its own end.
 fn chi2_of(session: &Session, found: &Fit) -> f64 {
     residuals(session, &found.state, &found.state, &Distortion::default()).norm_squared()

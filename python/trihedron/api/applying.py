@@ -14,14 +14,12 @@ import numpy as np
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.limits import TO_SIGMA
 from trihedron.channel_facts.quiet import look
 from trihedron.errors import InputError
-from trihedron.estimate.verification import norm_error
+from trihedron.estimate.gravity_error import static_force
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
-from trihedron.quantiles import median
 from trihedron.read.sensing import static_norm
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.records.results import CheckResult
@@ -136,7 +134,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     followed = thermally_corrected(known, recording)
     if followed is None:
         followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
-    findings = (*findings, *static_force(followed[0], recording.rate_hz, known))
+    findings = (*findings, *_static_force(followed[0], recording.rate_hz, known))
     return replace(
         recording,
         accelerometer=followed[0],
@@ -148,41 +146,13 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     )
 
 
-FAR_FROM_GRAVITY = 0.2
-"""Relative difference of the corrected |f| at rest from gravity that is no error of a calibration: before one, MEMS
-parts are within 10 % of their data sheet."""
-
-
-OFF_GRAVITY, SIGMAS = 0.01, 5.0
-"""Least relative difference that is stated as an error: |g| differs by 0.5 % between places, and the bias of a
-consumer part returns within 10 mg; and its least size in standard deviations."""
-
-
-def static_force(force: FloatArray | None, rate_hz: float, calibration: Calibration) -> tuple[Finding, ...]:
-    """A finding with the median |f| of corrected readings (n, 3) in quiet windows: a warning off gravity, serious far
-    from it.
-
-    Its standard deviation is the scatter of the windows, not of their mean: in motion they share an acceleration.
-    """
+def _static_force(force: FloatArray | None, rate_hz: float, known: Calibration) -> tuple[Finding, ...]:
+    """The finding with |f| of corrected readings (n, 3) in quiet windows; none without an accelerometer or windows."""
     windows = None if force is None else look({"accelerometer": force}, rate_hz)
-    norm, gravity = math.nan if force is None else static_norm(force, windows), calibration.gravity_m_s2
+    norm = math.nan if force is None else static_norm(force, windows)
     if windows is None or not math.isfinite(norm):
         return ()
-    sensor = calibration.accelerometer
-    means = (windows.quiet_mean("accelerometer") - sensor.b) @ np.linalg.inv(sensor.S).T
-    errors, _, model = norm_error(sensor, means, np.zeros((len(means), 3)), gravity)
-    sigma = math.hypot(median(model), TO_SIGMA * median(np.abs(errors - median(errors))))
-    off, share = abs(norm - gravity), abs(norm / gravity - 1.0)
-    case = "far" if share > FAR_FROM_GRAVITY else "off" if share > OFF_GRAVITY and off > SIGMAS * sigma else ""
-    said = Finding.of(
-        FindingCode.STATIC_FORCE,
-        case,
-        norm_m_s2=norm,
-        gravity_m_s2=gravity,
-        share=norm / gravity - 1.0,
-        sigma_m_s2=sigma,
-    )
-    return (said,)
+    return (static_force(known, norm, windows.quiet_mean("accelerometer")),)
 
 
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:

@@ -155,8 +155,8 @@ def calibrate(
             calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal)
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
-            grave = [finding.seen for finding in recording.findings if finding.severity is Severity.SERIOUS]
-            raise InputError(" ".join((*grave, str(error)))) from None
+            grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
+            raise InputError(" ".join((*grave, *(["As it is:"] if grave else []), str(error)))) from None
     if calibration.accelerometer.method != "joint":
         calibration = with_bending(calibration, segments)
     calibration = in_frame(calibration, wanted)

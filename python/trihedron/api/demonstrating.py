@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
 from trihedron.api.verifying import verify
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
@@ -179,8 +179,7 @@ def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
 def _mean_change(readings: FloatArray | None, without: FloatArray | None) -> FloatArray:
     assert readings is not None
     assert without is not None
-    out: FloatArray = np.mean(readings - without, axis=0)
-    return out
+    return np.asarray(np.mean(readings - without, axis=0))
 
 
 def _scenario(layout: int) -> Scenario:
@@ -203,7 +202,7 @@ def _uncalibrated_rms(segments: Segments, gravity_m_s2: float) -> float:
     """Rms gravity error in static poses [m/s²] without calibration: the data sheet's sensitivity and no bias."""
     assert segments.accelerometer_mean is not None
     norm = np.linalg.norm(segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
-    return float(np.sqrt(np.mean((norm - gravity_m_s2) ** 2)))
+    return rms_of(norm - gravity_m_s2)
 
 
 def _files(folder: Path) -> tuple[tuple[Path, str], ...]:

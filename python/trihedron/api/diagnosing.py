@@ -142,6 +142,9 @@ def _of_poses(
     begun = 0.05 if simulated is None else 0.45
     notify(begun, "calibrating")
     used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
+    if known is None:
+        # No effect of a sensor stands for a wrong time base: S takes it up.
+        findings += [f for f in used.findings if f.code is FindingCode.SCALE_NOT_NOMINAL]
     recording_used, segments_used = recording, segments
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
@@ -162,7 +165,8 @@ def _of_poses(
         from trihedron.api.diagnosing_with_simulation import compared_with_model
 
         given = replace(known, gravity_m_s2=gravity)
-        found = compared_with_model(found, given, simulated, (recording_used, segments_used, used), alpha)
+        found, more = compared_with_model(found, given, simulated, (recording_used, segments_used, used), alpha)
+        findings += more
         updated, used = used, given
     return DiagnosisResult(
         **vars(found),

@@ -17,8 +17,9 @@ from trihedron.comparison.quantisation import quantisation_noise
 from trihedron.comparison.ranges import stated_ranges
 from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.against.fitted import model_of_diagnosis
+from trihedron.diagnose.against.fitted import as_read, model_of_diagnosis
 from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
@@ -49,22 +50,28 @@ def compared_with_model(
     simulated: Simulated | None,
     fitted: tuple[Recording, Segments, Calibration],
     alpha: float,
-) -> Diagnosis:
-    """The diagnosis of a recording (``fitted``: recording, segments, own calibration) compared with the given model.
+) -> tuple[Diagnosis, tuple[Finding, ...]]:
+    """The diagnosis of a recording (``fitted``: recording, segments, own calibration) compared with the given model,
+    and findings where that is less certain than the recording's own.
 
     Parameters and effects are compared; with a simulation noise, stages and repeated simulations too.
     """
-    recording, segments, _ = fitted
+    recording, segments, own = fitted
+    fit = model_of_diagnosis(found)
+    place = known.gravity_m_s2, known.gravity_source
+    checked = verify_calibration(as_read(known, fit), recording, segments, *place, own)
+    imprecise = tuple(one for one in checked.findings if one.code is FindingCode.CALIBRATION_IMPRECISE)
     if simulated is None:
-        return compared(found, known, None, (), recording, segments, alpha)
+        return compared(found, known, None, (), recording, checked, alpha), imprecise
     turned = sign_of_gravity((simulated.segments, simulated.calibration), fitted[1:])
     frames = (*simulated.frames, *(() if turned is None else (turned,)))
     noise = (*frames, *_noise(simulated, found, recording, segments, alpha))
-    fit = model_of_diagnosis(found)
-    found = compared(found, known, _with_ranges(simulated, found, recording), noise, recording, segments, alpha)
+    found = compared(found, known, _with_ranges(simulated, found, recording), noise, recording, checked, alpha)
     stages = with_noise_stage(found.stages, simulated.sampled, recording, segments, fit, noise)
     found = replace(found, stages=stages)
-    return found if simulated.scenario is None else _beside_scenario(found, simulated.scenario, fitted, alpha)
+    if simulated.scenario is not None:
+        found = _beside_scenario(found, simulated.scenario, fitted, alpha)
+    return found, imprecise
 
 
 def _beside_scenario(

@@ -111,7 +111,8 @@ def filter_noise(
     known = _static(static) if static is not None else _sensors(own)
     # The log's own rest is no other log: its faults are those of the recording already.
     name = "" if static is None else _name(static)
-    of_static = _not_noise(own) if static is None else _doubts(static, name)
+    of_own = () if own is None else own.findings
+    of_static = [f for f in of_own if f.code in NOT_OF_THE_SENSOR] if static is None else _doubts(static, name)
     findings = (*recording.findings, *of_static, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
@@ -233,11 +234,6 @@ def _in_counts(static: Noise) -> str:
         f"the static log is in counts: give the JSON of `trihedron allan {_name(static)}` with --calibration FILE, or "
         "with --gyro-lsb and --accel-lsb, the sizes of a count"
     )
-
-
-def _not_noise(static: Noise | None) -> tuple[Finding, ...]:
-    """Findings of what is in the K of a static log beside noise."""
-    return tuple(one for one in (() if static is None else static.findings) if one.code in NOT_OF_THE_SENSOR)
 
 
 def _name(static: Noise | str | os.PathLike[str]) -> str:

@@ -20,14 +20,13 @@ from trihedron.api.planning_poses import (
     sigma_of,
 )
 from trihedron.api.reading import segment
-from trihedron.api.verifying import verify
+from trihedron.api.verifying import own_calibration, verify
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
 from trihedron.records.results import CalibrationResult, VerificationResult
-from trihedron.sensor_model import in_frame
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     acceleration_to_si,
@@ -54,7 +53,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
     Too few poses raise nothing: unknown values are None.
     """
     segments = segment(recording)
-    calibration = _calibration(recording, segments, gravity_m_s2)
+    calibration = None if segments.n_poses < 6 else own_calibration(recording, segments, gravity_m_s2)
     centre, matrix = _rough_model(recording, segments, calibration)
     up = _unit((_means(segments) - centre) @ matrix.T)
     known = _known(recording, segments, calibration, up, matrix, gravity_m_s2)
@@ -142,16 +141,6 @@ def conclude(
 
 def _means(segments: Segments) -> FloatArray:
     return np.zeros((0, 3)) if segments.accelerometer_mean is None else segments.accelerometer_mean
-
-
-def _calibration(recording: Recording, segments: Segments, gravity: float) -> Calibration | None:
-    if segments.n_poses < 6:
-        return None
-    try:
-        made = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    except INPUT_ERRORS:
-        return None
-    return in_frame(made, "lower")
 
 
 def _is_determined(calibration: Calibration | None) -> bool:
@@ -279,7 +268,7 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
         open_ones = [one for one in uncertain if one.now is None]
         after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
         count = f"{len(open_ones)} of {len(uncertain)} parameters"
-        return f"Not yet determined: {count}, {after.sensor} {after.name} the worst."
+        return f"No uncertainty yet of {count}: a combination is open, {after.sensor} {after.name} most."
     then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 
@@ -300,7 +289,8 @@ def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
 def _doubts(calibration: Calibration | None) -> tuple[str, ...]:
     if calibration is None:
         return ()
-    return tuple(f.seen for f in calibration.findings if f.severity is Severity.SERIOUS and f.code not in _NOT_THE_FIT)
+    grave = [f for f in calibration.findings if f.severity is Severity.SERIOUS or f.code is FindingCode.OUTLIER_POSE]
+    return tuple(f.seen for f in grave if f.code not in _NOT_THE_FIT)
 
 
 def _noise(recording: Recording, segments: Segments, matrix: FloatArray, calibration: Calibration | None) -> str:

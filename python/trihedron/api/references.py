@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.api.choices import settle_gravity
-from trihedron.api.reading import AnyRecording, recording_of
+from trihedron.api.reading import AnyRecording, recording_of, segment
 from trihedron.api.referring import AnyReference, calibration_by, motion_of
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_references, turns_of_frame
+from trihedron.estimate.verification import reference_findings
 from trihedron.records import Calibration, Frame, Recording
 from trihedron.records.reference import AgainstReference, FitToReference
 
@@ -83,8 +84,10 @@ def calibrate_references(
     first = replace(found[0], gyroscope=gyro, accelerometer=_averaged(found))
     calibration = calibration_by(first, logs[0], gravity, source, frame)
     said = said if first.accelerometer is not None else ()
-    findings = (*said, *(finding for one in found for finding in one.findings))
-    return ReferencesResult(replace(calibration, findings=findings), found, logs)
+    findings = [*said, *(finding for one in found for finding in one.findings)]
+    if first.accelerometer is not None:
+        findings += [found for log in logs for found in reference_findings(calibration, log, segment(log))]
+    return ReferencesResult(replace(calibration, findings=tuple(findings)), found, logs)
 
 
 def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:

@@ -17,14 +17,14 @@ from trihedron.api.sessions_combined import amount_of, combine
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import beyond_one_unit
+from trihedron.estimate.sessions.one_unit import of_another_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
-from trihedron.records.sessions import GEOMETRY, By, Change, Session
+from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
@@ -182,15 +182,10 @@ def of_several_units(results: Sequence[CalibrationResult]) -> tuple[Finding, ...
 def several_devices(
     sessions: Sequence[Session], changes: Sequence[Change], case: Literal["", "calibrated"] = ""
 ) -> tuple[Finding, ...]:
-    """A finding for every misalignment that changed, and every scale that changed by more than those of one unit.
-
-    A scale common to all axes is not among them: a unit of measurement or a clock changes it as well.
-    """
-    apart = {*GEOMETRY, *(parameter.id for parameter, _ in beyond_one_unit(sessions))}
+    """A finding for every change that one unit does not make."""
     return tuple(
         Finding.of(FindingCode.SEVERAL_DEVICES, case, parameter=one.id, amount=amount_of(one))
-        for one in changes
-        if one.significant and one.id in apart
+        for one in of_another_unit(sessions, changes)
     )
 
 

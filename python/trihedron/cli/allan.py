@@ -22,7 +22,7 @@ OPTIONS = {
     "calibration": ("FILE", "Calibration of the unit: it gives the size of a count."),
     "exclude": (
         "FROM:TO",
-        "Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
+        "Leave out this interval [s]; :TO from the start, FROM: to the end; may be given more than once.",
     ),
     "keep_events": "Exclude nothing automatically: impacts, vibration and jumps of the mean stay in.",
     "accuracy": ("PERCENT", "With --full: how long to record for this uncertainty of each term."),
@@ -55,7 +55,7 @@ def allan(
     results: FullResults,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
-    stretches = [_stretch(text) for text in exclude or []]
+    intervals = [_interval(text) for text in exclude or []]
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
     results.check(csv, plot, inputs=(*source.files, calibration))
@@ -67,7 +67,7 @@ def allan(
             raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
         found = _of_curve(source, samples, gyro_lsb, accel_lsb)
     else:
-        options: dict[str, Any] = {"exclude_s": stretches, "automatic": not keep_events}
+        options: dict[str, Any] = {"exclude_s": intervals, "automatic": not keep_events}
         options |= {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
         found = _of_file(source, checkpoint, options) if stream else _of_log(source, calibration, options)
     from trihedron.api.identifying import recording_lengths
@@ -121,7 +121,7 @@ def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, acce
         return noise_of_curve(source.log, rate_hz=source.rate, n_samples=samples, **source.units)
 
 
-def _stretch(text: str) -> tuple[float, float]:
+def _interval(text: str) -> tuple[float, float]:
     start, colon, stop = text.partition(":")
     try:
         if not colon or not (start or stop):

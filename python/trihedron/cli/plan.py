@@ -6,7 +6,7 @@ from trihedron.cli.output import Results
 OPTIONS = {
     "turns": ("LIST", "Known turns about every axis, in degrees: '90,-90' or '1440,-1440'."),
     "turn_time": ("S", "How long a turn takes."),
-    "pose_time": ("S", "Length of a pose, and of the stretch without rotation."),
+    "pose_time": ("S", "Length of a pose, and of the interval without rotation."),
     "gyro_noise": ("X", "White noise of the gyro [deg/s/√Hz]."),
     "accel_noise": ("X", "White noise of the accelerometer [µg/√Hz]."),
     "turn_error": ("DEG", "Standard error of a turn's angle (wall)."),

@@ -11,6 +11,7 @@ import typer
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
 from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, is_stdout, leave
 from trihedron.cli.run import note_file
+from trihedron.errors import InputError
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
@@ -87,7 +88,10 @@ def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:
         logs = named[1:]
     if len(logs) > 1 or (beside and logs):
         logs, extra = ([], logs) if beside else (logs[:1], logs[1:])
-        _calibrations(extra)
+        try:
+            _calibrations(extra)
+        except ValueError as error:
+            raise InputError(f"{error} If it is a log: one log is tested at a time; run it for each.") from None
     paths = [path for path in named if path not in logs]
     if not paths:
         raise typer.BadParameter("name a calibration file and a log")

@@ -9,12 +9,11 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.rows import SENSORS, difference
-from trihedron.diagnose.against.fitted import FittedModel, as_read, model_of_calibration, model_of_diagnosis
+from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration, model_of_diagnosis
 from trihedron.diagnose.against.mechanisms import FREE_CURVE, compare_effects, left_open_by
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
-from trihedron.estimate.verification import verify_calibration
 from trihedron.probability import f_upper
-from trihedron.records import Calibration, Recording, Segments
+from trihedron.records import Calibration, Recording, Segments, Verification
 from trihedron.records.diagnosis import (
     AcceptedEffect,
     Diagnosis,
@@ -97,13 +96,13 @@ def compared(
     simulated: tuple[Diagnosis, Recording] | None,
     noise: tuple[NoiseDifference, ...],
     recording: Recording,
-    segments: Segments,
+    checked: Verification,
     alpha: float,
 ) -> Diagnosis:
     """The diagnosis of a recording, extended by its differences to the given model.
 
     ``simulated`` is the user's simulated log with its own diagnosis, where that is the model; otherwise ``given`` is.
-    ``noise`` are the differences of noise and sampling.
+    ``noise`` are the differences of noise and sampling; ``checked`` is the model on the recording, nothing fitted.
     """
     own = model_of_diagnosis(found)
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
@@ -139,7 +138,7 @@ def compared(
         effects=effects.in_order,
         parameters=parameters,
         noise_compared=noise,
-        stages=(_as_given(as_read(given, own), recording, segments), *found.stages),
+        stages=(_as_given(checked), *found.stages),
     )
 
 
@@ -209,9 +208,8 @@ def _factor(one: CommonFactor) -> NoiseDifference:
     return difference(one.sensor, "unit" if one.written else "range", (None, None), "1", remark, ratio=ratio)
 
 
-def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
+def _as_given(checked: Verification) -> Stage:
     """Errors of the given parameters with one bias for the session, nothing fitted."""
-    checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
 
     def of(domain: Domain, error: FloatArray, noise: FloatArray | None, unit: str) -> list[StageDomain]:
         if not len(error):

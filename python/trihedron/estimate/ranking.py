@@ -7,9 +7,9 @@ from itertools import permutations, product
 import numpy as np
 
 from trihedron.arrays import FloatArray, rms_of
+from trihedron.estimate.gravity_error import norm_error
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
-from trihedron.estimate.verification import norm_error
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration, Verification
 from trihedron.records.ranking import Interval, Suspicion

@@ -9,10 +9,12 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
+from trihedron.estimate.gravity_error import norm_error
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by
 from trihedron.estimate.verified_parameters import (
     common_factor,
+    imprecision_findings,
     judge_parameters,
     shift_findings,
     shifted_parameters,
@@ -29,7 +31,6 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.verification import JudgedParameter
-from trihedron.sensor_model import norms
 
 FAR_BEYOND = 10.0
 """Ratio of an error to noise and stated uncertainty above which the calibration is not, or no longer, this sensor's.
@@ -96,21 +97,9 @@ def verify_calibration(
             *_bias_findings(calibration.gyroscope, rest, is_alone=not beyond_noise),
             *shift_findings(parameters),
             *_untested(calibration, own, segments),
+            *(() if beyond_noise else imprecision_findings(error, moves.angle_deg, own)),
         ),
     )
-
-
-def norm_error(
-    sensor: SensorCalibration, means: FloatArray, variance: FloatArray, gravity_m_s2: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """``|S a' + b| - |g|`` (n,) of mean readings (n, 3), its noise, and its noise with the calibration's uncertainty.
-
-    With ``u = f/|f|``: ``var = uᵀ S Σ Sᵀ u + J C Jᵀ``, ``J = (u ⊗ a', u)``.
-    """
-    norm, jacobian = norms(means, sensor.S, sensor.b)
-    noise = np.sum((jacobian[:, 9:] @ sensor.S) ** 2 * variance, axis=1)
-    model = np.einsum("ni,ij,nj->n", jacobian, sensor.covariance, jacobian)
-    return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
 
 
 def _untested(calibration: Calibration, own: Calibration | None, segments: Segments) -> Iterator[Finding]:

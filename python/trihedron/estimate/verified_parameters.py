@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import RELATIVE
@@ -156,3 +156,19 @@ def _resting(gyroscope: SensorCalibration, means: FloatArray) -> tuple[FloatArra
     n = len(rates)
     scatter = rates.std(axis=0, ddof=1) if n > 1 else np.full(3, np.inf)
     return rates.mean(axis=0), scatter / np.sqrt(n)
+
+
+def imprecision_findings(error: FloatArray, angle_deg: FloatArray, own: Calibration | None) -> Iterator[Finding]:
+    """Finding where errors within the stated uncertainty are larger than those of the log's own calibration, each pose
+    and move predicted by the others: F test of the mean squares."""
+    quality = {name: sensor.quality for name, sensor in (() if own is None else own.sensors) if sensor.quality}
+    pairs = [(1, "static", error, quality["accelerometer"].held_out)] if "accelerometer" in quality else []
+    if "gyroscope" in quality:
+        pairs.append((2, "moves", angle_deg, quality["gyroscope"].held_out_angle_deg))
+    for n_components, case, errors, held_out in pairs:
+        held = np.zeros(0) if held_out is None else held_out[np.isfinite(held_out)]
+        if len(errors) and held.any():
+            times = rms_of(errors) / rms_of(held)
+            p = probability.fdtrc(n_components * len(errors), n_components * len(held), times**2)
+            if p < probability.FALSE_ALARM:
+                yield Finding.of(FindingCode.CALIBRATION_IMPRECISE, case, times=times, p=p)

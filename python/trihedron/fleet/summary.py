@@ -11,12 +11,12 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import beyond_one_unit
+from trihedron.estimate.sessions.one_unit import of_another_unit
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc
 from trihedron.records.fleet import EffectCount, FleetLog, FleetSummary, MixedLogs, Outlier
-from trihedron.records.sessions import PARAMETERS, Session
+from trihedron.records.sessions import PARAMETERS, Change, Session
 
 MOST_NAMED = 4
 """Most logs that are named among those that were not compared."""
@@ -56,16 +56,19 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
     logs = tuple(_log(row) for row in rows)
     comparable, passed_over = _comparable(rows)
     sessions = [_session(row) for row in comparable]
-    by_device = _by_device(sessions)
-    mixed = _not_one_unit(by_device)
+    by_device: dict[str, list[Session]] = {}
+    for session in sessions:
+        by_device.setdefault(session.group, []).append(session)
+    changes = changes_among(list(by_device.values()), alpha=FALSE_ALARM)
+    mixed = _not_one_unit(by_device, changes)
     if mixed:
         for one in mixed:
             del by_device[one.serial]
         sessions = [session for group in by_device.values() for session in group]
+        changes = tuple(change for change in changes if change.group in by_device)
         more = f"{sum(one.n_logs for one in mixed)} of which it is not known which device they are of"
         passed_over = f"{passed_over} and {more}" if passed_over else more
     repeated = repeated_parameters(sessions) if len(sessions) > 1 else ()
-    changes = changes_among(list(by_device.values()), alpha=FALSE_ALARM)
     outliers, farthest = _outliers(by_device)
     diagnosed = [row for row in rows if row.get("diagnosis")]
     summary = FleetSummary(
@@ -149,13 +152,6 @@ def _session(row: dict[str, Any]) -> Session:
     )
 
 
-def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
-    out: dict[str, list[Session]] = {}
-    for session in sessions:
-        out.setdefault(session.group, []).append(session)
-    return out
-
-
 def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...], Outlier | None]:
     """Outlying devices, and the farthest of the others (None with too few): moderated deleted residual of each mean,
     Bonferroni-corrected over devices and parameters.
@@ -223,10 +219,15 @@ def _log_bias(dof: float) -> float:
     return 1.0 / dof + 1.0 / (3.0 * dof**2)
 
 
-def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
-    """Groups of logs that are not of one device."""
-    apart = ((serial, len(sessions), beyond_one_unit(sessions)) for serial, sessions in by_device.items())
-    return tuple(MixedLogs(serial, n, *found[0]) for serial, n, found in apart if found)
+def _not_one_unit(by_device: dict[str, list[Session]], changes: Sequence[Change]) -> tuple[MixedLogs, ...]:
+    """Groups of logs that are not of one device, with the most significant difference."""
+    mixed = []
+    for serial, sessions in by_device.items():
+        for change in of_another_unit(sessions, [change for change in changes if change.group == serial])[:1]:
+            k = int(np.argmax(np.abs(change.size)))
+            parameter = next(one for one in PARAMETERS if (one.id, one.name) == (change.id, change.names[k]))
+            mixed.append(MixedLogs(serial, len(sessions), parameter, abs(change.size[k])))
+    return tuple(mixed)
 
 
 def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[EffectCount, ...]:

@@ -141,6 +141,7 @@ class FindingCode(str, Enum):
     WORSE_THAN_UNCALIBRATED = "worse-than-uncalibrated"
     LIMIT_EXCEEDED = "limit-exceeded"
     NOT_TESTED = "not-tested"
+    CALIBRATION_IMPRECISE = "calibration-imprecise"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
     # noise

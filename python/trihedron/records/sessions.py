@@ -49,6 +49,9 @@ PARAMETERS: tuple[Parameter, ...] = (
 the natural logarithm of raw units per SI unit: differences of it are relative."""
 GEOMETRY = ("accel-misalignment", "gyro-misalignment", "triad-alignment")
 """Ids of parameters that the package and the board fix: they differ between devices."""
+ONE_UNIT = 0.01
+"""Largest difference in relative scale, or angle [rad], between two logs of one unit: 0.03 %/K over 30 K; units differ
+by several per cent (data sheets of consumer parts: 3 %)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_unit,
 )
+from trihedron.report.segments import rate_in_words
 from trihedron.report.verification import USES
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
@@ -162,7 +163,8 @@ def verdict(calibration: Calibration, errors_beside: str = "") -> str:
 def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:
     facts = []
     if recording is not None:
-        facts.append(("recording", f"{duration(recording.duration_s)} at {plain_number(recording.rate_hz, 4)} Hz"))
+        rate = rate_in_words(recording.rate_hz, recording.findings, 4)
+        facts.append(("recording", f"{duration(recording.duration_s)} at {rate}"))
     if segments is not None:
         facts.append(("motion", f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))

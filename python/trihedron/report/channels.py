@@ -9,7 +9,7 @@ from trihedron.report.document import Table
 from trihedron.report.numbers import MINUS, plain_number, unit_in_print
 
 UNKNOWN = "not known"
-CHANNELS = "The channels; bandwidth in the quietest stretches of the whole log"
+CHANNELS = "The channels; bandwidth in the quietest intervals of the whole log"
 
 
 def channels_table(recording: Recording) -> Table:

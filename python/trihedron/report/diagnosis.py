@@ -24,6 +24,7 @@ from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_pi
 from trihedron.report.diagnosis_words import (
     NOT_JUDGED,
     differing_headline,
+    findings_of,
     follows,
     headlines_of,
     is_explained,
@@ -85,7 +86,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     if diagnosis.noise_compared:
         noise = (*ratios_picture(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
-    findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
+    findings: Iterable[Finding] = findings_of(diagnosis)
     if diagnosis.verdict in ("not-testable", "unexplained"):
         # No result to be used, of which the size of gravity would decide.
         findings = [one for one in findings if one.code is not FindingCode.GRAVITY_DEFAULTED]

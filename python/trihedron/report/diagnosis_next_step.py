@@ -8,12 +8,12 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
-from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, named_effects, own_serious
+from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, findings_of, named_effects, own_serious
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
-from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import id_in_print, ids_in_print
 from trihedron.report.numbers import capital, listed
+from trihedron.report.verification import imprecise
 
 FOUND = ("missing-physics", "unexplained")
 """Verdicts with something to do about the readings."""
@@ -33,7 +33,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return dependent(diagnosis) or " ".join([action_in_words(serious), *_separation(diagnosis, "Then separate")])
     if diagnosis.verdict == "consistent":
         keep = f"Keep using {model or 'the model'}: it agrees with this log."
-        if imprecise_in_diagnosis(diagnosis):
+        if imprecise(findings_of(diagnosis)):
             keep = f"Take over the parameters of this log, which are more certain: {_taken_by(model)}."
         return dependent(diagnosis) or (keep if diagnosis.parameters else use)
     if diagnosis.verdict == "not-testable":
@@ -60,6 +60,8 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         missing = bool(named_effects(diagnosis, "recording")) and (is_carried or not is_file)
         news = [*(["the parameters that differ"] if differs else []), *(["the missing effects"] if missing else [])]
         said = listed(news or ["the noise and sampling of this log"])
+        surplus = named_effects(diagnosis, "model")
+        said += f", without {listed(surplus)}" if surplus else ""
         by = STORED if is_file and missing else _taken_by(model)
         steps.append(f"{of_another_device(diagnosis, model)}Take over {said}: {by}.")
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")

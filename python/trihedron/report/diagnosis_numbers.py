@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 
 from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
-from trihedron.records.sessions import GEOMETRY
+from trihedron.records.sessions import GEOMETRY, ONE_UNIT
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
@@ -102,9 +102,12 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 
 
 def of_another_device(diagnosis: Diagnosis, model: str) -> str:
-    """Advice where a calibration file, the ``model``, differs in what the package fixes; else empty."""
-    differs = model.endswith(".json") and any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
-    return "Check that the calibration is of this sensor: its axes have other directions. " if differs else ""
+    """Advice where a calibration file, the ``model``, differs in what one unit keeps; else empty."""
+    off = [p for p in diagnosis.parameters if p.significant] if model.endswith(".json") else []
+    why = "its axes have other directions" if any(p.id in GEOMETRY for p in off) else ""
+    if not why and any(p.id.endswith("-scale") and abs(p.difference) > ONE_UNIT for p in off):
+        why = f"scales of one unit repeat within {100.0 * ONE_UNIT:g} %"
+    return f"Check that the calibration is of this sensor: {why}. " if why else ""
 
 
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:

@@ -7,7 +7,6 @@ from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
 from trihedron.report.document import Headline, Level
 from trihedron.report.findings.wording import opening
-from trihedron.report.imprecise_calibration import imprecise_in_diagnosis
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -19,6 +18,7 @@ from trihedron.report.numbers import (
     with_sigma,
     with_unit,
 )
+from trihedron.report.verification import imprecise
 from trihedron.units import degrees_from_radians
 
 LEVELS: dict[str, Level] = {
@@ -69,9 +69,10 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, STATED)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
+        but = "".join(f"; but {_clause(opening(one.seen))}" for one in imprecise(findings_of(diagnosis))[:1])
         return (
             f"CONSISTENT{beside}: the model and its noise explain this recording; no missing effect is detectable"
-            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}{imprecise_in_diagnosis(diagnosis)}."
+            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}{but}."
         )
     if diagnosis.verdict == "unexplained":
         named = named_effects(diagnosis, "recording")
@@ -102,13 +103,15 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
 
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:
     """The verdict on residuals ``off`` that the effects ``named`` do not explain."""
-    text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model, and no known "
-    text += "effect explains"
+    at = next((one.where.segments for one in diagnosis.remaining if one.disagrees and one.where.segments), ())
+    most_in = f" (most in {listed([*at])})" if 0 < len(at) < MOST_NAMED else ""
+    text = f"UNEXPLAINED: {listed(off) if off else 'the recording'} {_disagree(off)} with the model{most_in}, and no "
+    text += "known effect explains"
     if named:
         shares = [one.share for one in diagnosis.effects if one.side in ("", "recording") and one.share is not None]
         most = sum(shares) if len(shares) == len(named) else 0.0
-        size = f"{100.0 * min(most, 1.0):.0f} % of the misfit" if most > MOSTLY else "of little effect"
-        text += f" {'all of it' if most > MOSTLY else 'it'} (found, {size}: {listed(named)})"
+        whole, size = ("all of it", "most of the misfit") if most > MOSTLY else ("it", "of little effect")
+        text += f" {whole} (found, {size}: {listed(named)})"
     else:
         text += " it"
     if diagnosis.relations:
@@ -146,14 +149,18 @@ def level_of(diagnosis: Diagnosis) -> Level:
     where the reference was computed from these readings, or where the given calibration is imprecise."""
     if own_serious(diagnosis) is not None:
         return "bad"
-    is_weak = bool(dependent(diagnosis) or imprecise_in_diagnosis(diagnosis))
+    is_weak = bool(dependent(diagnosis) or imprecise(findings_of(diagnosis)))
     return "usable" if diagnosis.verdict == "consistent" and is_weak else LEVELS[diagnosis.verdict]
+
+
+def findings_of(diagnosis: Diagnosis) -> tuple[Finding, ...]:
+    """Findings beside a diagnosis; empty where it is the record alone."""
+    return getattr(diagnosis, "findings", ())
 
 
 def dependent(diagnosis: Diagnosis) -> str:
     """The action for a reference that is not independent; empty where it is or there is none."""
-    found = getattr(diagnosis, "findings", ())
-    return next((str(f.action) for f in found if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
+    return next((str(f.action) for f in findings_of(diagnosis) if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
 
 
 def own_serious(diagnosis: Diagnosis) -> Finding | None:
@@ -172,7 +179,7 @@ def serious_beside(diagnosis: Diagnosis, own: Calibration | None) -> Finding | N
 
 def _not_compared(diagnosis: Diagnosis) -> str:
     """A remark where the gyro was not compared; else empty."""
-    found = getattr(diagnosis, "findings", ())
+    found = findings_of(diagnosis)
     is_out = any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in found)
     return "; the gyro was not compared" if is_out else ""
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 Level = Literal["good", "usable", "bad"]
 """The colour of a verdict: no problems, usable with warnings, not to be trusted."""
+_WRONG = ("usable", "bad")
 EMPTY = ("", "–")
 """Cells without a value."""
 CONSEQUENCE = (
@@ -22,6 +23,7 @@ CONSEQUENCE = (
     FindingCode.GRAVITY_MISSING,
     FindingCode.STUCK_VALUES,
     FindingCode.UNIT_CONTRADICTED,
+    FindingCode.SCALE_NOT_NOMINAL,
     FindingCode.TURNTABLE,
     FindingCode.COLUMNS_ASSUMED,
     FindingCode.NOT_FIT,
@@ -47,8 +49,9 @@ CONSEQUENCE = (
     FindingCode.LEFT_HANDED,
     FindingCode.TURN_NOT_A_MULTIPLE,
     FindingCode.TABLE_TILT,
-    FindingCode.GRAVITY_DEFAULTED,
     FindingCode.EFFECTS_MODELLED,
+    FindingCode.OUTLIER_POSE,
+    FindingCode.OUTLIER_MOVE,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
     FindingCode.NOT_OBSERVABLE,
@@ -57,8 +60,9 @@ CONSEQUENCE = (
     FindingCode.BIAS_DRIFT,
     FindingCode.GYRO_BIAS_DRIFT,
     FindingCode.NONLINEAR_RESIDUAL,
+    FindingCode.GRAVITY_DEFAULTED,
 )
-"""Findings about the whole result: what was read wrongly, then the gravest; those of single poses or moves follow."""
+"""Findings about the whole result: what was read wrongly, the gravest, what an option mends; the others follow."""
 WITHIN = "Usable where these errors are acceptable: "
 """Verdict with warnings, before the errors."""
 _COMMAND = re.compile(r"`trihedron (\w+) LOG")
@@ -68,7 +72,7 @@ IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 INSTEAD = (*IN_A_NEW_LOG, FindingCode.SEVERAL_DEVICES)
 """Findings whose action takes the place of the use of the result."""
 THEN_RUN = {
-    **dict.fromkeys(IN_A_NEW_LOG, "Record a new log with them, then: `... NEW_LOG`."),
+    **dict.fromkeys(IN_A_NEW_LOG, "Then record a new log and run `... NEW_LOG`."),
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
@@ -87,7 +91,7 @@ def begins_with(step: str, action: str) -> bool:
 
 
 def concerns_whole(finding: Finding) -> bool:
-    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck stretches aside."""
+    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck intervals aside."""
     is_stretch = finding.code is FindingCode.STUCK_VALUES and finding.severity is not Severity.SERIOUS
     return finding.code in CONSEQUENCE and not is_stretch
 
@@ -193,7 +197,7 @@ class Document:
         """The verdict's colour: that of the gravest finding at least."""
         if any(finding.severity is Severity.SERIOUS for finding in self.findings):
             return "bad"
-        if self.stated_level in ("usable", "bad"):
+        if self.stated_level in _WRONG:
             return self.stated_level
         if not self.is_trustworthy and self.stated_level is None:
             return "bad"
@@ -209,8 +213,18 @@ class Document:
     @property
     def what_next(self) -> str:
         """The action of a serious finding, or one in a new log; that of a warning about the whole result before
-        ``next_step``."""
-        first, then = self.foremost, self.next_step
+        ``next_step``, gravity that was not given after all else that is wrong."""
+        first = self.foremost
+        place = next((one for one in self.findings if one.code is FindingCode.GRAVITY_DEFAULTED), None)
+        is_last = place is not first or self.stated_level in _WRONG
+        if place is None or not is_last or first is None or first.severity is Severity.SERIOUS:
+            return self._begun_by(first)
+        if not self.next_step or place.action in self.next_step:
+            return self._begun_by(None if place is first else first)
+        return f"{self._begun_by(None if place is first else first)} {place.action}"
+
+    def _begun_by(self, first: Finding | None) -> str:
+        then = self.next_step
         if first is None or not first.action or begins_with(then, first.action) or first.action in then:
             return then
         action = action_in_words(first)

@@ -34,8 +34,9 @@ def effect_chart(
     """Curves of an effect over the variable that drives it, with the data of poses; for one without such data also the
     residual that it explains over force, rate or time."""
     panels = _curve_panels(effect.curves)
-    if not any(len(one.data) for one in effect.curves):
-        panels += _explained(effect, residuals, recording, segments, calibration)
+    if not any(len(one.data) for one in effect.curves) and (seen := _seen_in(effect, residuals)) is not None:
+        drivers = _drivers(_driver(effect, seen), seen, recording, segments, calibration)
+        panels += [_against(seen, label, unit, x) for label, unit, x in drivers]
     return Chart(tuple(panels), columns=min(3, len(panels))) if panels else None
 
 
@@ -93,21 +94,6 @@ def _driver_in_words(one: EffectCurve) -> tuple[str, float, str]:
 
 def _added_in_print(one: EffectCurve) -> tuple[float, str]:
     return (100.0, "%") if one.is_relative else shown("m/s^2" if one.sensor == "accelerometer" else "rad/s")
-
-
-def _explained(
-    effect: AcceptedEffect,
-    residuals: Sequence[DomainResiduals],
-    recording: Recording,
-    segments: Segments,
-    calibration: Calibration,
-) -> list[Panel]:
-    """The residual that an effect explains, over force, rate or time."""
-    seen = _seen_in(effect, residuals)
-    if seen is None:
-        return []
-    drivers = _drivers(_driver(effect, seen), seen, recording, segments, calibration)
-    return [_against(seen, label, unit, x) for label, unit, x in drivers]
 
 
 def alike(effects: Sequence[AcceptedEffect], residuals: Sequence[DomainResiduals]) -> list[list[AcceptedEffect]]:

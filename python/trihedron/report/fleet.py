@@ -42,7 +42,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     bad = [log for log in summary.logs if log.status != "done"]
     n_done = n - len(bad)
     mixed = {one.serial for one in summary.mixed}
-    n_devices = how_many(len({log.serial for log in summary.logs} - mixed), "device")
+    n_devices = how_many(len({log.serial for log in summary.logs}), "device") + (" or more" if mixed else "")
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
@@ -83,14 +83,14 @@ def fleet_report(summary: FleetSummary) -> Document:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
         named = first_of([id_in_print(effect.id) for effect in summary.effects])
         verdict += f" Diagnosis: {listed(found)}{f' ({named})' if named else ''}."
-    strays = list(dict.fromkeys(one.serial for one in summary.outliers))
+    outliers = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
-    if summary.repeated and len(devices) > 1 and not strays:
+    if summary.repeated and len(devices) > 1 and not outliers:
         verdict += f" {_within(summary)}"
-    if strays:
+    if outliers:
         first = summary.outliers[0]
         what, away = _by(first.parameter, first.deviation)
-        verdict += f" {_named(strays)} outside the others (most: {first.serial}, {what} by {away})."
+        verdict += f" {_named(outliers)} outside the others (most: {first.serial}, {what} by {away})."
     if summary.passed_over:
         verdict += f" Not compared: {summary.passed_over}."
     if moved:
@@ -103,8 +103,8 @@ def fleet_report(summary: FleetSummary) -> Document:
         sections=tuple(sections),
         lead=lead,
         headlines=_headlines(summary),
-        next_step="" if mixed else next_step_of_fleet(summary, strays, moved),
-        stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or strays or moved) else None,
+        next_step=next_step_of_fleet(summary, outliers, moved),
+        stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or outliers or moved) else None,
     )
 
 
@@ -174,8 +174,7 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
 
 def _mixed(summary: FleetSummary) -> list[Block]:
     rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
-    said = "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
-    said += "folder; until then these logs are compared with nothing."
+    said = "Axes of one unit keep their directions, and its scales repeat within 1 %; these are compared with nothing."
     head = ("taken for one device", "logs", "parameter", "differs by")
     return [Paragraph(said), Table(head, tuple(rows), "Logs too unlike")]
 
@@ -285,7 +284,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         logs = [log for log in logs if log.is_trustworthy] or logs
     n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
     serials = list(dict.fromkeys(log.serial for log in logs))
-    strays = {(one.serial, one.parameter) for one in summary.outliers}
+    outliers = {(one.serial, one.parameter) for one in summary.outliers}
     serial_of = np.array([serials.index(log.serial) for log in logs])
     order = np.array([int(np.sum(serial_of[:k] == serial_of[k])) for k in range(len(logs))])
     count = np.bincount(serial_of, minlength=len(serials))[serial_of]
@@ -293,6 +292,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
     x = Scale("device, in the order of the table", whole=True, limits=(0.5, len(serials) + 0.5), names=tuple(serials))
+    called = [f"{log.serial}: {log.name}" for log in logs]
     good = np.array([log.is_trustworthy for log in logs], dtype=bool)
     panels = []
     apart = numbers - np.median(numbers, axis=0)
@@ -303,16 +303,16 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
         factor, unit = shown(parameter.unit)
         centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
         values, error = (numbers[:, k] - centre) * factor, errors[:, k] * factor
-        is_stray = good & np.array([(log.serial, parameter) in strays for log in logs])
+        is_outlier = good & np.array([(log.serial, parameter) in outliers for log in logs])
         marks: list[Level | Points] = [Level(y=0.0)]
         kinds: tuple[tuple[BoolArray, Colour, str], ...] = (
-            (good & ~is_stray, AXIS_COLOURS[0], "a log"),
-            (is_stray, "accent", "unlike the others"),
+            (good & ~is_outlier, AXIS_COLOURS[0], "a log"),
+            (is_outlier, "accent", "unlike the others"),
             (~good, "soft", "not to be trusted"),
         )
         for part, colour, name in kinds:
             if part.any():
-                tips = [said(logs[i].serial, values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                tips = [said(called[i], values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))

@@ -14,21 +14,23 @@ OPEN = ("missing-physics", "unexplained")
 """Verdicts with effects or residuals that the calibration does not include."""
 
 
-def next_step_of_fleet(summary: FleetSummary, strays: list[str], moved: list[str]) -> str:
+def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[str]) -> str:
     usable = [log for log in summary.logs if is_usable(log)]
     unusable = [log for log in summary.logs if not is_usable(log)]
     rates = [_called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
     again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if RATE_ASSUMED not in log.serious]
     opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
-    steps = [f"state the units if {first_of(moved)} contains several ({BY_FILE})"] if moved else []
+    mixed = [one.serial for one in summary.mixed]
+    steps = [f"name the devices of {first_of(mixed)} ({BY_FILE}), or give each a folder"] if mixed else []
+    steps += [f"state the units if {first_of(moved)} contains several ({BY_FILE})"] if moved else []
     steps += [f"give --rate for {first_of(rates)}"] if rates else []
     steps += [f"record again, if it was to be a calibration: {first_of(again)}"] if again else []
-    odd = [f"{one} ({files_of(one, summary)})" for one in strays]
+    odd = [f"{one} ({files_of(one, summary)})" for one in outliers]
     steps += [f"check part, mounting and units of {first_of(odd)}"] if odd else []
     steps += [f"see what effects gain in {first_of(opened)}: `trihedron diagnose` each"] if opened else []
     steps += [f"against {id_in_print(one)}: {said}" for one, said in _remedy(summary)]
     steps += ["use each device's own calibration (folder calibrations)"] if usable else []
-    return capital("; ".join(steps)) + "." if steps else ""
+    return " ".join(f"{capital(step)}." for step in steps)
 
 
 def _remedy(summary: FleetSummary) -> list[tuple[str, str]]:

@@ -26,6 +26,7 @@ MEANING = {
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
     "calibration-doubted": "warnings of single calibrations",
+    "calibration-imprecise": "errors larger than by the log's own calibration",
     "calibration-shift": "parameters differ",
     "effect-not-applied": "effect not compensated",
     "effects-modelled": "residuals that no effect explains",
@@ -58,7 +59,7 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
-IN_FULL = ("left-handed", "turntable")
+IN_FULL = ("left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
 """A sentence about one pose or move begins with its number."""

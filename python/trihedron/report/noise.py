@@ -13,6 +13,7 @@ from trihedron.report.names import axis_in_print
 from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
+from trihedron.report.segments import rate_in_words
 from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
 _NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with \
@@ -35,9 +36,8 @@ def noise_report(
     """Lay out the noise of one log; ``lengths`` are recording times [s] per axis and term for ``accuracy``."""
     findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
-    facts = [
-        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz")
-    ]
+    rate = rate_in_words(noise.curve.rate_hz, findings, 5)
+    facts = [("length", f"{duration(length)}, {noise.curve.n_samples} samples at {rate}")]
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
         facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))

@@ -12,11 +12,18 @@ from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Sca
 from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.findings import by_weight, findings_block
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import above_noise, headlines_of, parameters_table, use_in_words, verified_in_words
+from trihedron.report.verification import (
+    above_noise,
+    headlines_of,
+    imprecise,
+    parameters_table,
+    use_in_words,
+    verified_in_words,
+)
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 ROW_PX = 34
-JUDGED: dict[str, Colour] = {"verified": "c1", "doubtful": "soft", "rejected": "accent"}
+JUDGED: dict[str, Colour] = {"verified": "c1", "imprecise": "c3", "doubtful": "soft", "rejected": "accent"}
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
@@ -69,9 +76,7 @@ def said_of(one: Ranked) -> str:
     said = [_mistake(found) for found in one.suspicions]
     if not said:
         said = [f.seen.rstrip(".") for f in by_weight(one.verification.findings) if f.severity is not Severity.NOTE][:2]
-    if not said and one.is_clearly_behind:
-        said = ["nothing found, but another fits better"]
-    said = said or ["nothing found"]
+    said = said or [f"nothing found{', but another fits better' if one.is_clearly_behind else ''}"]
     if one.without_bias:
         said.append(f"its file has no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
     return "; ".join(said)
@@ -115,7 +120,9 @@ def _order(ranking: Ranking) -> Table:
 
 
 def _judged(one: Ranked) -> str:
-    return "rejected" if one.is_rejected else "doubtful" if above_noise(one.verification) else "verified"
+    if one.is_rejected or above_noise(one.verification):
+        return "rejected" if one.is_rejected else "doubtful"
+    return "imprecise" if imprecise(one.verification.findings) else "verified"
 
 
 def _with_interval(rms: float, interval: tuple[float, float], factor: float) -> str:

@@ -124,7 +124,7 @@ def references_report(calibration: Calibration, references: tuple[AgainstReferen
             (
                 escaped(one.source),
                 _slow(one.error) + (", not independent" if one.error.signs else ""),
-                ", ".join(each_with_sigma(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), DEGREES)),
+                ", ".join(each_with_sigma(-one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), DEGREES)),
                 "–" if one.clock_rate_ppm is None else with_sigma(*one.clock_rate_ppm),
             )
             for one in references
@@ -185,10 +185,10 @@ def _error(found: AgainstReference) -> str:
 
 
 def _bias(found: AgainstReference) -> str:
-    """The bias in this recording: at its middle, and its change."""
+    """The bias in this recording, the reading without input as of a calibration: at its middle, and its change."""
     bias = found.bias
     k = len(bias.value) // 2
-    middle = ", ".join(each_with_sigma(bias.value[k], bias.sigma[k], DEGREES))
+    middle = ", ".join(each_with_sigma(-bias.value[k], bias.sigma[k], DEGREES))
     moved = plain_number(degrees_from_radians(float(np.ptp(bias.value, axis=0).max())), 2)
     return (
         f"[{middle}] °/s at {bias.time_s[k]:.0f} s, moves by up to {moved} °/s (g-sensitivity at the mean force in it)"

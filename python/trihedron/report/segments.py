@@ -1,11 +1,12 @@
 """Reports of a recording and of its poses and moves, with the charts of its signals."""
 
+from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ, FloatArray
-from trihedron.records import FindingCode, Pose, Recording, Segments, Severity, Truth
+from trihedron.records import Finding, FindingCode, Pose, Recording, Segments, Severity, Truth
 from trihedron.records.noise import least_length_s
 from trihedron.report.channels import logged_sensors
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
@@ -58,7 +59,7 @@ def _is_of_noise(segments: Segments, recording: Recording) -> bool:
 def recording_facts(recording: Recording, segments: Segments | None = None) -> tuple[tuple[str, str], ...]:
     """Length, rate, sensors with unit; with segments also noise, and the number of poses and moves."""
     facts = [("length", f"{duration(recording.duration_s)}, {recording.n_samples} samples")]
-    facts.append(("rate", f"{plain_number(recording.rate_hz, 5)} Hz"))
+    facts.append(("rate", rate_in_words(recording.rate_hz, recording.findings, 5)))
     for name in ("accelerometer", "gyroscope"):
         readings, unit = getattr(recording, name), unit_in_print(getattr(recording, f"{name}_unit").value)
         sigma = None if segments is None else getattr(segments, f"{name}_sigma")
@@ -70,6 +71,12 @@ def recording_facts(recording: Recording, segments: Segments | None = None) -> t
         poses, moves = how_many(segments.n_poses, "pose"), how_many(len(segments.moves), "move")
         facts.append(("found", f"{poses} ({duration(_still_s(segments))} in all), {moves}"))
     return tuple(facts)
+
+
+def rate_in_words(rate_hz: float, findings: Iterable[Finding], digits: int) -> str:
+    """The sampling rate, and whether it was assumed: times and lengths follow from it."""
+    is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in findings)
+    return f"{plain_number(rate_hz, digits)} Hz{' (assumed)' if is_assumed else ''}"
 
 
 def _still_s(segments: Segments) -> float:
@@ -93,7 +100,7 @@ def pose_table(segments: Segments, recording: Recording | None = None) -> Table:
                 for axis, of, error in zip(AXES, mean.T, sigma.T, strict=True)
             }
     rows = tuple((str(k + 1), *(cells[k] for cells in columns.values())) for k in range(segments.n_poses))
-    words = "Mean readings ± their standard error; disturbed stretches excluded"
+    words = "Mean readings ± their standard error; disturbed intervals excluded"
     return Table(("pose", *columns), rows, words if recording else f"{words}; in the unit of the log")
 
 
@@ -110,8 +117,8 @@ def signals_chart(recording: Recording, segments: Segments | None = None) -> Cha
     poses = () if segments is None else segments.poses
     spans = [_span(recording, pose.start, pose.stop - 1) for pose in poses if not pose.is_unsteady]
     spans += [_span(recording, pose.start, pose.stop - 1, SHAKEN, "soft") for pose in poses if pose.is_unsteady]
-    bumps = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
-    return _signals(recording, (*spans, *bumps))
+    disturbed = [_span(recording, *part, "disturbed, excluded", "warn") for pose in poses for part in pose.disturbed]
+    return _signals(recording, (*spans, *disturbed))
 
 
 def state_of(pose: Pose) -> str:

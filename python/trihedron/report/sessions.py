@@ -24,7 +24,6 @@ from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark,
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.imprecise_calibration import FAR_ABOVE
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.verification import USES
@@ -88,8 +87,8 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _worst(model: SessionsModel) -> str:
-    """The largest gravity error of a recording, where it is far above noise: recordings may agree and be wrong."""
-    known = [one for one in model.sessions if one.times_noise > FAR_ABOVE]
+    """The largest gravity error of a recording: recordings may agree and be wrong."""
+    known = [one for one in model.sessions if math.isfinite(one.times_noise)]
     if not known:
         return ""
     worst = max(known, key=lambda one: one.gravity_error_m_s2)

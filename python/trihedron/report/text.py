@@ -18,6 +18,10 @@ NARROWEST, WIDEST = 60, 200
 _GAP, _NARROW_GAP = 3, 2
 _HELD = "\u00a0"
 _COMMAND = re.compile(r"\(?`[^`]+`[.,;:)]*")
+_WORD_END = re.compile(rf"{_HELD}(?=(?:[^']*'[^']*')*[^']*$)")
+"""A space of a command outside quotes."""
+_OPTION = re.compile(rf"({_HELD}--?\w[\w-]*){_HELD}(?!-)")
+"""An option, with the space before its value."""
 _SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])(?=(?:[^`]*`[^`]*`)*[^`]*$)")
 """A space between sentences, not inside a command."""
 _COMMON_POWER = re.compile(r"^\((.+) ± (.+)\)(e\S+)$")
@@ -105,13 +109,24 @@ def _finding_lines(finding: Finding, style: Style) -> list[str]:
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
-    # A command that fits in a line is not broken, so that it can be copied.
-    most = width - max(len(first), len(rest)) - 1
-    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD) if len(found[0]) <= most else found[0], text)
+    # A command stays in one line, or is continued as a shell reads it, so that it can be pasted.
+    text = _COMMAND.sub(lambda found: found[0].replace(" ", _HELD), text)
     lines = textwrap.wrap(
         text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )
-    return [line.replace(_HELD, " ") for line in lines] or [""]
+    whole = [part for line in lines for part in (_continued(line, rest, width) if _width(line) > width else [line])]
+    return [line.replace(_HELD, " ") for line in whole] or [""]
+
+
+def _continued(line: str, indent: str, width: int) -> list[str]:
+    """The lines of a command longer than the width, each but the last with a backslash at its end."""
+    first, *words = _WORD_END.split(_OPTION.sub(r"\1 ", line))
+    lines = [first]
+    for k, word in enumerate(words, start=1):
+        is_last = k == len(words)
+        is_within = len(lines[-1]) + 1 + len(word) + (0 if is_last else 2) <= width
+        lines[-1:] = [f"{lines[-1]} {word}"] if is_within else [f"{lines[-1]} \\", f"{indent}    {word}"]
+    return lines
 
 
 def _width(text: str) -> int:

@@ -1,5 +1,6 @@
 """Report of a calibration tested on another recording."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,6 @@ from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.imprecise_calibration import imprecise_in_verification
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
@@ -55,7 +55,6 @@ def verification_report(
         headlines=headlines_of(v),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         next_step=use_in_words(v, "the calibration"),
-        stated_level="usable" if imprecise_in_verification(v) else None,
     )
 
 
@@ -64,11 +63,16 @@ def above_noise(v: Verification) -> list[Finding]:
     return [finding for finding in v.findings if finding.code in _ABOVE_NOISE]
 
 
+def imprecise(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings that a calibration is less certain than the log's own."""
+    return [finding for finding in findings if finding.code is FindingCode.CALIBRATION_IMPRECISE]
+
+
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
-    word = "Not contradicted" if imprecise_in_verification(v) or _is_untested(v) else "Verified"
-    verified = f"{word}: errors are within noise and uncertainty{imprecise_in_verification(v)}"
+    word = "Not contradicted" if imprecise(v.findings) or _is_untested(v) else "Verified"
+    verified = f"{word}: errors are within noise and uncertainty"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
 
@@ -83,9 +87,7 @@ def use_in_words(v: Verification, what: str) -> str:
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
-    if use and imprecise_in_verification(v):
-        look = "See what the errors are: `trihedron diagnose LOG --calibration FILE`."
-        use = f"{look} Where they are acceptable: u{use[1:]}"
+    above += imprecise(v.findings)
     if above and v.is_passed:
         return f"{above[0].action} Where the errors are acceptable it may be used as it is."
     return above[0].action if above else use

@@ -14,11 +14,14 @@ from trihedron.segment.floor import RangeEnd, is_cut
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import Run, means_of
+from trihedron.units import rate_to_si
 
 CREEP_CHANCE = 1e-3
 """Probability that any steady pose of a log is called settling though none is."""
 LARGEST_NOISE_G = 0.05
 """Noise of one sample, in g, above which poses vibrate: at 1 kHz the noisiest MEMS parts (400 µg/√Hz) reach 0.015."""
+LARGEST_DENSITY = np.radians(0.1)
+"""Noise density of a gyro's means [rad/s/√Hz] above which the sensor turns: twice that of the noisiest MEMS parts."""
 BEYOND_GRAVITY = 0.2
 """Excess of |f| in clipped poses that no bias or scale error of a working accelerometer explains."""
 POSES_FOR_NINE = 9
@@ -153,11 +156,24 @@ def judge_log(
     return found
 
 
-def judge_vibration(sigma: FloatArray, mean: FloatArray) -> list[Finding]:
-    """Vibration in the poses, by the accelerometer's noise of one sample (3,) and the means of the poses (h, 3)."""
-    gravity = float(np.median(np.linalg.norm(mean, axis=1))) if len(mean) else 0.0
-    share = float(sigma.max(initial=0.0)) / gravity if gravity > 0.0 else 0.0
-    return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)] if share > LARGEST_NOISE_G else []
+def judge_vibration(
+    recording: Recording, channels: Channels, sigma: FloatArray, means: PoseMeans, poses: tuple[Pose, ...]
+) -> list[Finding]:
+    """Vibration in the poses, by the accelerometer's noise of one sample in ``sigma`` (c,); in a session, a sensor that
+    is never still, by the slow noise of the gyro in its poses."""
+    gyro = channels.is_gyroscope
+    gravity = float(np.median(np.linalg.norm(means.mean[:, ~gyro], axis=1))) if poses else 0.0
+    share = float(sigma[~gyro].max(initial=0.0)) / gravity if gravity > 0.0 else 0.0
+    if share > LARGEST_NOISE_G:
+        return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)]
+    scale = rate_to_si(recording.gyroscope_unit)
+    # A mean of readings on one code is uncertain by the code, not by motion.
+    gyro = gyro & (sigma**2 > channels.quantisation_variance)
+    if scale is None or len(poses) < POSES_FOR_NINE or not gyro.any():
+        return []
+    length_s = np.array([pose.stop - pose.start for pose in poses]) / recording.rate_hz
+    density = scale * float(np.median(np.sqrt(2.0 * length_s) * means.sigma[:, gyro].max(axis=1)))
+    return [Finding.of(FindingCode.POSES_VIBRATE, "held", density=density)] if density > LARGEST_DENSITY else []
 
 
 def judge_bias(means: PoseMeans) -> list[Finding]:

@@ -142,9 +142,7 @@ def _describe(
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
-    found += judge_bias(means)
-    if recording.accelerometer is not None:
-        found += judge_vibration(sigma[~channels.is_gyroscope], means.mean[:, ~channels.is_gyroscope])
+    found += judge_bias(means) + judge_vibration(recording, channels, sigma, means, poses)
     return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 

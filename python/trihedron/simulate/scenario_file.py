@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from trihedron.documents import read_toml
 from trihedron.errors import InputError
 from trihedron.sanitise import meant
@@ -65,8 +67,8 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
     scenario = Scenario(
         motion=_motion(table),
         name=str(table.get("name", name)),
-        accelerometer=_changed(accelerometer, table.get("accelerometer", {}), "accelerometer"),
-        gyroscope=_changed(gyroscope, table.get("gyroscope", {}), "gyroscope"),
+        accelerometer=_sensor(accelerometer, table, "accelerometer"),
+        gyroscope=_sensor(gyroscope, table, "gyroscope"),
         clock=_changed(profile.clock, table.get("clock", {}), "clock"),
         environment=_environment(table.get("environment", {})),
     )
@@ -136,6 +138,19 @@ def _reject_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: st
             homes = [t for t in tables if key in {f.name for f in dataclasses.fields(_TABLES[t])}]
             hint = f" (it belongs in {' or '.join(f'[{t}]' for t in homes)})" if homes else meant(key, known)
             raise InputError(f"{where} has no key {key!r}{hint}; it knows {', '.join(known)}")
+
+
+def _sensor(base: Any, table: Mapping[str, Any], name: str) -> Any:
+    """The profile's sensor with fields of a table; in another unit its own ADC has the same steps and range."""
+    values = table.get(name, {})
+    made = _changed(base, values, name)
+    if made.unit is base.unit or "adc" in values:
+        return made
+    adc, (old, new) = base.adc, (np.abs(np.diag(np.asarray(one.S))).mean() for one in (base, made))
+    factor = float(old / new)
+    half, middle = 0.5 * factor * (adc.high - adc.low), -float(np.mean(np.linalg.solve(made.S, made.b)))
+    scaled = dataclasses.replace(adc, lsb=factor * adc.lsb, low=middle - half, high=middle + half)
+    return dataclasses.replace(made, adc=dataclasses.replace(scaled, dead_band=factor * adc.dead_band))
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:

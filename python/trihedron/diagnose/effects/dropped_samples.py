@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import MIN_FALL, MOST_NAMED, DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
+from trihedron.diagnose.session.inserted_samples import insert_samples, moved, with_inserted
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
@@ -30,8 +28,6 @@ CONTRADICTS, FEWEST_MOVES = 10.0, 3
 """Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 MOST_OF_INTERVALS = 0.02
 """Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
-FEWEST_OF_PARABOLA = 6
-"""Samples from which the slope of a parabola is more precise than the first step: twice its number of parameters."""
 
 
 @dataclass(frozen=True)
@@ -57,45 +53,6 @@ def find_losses(obs: Observations) -> tuple[Loss, ...]:
     return tuple(sorted(losses, key=lambda loss: loss.sample))
 
 
-def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observations:
-    """One move alone, with ``losses`` (counts after samples) inserted."""
-    a, b = obs.move_ranges[m]
-    assert obs.raw_rate is not None
-    own = {k - a: n for k, n in losses.items()}
-    time = with_time(obs.time_s[a:b], own, 1.0 / obs.recording.rate_hz)
-    force, rate = (with_bridges(one[a:b], own) for one in (obs.raw_force, obs.raw_rate))
-    ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
-    return replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
-
-
-def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
-    """Recording and segments with ``n`` samples inserted behind sample ``k`` for every ``k: n``."""
-    place = moved(recording.n_samples, losses)
-    time_s = with_time(recording.time_s, losses, 1.0 / recording.rate_hz)
-    channels = ("accelerometer", "gyroscope", "temperature_degc", "supply_v")
-    logged = {name: value for name in channels if (value := getattr(recording, name)) is not None}
-    values: dict[str, Any] = {name: with_bridges(value, losses) for name, value in logged.items()}
-    mended = replace(recording, time_s=time_s, auxiliary=type(recording.auxiliary)({}), **values)
-    mended = mended.with_facts(recording.facts.moved(place))
-
-    def at(index: int) -> int:
-        return int(place[index]) if index < len(place) else len(time_s)
-
-    poses = tuple(
-        replace(
-            pose, start=at(pose.start), stop=at(pose.stop - 1) + 1, outer_start=at(pose.outer_start),
-            outer_stop=at(pose.outer_stop - 1) + 1,
-            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in pose.disturbed),
-        )
-        for pose in segments.poses
-    )  # fmt: skip
-    moves = tuple(
-        replace(move, start=poses[move.pose_before].stop, stop=poses[move.pose_after].start) for move in segments.moves
-    )
-    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in poses])
-    return mended, replace(segments, poses=poses, moves=moves, time_mid_s=mid, whole=None)
-
-
 def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
     """Observations of the recording with samples inserted."""
     return replace(observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging), jitter_s=obs.jitter_s)
@@ -109,57 +66,6 @@ def _same_moves(obs: Observations, losses: dict[int, int]) -> Observations:
     other = {m for m, (a, b) in enumerate(whole.move_poses) if (int(a), int(b)) not in known}
     whole = whole.without_moves(other)
     return whole if whole.n_moves == obs.n_moves else obs
-
-
-def moved(n: int, losses: dict[int, int]) -> IntArray:
-    """(n,) places of samples once ``losses`` (counts after samples) are inserted."""
-    extra = np.zeros(n, dtype=np.intp)
-    extra[[k + 1 for k in losses]] = list(losses.values())
-    return np.arange(n) + np.cumsum(extra)
-
-
-def with_time(time_s: FloatArray, losses: dict[int, int], step_s: float) -> FloatArray:
-    """Timestamps with those of the losses; behind a gap they move by the time lost."""
-    place = moved(len(time_s), losses)
-    return np.interp(np.arange(place[-1] + 1), place, time_s + (place - np.arange(len(place))) * step_s)
-
-
-def with_bridges(values: FloatArray, losses: dict[int, int]) -> FloatArray:
-    """Values (n, ...) with samples on a cubic across every loss."""
-    place = moved(len(values), losses)
-    out = np.empty((place[-1] + 1, *values.shape[1:]))
-    out[place] = values
-    for k, n in losses.items():
-        out[place[k] + 1 : place[k + 1]] = bridge(values, k, n)
-    return out
-
-
-def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite by the values and slopes on either side.
-
-    The error of the rotation integrated across the gap is of fifth order in its length.
-    """
-    if k < 1 or k + 2 >= len(values):
-        return np.repeat(values[k : k + 1], n, axis=0)
-    a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])
-    b, db = _edge(values[k + 1 : k + 2 + max(n // 2, 1)])
-    da = -da
-    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-    width = n + 1
-    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
-    return out
-
-
-def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Value and slope at the first of the samples (m, ...), from a parabola where there are enough: the noise of a
-    single step would be multiplied by the length of the gap."""
-    if len(values) < FEWEST_OF_PARABOLA:
-        return values[0], values[1] - values[0]
-    x = np.arange(len(values))
-    slope, value = np.polynomial.polynomial.polyfit(x, values.reshape(len(values), -1), 2)[1::-1]
-    return value.reshape(values.shape[1:]), slope.reshape(values.shape[1:])
 
 
 _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
@@ -234,13 +140,10 @@ class _Move:
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
         """Losses with the counts that gravity determines; those that do not reduce the misfit are left out.
 
-        Those that the motion alone decides are refined together: one without the other has a wrong count.
+        Refined together, since one without the other has a wrong count; then the weakest is tried first.
         """
-        own = self._refined([one for one in losses if one.is_certain])
-        for one in sorted((one for one in losses if not one.is_certain), key=lambda one: -one.gain):
-            tried = self._refined([*own, one])
-            own = tried if self._is_better(tried, own) else own
-        for one in sorted(own, key=lambda one: one.gain):
+        own = self._refined(sorted(losses, key=lambda one: -one.gain))
+        for one in sorted(losses, key=lambda one: one.gain):
             fewer = self._refined([other for other in own if other.sample != one.sample])
             own = own if self._is_better(own, fewer) else fewer
         return own
@@ -260,11 +163,11 @@ class _Move:
         best, least = own[k], self.misfit(own)
         for direction in (-1, 1):
             while 1 <= best.count + direction <= most_lost(self.obs.recording.rate_hz):
-                moved = replace(best, count=best.count + direction)
-                value = self.misfit([*own[:k], moved, *own[k + 1 :]])
+                other = replace(best, count=best.count + direction)
+                value = self.misfit([*own[:k], other, *own[k + 1 :]])
                 if value >= least:
                     break
-                best, least = moved, value
+                best, least = other, value
         return best
 
     def sigma(self, own: list[Loss], one: Loss) -> float:

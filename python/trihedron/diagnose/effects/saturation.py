@@ -124,13 +124,12 @@ class _Saturation(DirectEffect):
     def _misfit(self, context: Context, touched: list[int]) -> tuple[float, float, int]:
         """Chi-square per row of the moves with a plateau, the usual one of the others, and the number of those rows.
 
-        Rotations at a constant rate give plateaus too. A false reading contradicts gravity or velocity after the move,
-        and more than in moves within the range. For a gyro only gravity counts: velocity also contradicts where the
-        accelerometer is away from the axis of a table.
+        Rotations at a constant rate give plateaus too. A false reading contradicts gravity (gyro) or velocity
+        (accelerometer) after the move, and more than in moves within the range. Not both: velocity also contradicts
+        where the accelerometer is away from the axis of a table, gravity where the gyro is wrong.
         """
         system = context.fitted.system
-        domains = (MOVES,) if self.sensor == GYRO else (MOVES, DYNAMICS)
-        rows = np.isin(system.domain, domains) & (system.walk == 0)
+        rows = (system.domain == (MOVES if self.sensor == GYRO else DYNAMICS)) & (system.walk == 0)
         at_limit, squared = np.isin(system.segment, touched), system.residual**2
         others = squared[rows & ~at_limit]
         usual = max(float(np.median(others)) / MEDIAN_CHI2[1], 1.0) if len(others) >= FEWEST_OTHERS else 1.0

@@ -67,6 +67,7 @@ def dependences(context: Context) -> list[Dependence]:
     products, history, warming = _products("u", u, "g^2"), _history(context), _warming(context)
     rates: list[Column] = [(f"w_{AXES[a]}", w[a], "rad/s") for a in range(3)]
     out = [
+        *_each(0, "scale", _over_time("u", u, context.elapsed, "g")),
         *_each(0, HISTORY, history), *_each(0, "temperature", warming), *_each(0, "force", products),
         *_each(0, "rate", rates, is_motion=True),
         *_each(0, "rate products", [("|w|^2", (w**2).sum(axis=0), "(rad/s)^2")], is_motion=True),
@@ -81,6 +82,7 @@ def dependences(context: Context) -> list[Dependence]:
         mixed = [(f"w_{AXES[a]} f_{AXES[b]}", w[a] * u[b], "rad/s g") for a in range(3) for b in range(3)]
         size = [("|w|", np.linalg.norm(w, axis=0), "rad/s")]
         out += [
+            *_each(1, "scale", _over_time("w", w, context.elapsed, "rad/s"), is_motion=True),
             *_each(1, "force", [*products, *own]), *_each(1, "previous pose", previous), *_each(1, HISTORY, history),
             *_each(1, "temperature", warming), *_each(1, "rate times force", mixed, is_motion=True),
             *_each(1, "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
@@ -103,6 +105,11 @@ def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:
     return [
         (f"{symbol}_{AXES[a]} {symbol}_{AXES[b]}", values[a] * values[b], unit) for a, b in combinations(range(3), 2)
     ]
+
+
+def _over_time(symbol: str, values: FloatArray, elapsed: FloatArray, unit: str) -> list[Column]:
+    """The elapsed share of the session times each component of ``values`` (3, points): a scale that drifts."""
+    return [(f"{symbol}_{AXES[a]} over time", values[a] * (elapsed - elapsed.mean()), unit) for a in range(3)]
 
 
 def _history(context: Context) -> list[Column]:

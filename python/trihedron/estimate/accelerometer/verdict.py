@@ -84,7 +84,11 @@ def observability_findings(
         )
         return
     worst = design.worst_prediction()
-    if is_anchored:
+    is_weak = worst > WEAK_PREDICTION * relative_sigma
+    if is_anchored and not is_weak:
+        # Other orientations would not help: each pose by itself is uncertain.
+        yield Finding.of(FindingCode.NOT_OBSERVABLE, "poses-uncertain", measured_g=relative_sigma)
+    elif is_anchored:
         yield Finding.of(
             FindingCode.NOT_OBSERVABLE,
             "poses-weak",
@@ -97,7 +101,7 @@ def observability_findings(
             n_parameters=9,
             worst_prediction_g=worst,
         )
-    elif worst > WEAK_PREDICTION * relative_sigma:
+    elif is_weak:
         yield Finding.of(
             FindingCode.WEAKLY_OBSERVABLE,
             "poses",

@@ -50,8 +50,8 @@ LEAST_S = 40.0
 """Shortest shared motion: in less, the halves do not validate predictions over 10 s."""
 UNTURNED = np.ones(2)
 """``turned_alike`` of a body that does not rotate."""
-PREDICTING = 20
-"""Number of draws of the strengths per prediction."""
+PREDICTING = 100
+"""Number of draws of the strengths per prediction: with 20 the NEES of a flight scatters by 5 %, with 100 by 3 %."""
 
 
 @dataclass(frozen=True)
@@ -168,9 +168,7 @@ def _sensor(
         vibration=bounded(draws[:, 1]) if learnt.prior.is_there[1] and not follows else None,
         reference=_worth(draws, follows),
         shares=shares,
-        consistency=tuple(
-            one for h in asked.horizons_s if (one := consistency(learnt.held, taught, static, h)) is not None
-        ),
+        consistency=consistency(learnt.held, taught, static, asked.horizons_s),
         is_settled=found.is_settled and taught.is_settled,
         quietest=stretches[0].quietest,
     )  # fmt: skip
@@ -225,31 +223,32 @@ def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stre
 
 
 def consistency(
-    held: Sequence[tuple[Stretch, int]], taught: Fitted, static: StaticNoise | None, horizon_s: float
-) -> Nees | None:
-    """Held-out NEES and rms over one horizon under ``taught``, and under static N and K with an exact reference."""
-    some = taught.draws[:: max(1, len(taught.draws) // PREDICTING)]
-    found = errors_over(held, some, horizon_s)
-    if found is None:
-        return None
-    beside: Errors | None = None
+    held: Sequence[tuple[Stretch, int]], taught: Fitted, static: StaticNoise | None, horizons_s: Sequence[float]
+) -> tuple[Nees, ...]:
+    """Held-out NEES and rms over each horizon under ``taught``, and under static N and K with an exact reference."""
+    found = errors_over(held, taught.draws[:: max(1, len(taught.draws) // PREDICTING)], horizons_s)
+    beside: list[Errors | None] = [None] * len(found)
     if static is not None:
         plain = np.zeros(len(NAMES))
         plain[[0, 2]] = static.N.filter_value, static.K.filter_value
         # The white error of a position is never 0: the fitted one is kept.
         plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
         exact = [(replace(one, given=None), first) for one, first in held]
-        beside = errors_over(exact, plain[None], horizon_s)
-    return Nees(
-        horizon_s,
-        float(np.mean(found.nees)),
-        float(np.sqrt(found.predicted)),
-        float(np.sqrt(found.actual)),
-        len(found.nees),
-        found.n_apart,
-        None if beside is None else float(np.mean(beside.nees)),
-        None if beside is None else float(np.sqrt(beside.predicted)),
-        None if beside is None else float(np.sqrt(beside.actual)),
+        beside = errors_over(exact, plain[None], horizons_s)
+    return tuple(
+        Nees(
+            horizon_s,
+            float(np.mean(own.nees)),
+            float(np.sqrt(own.predicted)),
+            float(np.sqrt(own.actual)),
+            len(own.nees),
+            own.n_apart,
+            None if other is None else float(np.mean(other.nees)),
+            None if other is None else float(np.sqrt(other.predicted)),
+            None if other is None else float(np.sqrt(other.actual)),
+        )
+        for horizon_s, own, other in zip(horizons_s, found, beside, strict=True)
+        if own is not None
     )
 
 

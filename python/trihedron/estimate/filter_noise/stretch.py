@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, qr, solve_triangular
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 
 AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
@@ -22,9 +22,8 @@ NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s", 
 """Order of the eight strengths of a stretch."""
 ALIKE = ("noise", "vibration", "white")
 """Strengths whose errors are equal and independent on the three axes."""
-BLOCK_ENDS, TRIANGLE_ENDS = (1.0 / 6.0, 0.0), (7.0 / 30.0, 1.0 / 120.0)
-"""Corrections (diagonal, neighbour) to min(t, t') at the middles, in the variance that a random walk gains per block:
-a block mean contains 1/3 of it instead of 1/2, a triangular mean over two blocks 4/15."""
+NODES, WEIGHTS = (np.polynomial.legendre.leggauss(3) + np.array([[1.0], [0.0]])) / 2.0
+"""Places in a block and their weights: products of two observations' parts are of fourth degree, integrated exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +35,10 @@ class Stretch:
     (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and to all later ones, None
     where the observation is the angle itself; ``given`` (3 m, 3 m) a known covariance, or None; ``attitude`` (m, 3, 3)
     body to world; ``bias_steps`` (3 m, 3 m) the derivative of the observations with respect to the bias in each block;
-    ``power`` (m,) that of vibration, with mean 1; ``ends`` as ``BLOCK_ENDS``; ``kelvin`` (m,) the logged temperature
-    less its mean, and ``warmth`` (3 m, 3) the derivative of the observations by the bias per kelvin, or None;
-    ``quietest`` [SI/√Hz] the noise density of the log's quietest block, above the band: static noise and vibration.
+    ``power`` (n,) that of vibration in each block, with mean 1; ``walk`` (m, 3 n) as `parts_of_walk`; ``kelvin`` (m,)
+    the logged temperature less its mean, and ``warmth`` (3 m, 3) the derivative of the observations by the bias per
+    kelvin, or None; ``quietest`` [SI/√Hz] the noise density of the log's quietest block, above the band: static
+    noise and vibration.
     """
 
     time_s: FloatArray
@@ -51,7 +51,7 @@ class Stretch:
     tilts: FloatArray | None
     attitude: FloatArray
     power: FloatArray
-    ends: tuple[float, float] = BLOCK_ENDS
+    walk: FloatArray
     kelvin: FloatArray | None = None
     warmth: FloatArray | None = None
     given: AnyFloats | None = None
@@ -118,9 +118,14 @@ class Stretch:
         return float(-0.5 * (y @ y - gain @ gain) - log_det - 0.5 * len(y) * np.log(2.0 * np.pi))
 
     def factor(self, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Cholesky factor (3 m, 3 m) of the covariance plus the columns' prior, and whitened observations (3 m,)."""
-        V = self.covariance(strengths) + self.columns @ self.columns.T
-        L = cholesky(V, lower=True, check_finite=False)
+        """Cholesky factor (3 m, 3 m) of the covariance plus the columns' prior, and whitened observations (3 m,).
+
+        By an orthogonal transformation of the root: the columns' prior is up to 10¹² times the noise in squares.
+        """
+        root = cholesky(self.covariance(strengths), lower=True, check_finite=False)
+        (R,) = qr(np.hstack([self.columns, root]).T, mode="r", overwrite_a=True, check_finite=False)
+        n = len(self.observed)
+        L = np.asarray(R[:n].T * np.sign(np.diag(R)), dtype=np.float64)
         return L, solve_triangular(L, self.observed - self.columns @ self.centre, lower=True, check_finite=False)
 
     def part(self, first: int, last: int) -> Stretch:
@@ -138,7 +143,7 @@ class Stretch:
             tilts=None if self.tilts is None else self.tilts[at],
             given=None if self.given is None else self.given[rows, rows],
             attitude=self.attitude[at],
-            power=self.power[at],
+            walk=self.walk[at],
             kelvin=None if self.kelvin is None else self.kelvin[at],
             warmth=None if self.warmth is None else self.warmth[rows],
         )
@@ -170,12 +175,21 @@ def matern_of_means(lag_s: FloatArray, tau_s: float, width_s: float) -> FloatArr
     return np.asarray((both - 2.0 * twice_integrated(lag_s)) / width_s**2)
 
 
-def accumulated(per_block: FloatArray, ends: tuple[float, float]) -> FloatArray:
-    """(m, m) covariance of block means of a random walk whose variance grows by ``per_block`` (m,): min(t, t') at the
-    middles of the blocks, less the corrections ``ends``."""
-    upto = np.cumsum(per_block) - 0.5 * per_block
-    less = np.diag(ends[0] * per_block) + ends[1] * per_block.mean() * neighbours(len(upto))
-    return np.asarray(np.minimum.outer(upto, upto) - less)
+def parts_of_walk(n: int, *, is_triangle: bool) -> FloatArray:
+    """(m, 3 n) part of a step of a random walk, at the nodes of each of ``n`` blocks, in every observation: means over
+    the blocks, or (m = n - 1) triangular means over two neighbouring ones."""
+    m = n - 1 if is_triangle else n
+    out = np.multiply.outer(np.tri(m, n, -1), np.ones(len(NODES)))
+    at = np.arange(m)
+    out[at, at] = 1.0 - 0.5 * NODES**2 if is_triangle else 1.0 - NODES
+    if is_triangle:
+        out[at, at + 1] = 0.5 * (1.0 - NODES) ** 2
+    return out.reshape(m, -1)
+
+
+def accumulated(walk: FloatArray, per_block: FloatArray) -> FloatArray:
+    """(m, m) covariance of observations of a random walk whose variance grows by ``per_block`` (n,) in each block."""
+    return np.asarray((walk * np.outer(per_block, WEIGHTS).ravel()) @ walk.T)
 
 
 def neighbours(m: int) -> FloatArray:
@@ -204,39 +218,43 @@ class Errors:
     n_apart: int
 
 
-def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, horizon_s: float) -> Errors | None:
-    """Prediction errors ``horizon_s`` ahead from all earlier observations; of each stretch from block ``first`` on.
+def errors_over(
+    stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, horizons_s: Sequence[float]
+) -> list[Errors | None]:
+    """Errors over each horizon predicted from all earlier observations; of each stretch from block ``first`` on.
 
     With V = L Lᵀ and w = L⁻¹y the prediction of observation j from those up to k is L[j, :k] w[:k], its covariance
     L[j, k:j] L[j, k:j]ᵀ: one factor gives the filter over every horizon. Means and covariances are those of the mixture
     over ``draws`` (d, 8) of the strengths. None where no stretch is long enough.
     """
-    nees, actual, predicted, apart = [], [], [], 0
+    found: list[list[tuple[FloatArray, FloatArray, int]]] = [[] for _ in horizons_s]
     for stretch, first in stretches:
-        step_s = float(np.median(np.diff(stretch.time_s)))
-        ahead = max(1, round(horizon_s / step_s))
-        targets = np.arange(max(first, ahead + 2) + ahead - 1, len(stretch.time_s))
-        if not len(targets):
-            continue
-        apart += -(-len(targets) // ahead)
-        every = [_ahead(stretch, strengths, ahead, targets) for strengths in draws]
-        errors = np.array([error for error, _ in every])
-        middle = errors.mean(axis=0)
-        apart_of = errors - middle
-        covariance = np.mean([cov for _, cov in every], axis=0) + np.einsum("dni,dnj->nij", apart_of, apart_of) / len(
-            draws
-        )
-        nees += list(np.einsum("ni,ni->n", middle, np.linalg.solve(covariance, middle[:, :, None])[:, :, 0]))
-        actual += list(np.sum(middle**2, axis=1))
-        predicted += list(np.trace(covariance, axis1=1, axis2=2))
-    if not nees:
-        return None
-    return Errors(np.array(nees), float(np.mean(actual)), float(np.mean(predicted)), apart)
+        n, step_s = len(stretch.time_s), float(np.median(np.diff(stretch.time_s)))
+        ahead = [max(1, round(h / step_s)) for h in horizons_s]
+        targets = [np.arange(max(first, a + 2) + a - 1, n) for a in ahead]
+        every = []
+        for strengths in draws:
+            factor = stretch.factor(strengths)
+            every.append([_ahead(*factor, a, some) for a, some in zip(ahead, targets, strict=True)])
+        for k, (a, some) in enumerate(zip(ahead, targets, strict=True)):
+            if len(some):
+                errors, covariances = (np.array([one[k][part] for one in every]) for part in (0, 1))
+                middle = errors.mean(axis=0)
+                apart = np.einsum("dni,dnj->nij", errors - middle, errors - middle) / len(draws)
+                found[k].append((middle, covariances.mean(axis=0) + apart, -(-len(some) // a)))
+    return [_errors(parts) if parts else None for parts in found]
 
 
-def _ahead(stretch: Stretch, strengths: FloatArray, ahead: int, targets: np.ndarray) -> tuple[FloatArray, FloatArray]:
-    """Errors (n, 3) of the blocks ``targets`` (n,) and their covariances (n, 3, 3) under one set of strengths."""
-    L, w = stretch.factor(strengths)
+def _errors(parts: Sequence[tuple[FloatArray, FloatArray, int]]) -> Errors:
+    """Errors (n, 3), their covariances (n, 3, 3) and numbers of starts without overlap of all stretches as one."""
+    error, covariance = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    nees = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[:, :, None])[:, :, 0])
+    predicted = float(np.trace(covariance, axis1=1, axis2=2).mean())
+    return Errors(nees, float(np.sum(error**2, axis=1).mean()), predicted, sum(part[2] for part in parts))
+
+
+def _ahead(L: FloatArray, w: FloatArray, ahead: int, targets: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Errors (n, 3) of the blocks ``targets`` (n,) and their covariances (n, 3, 3), by a factor of the covariance."""
     errors, covariances = np.empty((len(targets), 3)), np.empty((len(targets), 3, 3))
     for k, j in enumerate(targets):
         known, last = 3 * (j - ahead + 1), 3 * j + 3

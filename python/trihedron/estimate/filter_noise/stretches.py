@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron._core import ReferenceBlocks
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.filter_noise.stretch import BLOCK_ENDS, TRIANGLE_ENDS, Stretch, accumulated, neighbours, walked
+from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, neighbours, parts_of_walk, walked
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.ranges import edges_of
@@ -99,8 +99,8 @@ def _angle_stretch(table: dict[str, FloatArray], at: slice, h: float, centre: Fl
     start = np.tile(START_RAD * np.eye(3), (m, 1))
     columns = np.hstack([table["columns"][at].reshape(3 * m, -1), start])
     steps = bias_steps(table["bias"][at])
-    quiet, shaken = np.full(m, h), h * table["power"][at]
-    noise, vibration = (accumulated(q, BLOCK_ENDS) for q in (quiet, shaken))
+    walk, power = parts_of_walk(m, is_triangle=False), table["power"][at]
+    noise, vibration = (accumulated(walk, h * q) for q in (np.ones(m), power))
     return Stretch(
         time_s=time,
         observed=table["angle"][at].ravel(),
@@ -111,7 +111,8 @@ def _angle_stretch(table: dict[str, FloatArray], at: slice, h: float, centre: Fl
         bias_steps=steps,
         tilts=None,
         attitude=table["attitude"][at],
-        power=table["power"][at],
+        power=power,
+        walk=walk,
     )
 
 
@@ -187,9 +188,8 @@ def _velocity_stretch(
     start, upward = np.tile(np.eye(3) * SIZES["start"], (m, 1, 1)), since[:, None, None] * np.eye(3) * SIZES["up"]
     columns = np.concatenate([scale, bias * SIZES["b"], upward, start, arm], axis=2).reshape(3 * m, -1)
     steps = bias_steps(bias)
-    quiet = np.full(m, h)
-    shaken = 0.5 * h * (vibration[1:] + vibration[:-1])
-    noise, shakes = (accumulated(q, TRIANGLE_ENDS) for q in (quiet, shaken))
+    walk = parts_of_walk(m + 1, is_triangle=True)
+    noise, shakes = (accumulated(walk, h * q) for q in (np.ones(m + 1), vibration))
     # An attitude error e changes the specific force by e x f; its integral is a velocity error.
     across = between(np.einsum("ijk,nk->nij", LEVI_CIVITA, world))
     return Stretch(
@@ -203,8 +203,8 @@ def _velocity_stretch(
         tilts=np.diff(across, axis=0, prepend=0.0),
         # Attitude at the edge between two blocks.
         attitude=C[n - 1 : m * n : n],
-        power=vibration[1:],
-        ends=TRIANGLE_ENDS,
+        power=vibration,
+        walk=walk,
     )
 
 
@@ -213,7 +213,7 @@ def _of_white_attitude(stretch: Stretch, white_rad: float) -> FloatArray:
     assert stretch.tilts is not None
     m = len(stretch.tilts)
     per_block = np.einsum("kij,klj->il", stretch.tilts, stretch.tilts) / m * white_rad**2
-    return np.kron(accumulated(np.ones(m), TRIANGLE_ENDS), per_block)
+    return np.kron(accumulated(stretch.walk, np.ones(len(stretch.power))), per_block)
 
 
 def _differences(samples: FloatArray, n: int) -> FloatArray:

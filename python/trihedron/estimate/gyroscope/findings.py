@@ -11,7 +11,7 @@ from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
+from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc, stdtrit
 from trihedron.records import (
     PARAMETER_NAMES,
     Finding,
@@ -28,6 +28,8 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radian
 
 MAX_SCALE_RATIO = 1.5
 """Ratio to the nominal scale above which the unit or the rate is wrong: MEMS gyros are within 10 % of data sheets."""
+ONE_FACTOR = 0.01
+"""Probability that three scales which differ from axis to axis by chance look like one factor."""
 
 
 def findings_of(
@@ -66,14 +68,26 @@ def findings_of(
 
 
 def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
-    """Finding for a scale that contradicts the unit of the log: sample rate or unit is wrong by that factor."""
+    """Finding for a common scale that contradicts the unit of the log: unit, sampling rate or timestamps are wrong."""
     nominal = rate_to_si(raw_unit)
     if nominal is None:
         return
-    ratio = float(np.exp(np.mean(np.log(np.linalg.norm(S, axis=0) / nominal))))
-    if not np.isfinite(ratio) or 1.0 / MAX_SCALE_RATIO <= ratio <= MAX_SCALE_RATIO:
+    each = np.log(np.linalg.norm(S, axis=0) / nominal)
+    common, spread = float(np.mean(each)), float(np.std(each, ddof=1))
+    if not np.isfinite(common):
         return
-    yield Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=ratio, unit=raw_unit.value)
+    if abs(common) > np.log(MAX_SCALE_RATIO):
+        yield Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=np.exp(common), unit=raw_unit.value)
+    # Sensitivities differ from axis to axis; what all three have in common and data sheets exclude may be the time.
+    elif abs(common) > WEAK and abs(common) > -stdtrit(2, ONE_FACTOR / 2.0) * spread / np.sqrt(3.0):
+        yield Finding.of(
+            FindingCode.SCALE_NOT_NOMINAL,
+            "gyro-common",
+            excess=np.expm1(common),
+            spread=spread,
+            nominal=WEAK,
+            unit=raw_unit.value,
+        )
 
 
 def handedness(S: FloatArray, S_accelerometer: FloatArray, recording: Recording | None = None) -> Iterator[Finding]:

@@ -185,6 +185,7 @@ def _observed(
     sigma = sensor.quality.sigma / gravity_m_s2
     design = PoseDesign.of(force / np.linalg.norm(force, axis=1)[:, None], sigma)
     observability = design.observability(float(np.median(sigma)))
+    outliers = [finding for finding in seen if finding.code is FindingCode.OUTLIER_POSE]
     weak = observability_findings(
         design,
         float(np.median(sigma)),
@@ -193,4 +194,4 @@ def _observed(
         anchor=START_RELATIVE,
         are_faces=are_six_faces(poses.mean),
     )
-    return observability, tuple(weak)
+    return observability, (*outliers, *weak)

@@ -109,10 +109,9 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
         "rate times force": FamilyWords(
             "turn about a level and about a vertical axis at the same rate", ("a drive frame bent by weight",)
         ),
-        "angular acceleration": FamilyWords(
-            "pivot about a fixed point, starting and stopping briskly, then smoothly", ("a lever arm",)
+        "scale": FamilyWords(
+            "repeat the session with a warm sensor, and log its temperature", ("a scale that follows the temperature",)
         ),
-        "force rate": FamilyWords("shake along one axis without turning"),
     }
 )
 """Words by family of variables, as defined in ``diagnose/relations``; other families have none."""

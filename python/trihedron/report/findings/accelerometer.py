@@ -39,6 +39,11 @@ ENTRIES = {
         _FACES_OR_POSES,
         numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
+    (Code.NOT_OBSERVABLE, "poses-uncertain", SERIOUS): Words(
+        "The orientations suffice, but the reading of a pose is uncertain by {measured_g:.2g %} of gravity.",
+        "Too coarse a resolution (few digits, or counts taken for another unit), or a sensor that is not still.",
+        "Write more digits or choose a smaller range, check the unit, and put the sensor down in every pose.",
+    ),
     (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
         "In some orientations gravity is predicted to {worst_prediction_g:.2g %} only (1 σ; measured in one pose to "
         "{measured_g:.2g %}); least certain: {weakest}.",
@@ -50,7 +55,7 @@ ENTRIES = {
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
         "The sensor was touched or not static in this pose, or a reading clipped.",
-        "Cut the rows of pose {pose} out of the log (`trihedron segment LOG` lists its times) and run again.",
+        "Cut the outlier poses out of the log (`trihedron segment LOG` lists their times) and run again.",
     ),
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_quadratic:?a quadratic nonlinearity|{is_cubic:?a cubic "

@@ -108,6 +108,15 @@ _VERIFIED = {
         "Few orientations or rotations: an error of the calibration that shows in others passes.",
         "Record 9 or more poses in different orientations, with rotations between them, and verify on that log.",
     ),
+    **{
+        (Code.CALIBRATION_IMPRECISE, case, WARNING): Words(
+            f"The {error} is {{times:.2g}} times that of this log's own calibration, cross-validated, yet within the "
+            "uncertainty of the calibration (p = {p:.1g}).",
+            "A calibration of few poses, or one whose biases return within a wide range.",
+            "Use this log's own calibration, which is more certain: `trihedron calibrate LOG`.",
+        )
+        for case, error in (("static", "gravity error in static poses"), ("moves", "tilt error after a rotation"))
+    },
     (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
         "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
@@ -117,7 +126,7 @@ _VERIFIED = {
     ),
 }
 
-_FORCE = "In quiet stretches the corrected |f| is {norm_m_s2:.5g} m/s²"
+_FORCE = "In quiet intervals the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
         "The gyro was excluded: the calibration contains no gyro.",
@@ -149,6 +158,13 @@ _USE = {
         "The scale or bias has changed since the calibration (temperature, shock, another range), or the unit is "
         "another one.",
         "Check it on this log: `trihedron verify FILE LOG`.",
+    ),
+    (Code.STATIC_FORCE, "scatter", WARNING): Words(
+        f"{_FORCE} and differs from stretch to stretch by {{sigma_m_s2:.2g}} m/s² (1 σ); gravity is "
+        "{gravity_m_s2:.5g} m/s².",
+        "The calibration is of another sensor or range, or the sensor was not still.",
+        "Test it on this log: `trihedron verify FILE LOG`.",
+        numbers=("share",),
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
         f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",

@@ -5,7 +5,7 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 ENTRIES = {
     (Code.FILTER_NOISE_STATIC, "", WARNING): Words(
         "No reference: N and K are those of this log's static intervals, without what vibration and motion add.",
-        "Static stretches and gravity show neither the heading nor what happens during motion.",
+        "Static intervals and gravity show neither the heading nor what happens during motion.",
         "Give the filter's own result, a tracker or a second unit with --reference MOTION.",
     ),
     (Code.FILTER_NOISE_STATIC, "doubted", SERIOUS): Words(

@@ -55,6 +55,13 @@ _MOVES = {
         "The log's time base or rate is wrong by that factor, or its unit is another one.",
         "Check --time-unit, --rate and --gyro-unit.",
     ),
+    (Code.SCALE_NOT_NOMINAL, "gyro-common", WARNING): Words(
+        "all three gyro scales are {excess:+.2g %} off in {unit:unit}; they agree within {spread:.1g %} (1 σ), and "
+        "data sheets allow about {nominal:.1g %}, axis by axis.",
+        "the sampling rate or the timestamps are off by that factor, which looks like the sensor's sensitivity.",
+        "If the log did not last as long as its timestamps say (a clock tells), they or the rate are wrong by "
+        "{excess:abs .2g %}: record again, or give --columns time=none and --rate.",
+    ),
     (Code.LEFT_HANDED, "gyro", WARNING): Words(
         "the gyro's axes as logged form a left-handed triad (det S < 0).",
         "a turn was stated in the wrong sense; or one documented gyro axis is reversed, or two are exchanged.",
@@ -104,7 +111,7 @@ _MOVES = {
         "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
         "times its noise, and is excluded.",
         "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
-        "Look at this move; repeat it.",
+        "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "

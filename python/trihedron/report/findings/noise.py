@@ -20,13 +20,13 @@ _LOG = {
     (Code.LOG_IMPACT, "", NOTE): Words(
         "{n_impacts:# short excursion} of up to {impact:abs .3g} {unit:unit}, the largest at {time_s:.1f} s.",
         "an impact on the table, a door, a lost or damaged reading.",
-        "They raise N and Q; these stretches are excluded.",
+        "They raise N and Q; these intervals are excluded.",
     ),
     (Code.LOG_MOTION, "", WARNING): Words(
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
         "motion, vibration or handling during a log that should be static.",
-        "They raise N; these stretches are excluded.",
+        "They raise N; these intervals are excluded.",
     ),
     (Code.LOG_MOTION, "throughout", SERIOUS): Words(
         "Events cover {share:.0f %} of the log, too much to exclude: it is disturbed throughout.",
@@ -46,7 +46,7 @@ _LOG = {
         "For B, K and R log at a constant temperature; `trihedron diagnose LOG` fits it.",
     ),
     (Code.LOG_TURNED, "", WARNING): Words(
-        "The unit was turned by {turn_rad:.2g !deg}°, and B, K and R contain the turn; the longest stretch "
+        "The unit was turned by {turn_rad:.2g !deg}°, and B, K and R contain the turn; the longest interval "
         "in one direction is {start_s:.0f} to {stop_s:.0f} s.",
         "it was turned over, or its support tilted, during a log that should be static.",
         "For B, K and R take one direction alone, with"
@@ -59,7 +59,7 @@ _LOG = {
         lines={"axes": "{v0:axis} by {v1:.3g} {v2:unit}, {v3} times, every {v4:.2g} s"},
     ),
     (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
-        "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
+        "{n_stretches:# interval} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
         "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
     ),

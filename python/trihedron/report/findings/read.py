@@ -33,13 +33,13 @@ _UNITS = {
         "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit:unit}."
     ),
     (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
-        "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
+        "The accelerometer has no interval without missing readings to determine its unit; taken as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
         numbers=("static_norm",),
     ),
     (Code.UNIT_ASSUMED, "no-gravity", WARNING): Words(
-        "The accelerometer reads {static_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
+        "The accelerometer reads {static_norm:.4g} in its quietest intervals, which is gravity in no known unit; taken "
         "as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,

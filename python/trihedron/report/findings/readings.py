@@ -2,7 +2,7 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_LIMIT = "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# stretch})"
+_LIMIT = "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# interval})"
 ENTRIES = {
     (Code.DEVICES_INTERLEAVED, "", SERIOUS): Words(
         "Rows alternate between the readings of {n} devices, and no column identifies them.",

@@ -17,8 +17,8 @@ ENTRIES = {
     ),
     (Code.REFERENCE_APART, "", WARNING): Words(
         "From {start_s:.0f} to {end_s:.0f} s of the log the reference deviates from the remaining log.",
-        "A tracker that lost its markers or was re-initialised, or a stretch that was computed otherwise.",
-        "Look at the reference's own quality flags there, or leave the stretch out.",
+        "A tracker that lost its markers or was re-initialised, or an interval that was computed otherwise.",
+        "Look at the reference's own quality flags there, or leave the interval out.",
     ),
     (Code.REFERENCE_MISFIT, "", WARNING): Words(
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "

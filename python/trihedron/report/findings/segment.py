@@ -52,6 +52,12 @@ ENTRIES = {
         "Motors run, as in a flight or a drive.",
         "Record static poses with the motors off; for noise in motion: `trihedron noise LOG --reference MOTION`.",
     ),
+    (Code.POSES_VIBRATE, "held", WARNING): Words(
+        "the sensor was not still in its poses; the gyro's means scatter as by noise of {density:.2g °/s}/√Hz, "
+        "more than any sensor's.",
+        "The sensor was held in the hand or stood on a support that shakes.",
+        "Put the sensor down in every pose and record again: the motion makes S and b less certain.",
+    ),
     (Code.SLOW_TURN, "", NOTE): Words(
         "{turning_s:.1f} s are static to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} "
         "s; taken as moving.",

@@ -1,0 +1,58 @@
+"""Gravity error of a calibration: ``|S a' + b| - |g|`` of static readings, and its expected size."""
+
+import math
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.channel_facts.limits import TO_SIGMA
+from trihedron.quantiles import median
+from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
+from trihedron.sensor_model import correct, norms, other_form
+
+FAR_FROM_GRAVITY = 0.2
+"""Relative difference of the corrected |f| at rest from gravity that is no error of a calibration: before one, MEMS
+parts are within 10 % of their data sheet."""
+OFF_GRAVITY, SIGMAS = 0.01, 5.0
+"""Least relative difference that is stated as an error: |g| differs by 0.5 % between places, and the bias of a
+consumer part returns within 10 mg; and its least size in standard deviations."""
+
+
+def norm_error(
+    sensor: SensorCalibration, means: FloatArray, variance: FloatArray, gravity_m_s2: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """``|S a' + b| - |g|`` (n,) of mean readings (n, 3), its noise, and its noise with the calibration's uncertainty.
+
+    With ``u = f/|f|``: ``var = uᵀ S Σ Sᵀ u + J C Jᵀ``, ``J = (u ⊗ a', u)``.
+    """
+    norm, jacobian = norms(means, sensor.S, sensor.b)
+    noise = np.sum((jacobian[:, 9:] @ sensor.S) ** 2 * variance, axis=1)
+    model = np.einsum("ni,ij,nj->n", jacobian, sensor.covariance, jacobian)
+    return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
+
+
+def static_force(calibration: Calibration, norm_m_s2: float, force: FloatArray) -> Finding:
+    """The finding with the corrected |f| of quiet windows: a warning off gravity, serious far from it.
+
+    ``force`` (n, 3) is the mean of each window. Its standard deviation is the scatter of the windows, not of their
+    mean: in motion they share an acceleration.
+    """
+    sensor, gravity = calibration.accelerometer, calibration.gravity_m_s2
+    readings = correct(force, *other_form(sensor.S, sensor.b))
+    errors, _, model = norm_error(sensor, readings, np.zeros_like(force), gravity)
+    scatter = TO_SIGMA * median(np.abs(errors - median(errors)))
+    sigma = math.hypot(median(model), scatter)
+    share = norm_m_s2 / gravity - 1.0
+    case = "scatter" if scatter > OFF_GRAVITY * gravity else ""
+    if abs(share) > FAR_FROM_GRAVITY:
+        case = "far"
+    elif abs(share) > OFF_GRAVITY and abs(norm_m_s2 - gravity) > SIGMAS * sigma:
+        case = "off"
+    return Finding.of(
+        FindingCode.STATIC_FORCE,
+        case,
+        norm_m_s2=norm_m_s2,
+        gravity_m_s2=gravity,
+        share=share,
+        sigma_m_s2=sigma,
+    )
