@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import trihedron
 import trihedron.estimate.session.solved as solved_session
@@ -181,9 +182,9 @@ def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
     assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"
 
 
-def log(seed, size=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):
-    """Accelerometer (n, 3) of poses in random directions: a bias ``size`` that decays after moves, a ``drift`` [m/s²]
-    over the log, and supports that give way by ``tilt_rad``."""
+def log(seed, share=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):
+    """Accelerometer (n, 3) of poses in random directions: a ``share`` of each change of force that comes late, a
+    ``drift`` [m/s²] over the log, and supports that give way by ``tilt_rad``."""
     rng = np.random.default_rng(seed)
     up = rng.normal(size=(N_POSES, 3))
     up /= np.linalg.norm(up, axis=1)[:, None]
@@ -196,11 +197,11 @@ def log(seed, size=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):
         across /= np.linalg.norm(across)
         lean = tilt_rad * rng.choice([-1.0, 1.0]) * np.exp(-t / 1.5)
         rest = here * np.cos(lean) + across * np.sin(lean)
-        parts += [
-            9.81 * path / np.linalg.norm(path, axis=1)[:, None],
-            9.81 * rest + np.array(size) * np.exp(-t / tau_s),
-        ]
+        parts += [9.81 * path / np.linalg.norm(path, axis=1)[:, None], 9.81 * rest]
     force = np.concatenate(parts[1:])
+    keep = np.exp(-1.0 / (RATE_HZ * tau_s))
+    late = lfilter([1.0 - keep], [1.0, -keep], force - force[0], axis=0) + force[0]
+    force = force + np.array(share) * (late - force)
     force = force + drift * np.linspace(0.0, 1.0, len(force))[:, None] + NOISE * rng.normal(size=force.shape)
     time_s = np.arange(len(force)) / RATE_HZ
     return trihedron.Recording(time_s, force, None, RATE_HZ, accelerometer_unit="m/s^2")
@@ -213,17 +214,23 @@ def found(recording):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_bias_that_settles_has_its_size_and_marks_the_calibration(seed):
-    recording = log(seed, size=(0.05, 0.0, -0.03))
+def test_an_accelerometer_that_settles_after_rotations_is_found_and_its_calibration_is_of_the_settled_one(seed):
+    share = np.array([0.005, 0.001, 0.003])
+    recording = log(seed, share=share)
     one = found(recording)
     assert one is not None
-    size = np.array([one.numbers[f"{axis}_mg"] for axis in "xyz"]) * 9.81e-3
-    # The time constants tried are a factor of two apart: the size at the start is known to about a quarter.
-    assert np.abs(size - [0.05, 0.0, -0.03]).max() < 0.025
-    assert not trihedron.calibrate(recording, gravity_m_s2=9.81).is_trustworthy
+    size = 1e-2 * np.array([one.numbers[f"{axis}_percent"] for axis in "xyz"])
+    # Beside its σ at one time constant, that of the time constant itself.
+    assert np.abs(size - share).max() < 0.04 * one.numbers["sigma_percent"] + 0.1 * share.max()
+    result = trihedron.calibrate(recording, gravity_m_s2=9.81)
+    lower = np.tril_indices(3)
+    z = (result.accelerometer.S - np.eye(3))[lower] / result.accelerometer.sigma_S[lower]
+    # Means that are not corrected put S_xx off by 0.1 %, seven standard errors.
+    assert np.abs(z).max() < 4.0
+    assert result.is_trustworthy
 
 
-def test_drift_noise_and_yielding_supports_are_no_settling_bias():
+def test_drift_noise_and_yielding_supports_are_no_settling_accelerometer():
     logs = [log(seed, drift=0.05, tilt_rad=2e-3 * (seed % 2)) for seed in range(100, 120)]
     # Each is a false alarm once in a thousand.
     assert sum(found(one) is not None for one in logs) == 0

@@ -167,7 +167,7 @@ def calibrate(
     findings = (
         *said,
         *recording.findings,
-        *_as_they_weigh(segments, calibration),
+        *_as_they_weigh(segments),
         *_of_fit(calibration, recording, segments),
     )
     return _result(calibration, _with_doubtful_columns(findings), segments, recording)
@@ -207,14 +207,10 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     return (*unless_seen(fitted, missing), *of_gyro, *missing)
 
 
-def _as_they_weigh(segments: Segments, calibration: Calibration) -> Found:
-    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it, that of
-    the bias where b is off by more than its uncertainty."""
-    sigma_mg = 1e3 * float(np.max(calibration.accelerometer.sigma_b)) / calibration.gravity_m_s2
+def _as_they_weigh(segments: Segments) -> Found:
+    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it."""
 
     def is_grave(one: Finding) -> bool:
-        if one.code is FindingCode.BIAS_SETTLING:
-            return one.numbers["mean_mg"] > sigma_mg
         return one.code is FindingCode.POSE_SETTLING and one.numbers["poses"] > MOST_SETTLING * segments.n_poses
 
     return tuple(replace(one, severity=Severity.SERIOUS) if is_grave(one) else one for one in segments.findings)

@@ -219,7 +219,8 @@ def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
     )
     poses = tuple(_moved_pose(pose, place, kept) for pose in segments.poses)
     moves = tuple(Move(m.index, m.pose_before, m.pose_after, place(m.start), place(m.stop)) for m in segments.moves)
-    return recording, replace(segments, poses=poses, moves=moves)
+    as_read = None if segments.as_read is None else replace(segments.as_read, poses=poses, moves=moves)
+    return recording, replace(segments, poses=poses, moves=moves, as_read=as_read)
 
 
 def _moved_pose(pose: Pose, place: Any, kept: int) -> Pose:

@@ -146,7 +146,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
     of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.rejected)
-    domains = (*_disagreeing(judge_rows(plain.fitted, alpha), settles), *of_samples)
+    domains = _disagreeing((*judge_rows(plain.fitted, alpha), *of_samples), settles)
     notify(0.3, "letting effects compete")
     bare = hypothesis(observed.obs, observed.fitted.state, prior)
     found = search(bare, alpha)
@@ -159,8 +159,10 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     answer = Answer(
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
-    rows = _disagreeing(judge_rows(judged.fitted, alpha), settles)
-    remaining = with_relations((*rows, *_explained(answer, of_samples)), found.related)
+    if "accel-hysteresis" in answer.ids:
+        settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
+    rows, inside = (_disagreeing(some, settles) for some in (judge_rows(judged.fitted, alpha), of_samples))
+    remaining = with_relations((*rows, *_explained(answer, inside)), found.related)
     if not answer.ids:
         domains = remaining  # nothing was added to the linear model: one judgement of it
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
@@ -171,7 +173,7 @@ def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[F
     a bias settles inside the poses, with p-values: the noise of their means had absorbed it."""
     context = Context(predicted)
     biases = [one for one in predicted.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
-    shown: dict[Domain, float] = {"static-accel": biases[0].numbers["p_value"]} if biases else {}
+    shown: dict[Domain, float] = {"within-static": biases[0].numbers["p_value"]} if biases else {}
     found, limit = settling(context), threshold(alpha)
     if found is not None and found.of_bias >= limit:
         shown["static-gyro"] = math.exp(-0.5 * found.of_bias)

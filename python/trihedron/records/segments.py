@@ -99,6 +99,9 @@ class Segments(Presented):
         Unit vectors in raw units along which |f| grows fastest, and the standard error of the mean along them, NaN
         where only those of the axes are known: a settling body rotates gravity, which leaves |f| unchanged. None where
         the vertical is unknown.
+    as_read : Segments or None
+        The same with means and errors as they were read, where those of the accelerometer are without what its settling
+        after rotations adds; None where it does not settle.
 
     Examples
     --------
@@ -122,15 +125,17 @@ class Segments(Presented):
     whole: Segments | None = None
     accelerometer_up: FloatArray | None = None
     accelerometer_sigma_up: FloatArray | None = None
+    as_read: Segments | None = None
 
     def __post_init__(self) -> None:
         all_of("poses", self.poses, Pose)
         all_of("moves", self.moves, Move)
         all_of("findings", self.findings, Finding)
         kind_of("whole", self.whole, Segments, type(None))
+        kind_of("as_read", self.as_read, Segments, type(None))
         for field in fields(self):
             value = getattr(self, field.name)
-            is_array = field.name not in ("poses", "moves", "findings", "whole")
+            is_array = field.name not in ("poses", "moves", "findings", "whole", "as_read")
             if is_array and not (value is None and "None" in str(field.type)):
                 object.__setattr__(self, field.name, numbers_of(field.name, value))
         n = len(self.poses)

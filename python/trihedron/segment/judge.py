@@ -14,6 +14,7 @@ from trihedron.segment.floor import RangeEnd, is_cut
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import Run, means_of
+from trihedron.segment.settling import Settling
 from trihedron.units import rate_to_si
 
 CREEP_CHANCE = 1e-3
@@ -176,18 +177,15 @@ def judge_vibration(
     return [Finding.of(FindingCode.POSES_VIBRATE, "held", density=density)] if density > LARGEST_DENSITY else []
 
 
-def judge_bias(means: PoseMeans) -> list[Finding]:
-    """A bias that settles after moves: its size at their end, time constant, p-value."""
-    one = means.settling
-    if one is None:
-        return []
-    size, sigma = 1e3 * one.size, 1e3 * one.sigma
-    return [
-        Finding.of(
-            FindingCode.BIAS_SETTLING, x_mg=size[0], y_mg=size[1], z_mg=size[2], sigma_mg=sigma.max(), tau_s=one.tau_s,
-            mean_mg=float(np.linalg.norm(size)) * one.share, p_value=one.p_value, wait_s=3.0 * one.tau_s,
-        )
-    ]  # fmt: skip
+def judge_settling(one: Settling, means: PoseMeans) -> Finding:
+    """The share of a change of force that comes late, and its part in the means, in which it is no longer."""
+    share, sigma, force = 100.0 * one.share, 100.0 * one.sigma, means.mean[:, :3]
+    gravity = float(np.max(np.ptp(force, axis=0))) / 2.0
+    return Finding.of(
+        FindingCode.BIAS_SETTLING, x_percent=share[0], y_percent=share[1], z_percent=share[2],
+        sigma_percent=sigma.max(), tau_s=one.tau_s, p_value=one.p_value, wait_s=3.0 * one.tau_s,
+        mean_mg=1e3 / gravity * float(np.sqrt(np.mean(np.sum(one.mean**2, axis=1)))),
+    )  # fmt: skip
 
 
 def _start_s(recording: Recording, pose: Pose) -> float:

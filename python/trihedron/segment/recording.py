@@ -17,7 +17,7 @@ from trihedron.records.progress import Progress
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity, range_ends
-from trihedron.segment.judge import judge_bias, judge_log, judge_runs, judge_vibration, without_cut
+from trihedron.segment.judge import judge_log, judge_runs, judge_settling, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
@@ -33,9 +33,10 @@ from trihedron.segment.runs import (
     whole_windows,
     without_approaches,
 )  # fmt: skip
+from trihedron.segment.settling import Settling, find_settling
 from trihedron.segment.shaken import find_vibrating
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks, turning_blocks
-from trihedron.units import AccelerationUnit, rate_to_si
+from trihedron.units import AccelerationUnit, acceleration_to_si, rate_to_si
 
 LONG_S = 4.0
 """Duration of a quiet range whose central half still shows noise over seconds."""
@@ -133,6 +134,24 @@ def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
 def _describe(
     recording: Recording, channels: Channels, activity: Activity, runs: list[Run], turning: BoolArray
 ) -> Segments:
+    has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
+    settling = find_settling(channels, runs, has_unit=has_unit)
+    as_read = _averaged(recording, channels, activity, runs, turning, None)
+    if settling is None:
+        return as_read
+    settled = _averaged(recording, settling.channels, activity, runs, turning, settling)
+    return replace(settled, as_read=replace(as_read, findings=settled.findings))
+
+
+def _averaged(
+    recording: Recording,
+    channels: Channels,
+    activity: Activity,
+    runs: list[Run],
+    turning: BoolArray,
+    settling: Settling | None,
+) -> Segments:
+    """Segments of the ``channels``, which are without the settling if there is any."""
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
     noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
@@ -142,7 +161,10 @@ def _describe(
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
-    found += judge_bias(means) + judge_vibration(recording, channels, sigma, means, poses)
+    if settling is not None:
+        means = settling.without(means)
+        found.append(judge_settling(settling, means))
+    found += judge_vibration(recording, channels, sigma, means, poses)
     return _assemble(recording, poses, moves, sigma, means, tuple(found))
 
 

@@ -19,8 +19,10 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
     A disturbance inside a pose rotates the body; the mean over it contradicts the moves on both sides. Between the
     pieces of a cut pose the gyro carries the attitude like in any move.
 
-    ``whole`` of the result are the poses as they were found, each averaged over all of its samples.
+    ``whole`` of the result are the poses as they were found, each averaged over all of its samples. Means are as they
+    were read: a joint model names settling after rotations, and estimates it beside all other effects.
     """
+    segments = segments if segments.as_read is None else segments.as_read
     shortest = max(int(SHORTEST_PIECE_S * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
     was_disturbed = False

@@ -12,13 +12,12 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.BIAS_SETTLING, "", WARNING): Words(
-        "The accelerometer's bias settles after every move: at its end X, Y, Z are {x_mg:.2f}, {y_mg:.2f}, {z_mg:.2f} "
-        "mg (each ± {sigma_mg:.2f}) off, with a time constant of about {tau_s:.1f} s; on average over the poses "
-        "{mean_mg:.2f} mg.",
-        "The package or its adhesive creeps after a change of load, or the motion warmed the sensor.",
-        "Wait about {wait_s:.0f} s after every move before a pose counts.",
+        "The accelerometer settles after rotations: {x_percent:.3f}, {y_percent:.3f}, {z_percent:.3f} % (each ± "
+        "{sigma_percent:.3f}) of a change of force on X, Y, Z come late, with a time constant of about {tau_s:.1f} s. "
+        "The means of the poses, off by {mean_mg:.2f} mg rms, were corrected.",
+        "The package or its adhesive yields after a change of load.",
+        "S and b are those of the settled sensor: wait about {wait_s:.0f} s after a rotation before a reading counts.",
         numbers=("p_value",),
-        or_severity=SERIOUS,
     ),
     (Code.POSE_DISTURBED, "", NOTE): Words(
         "{disturbances:# short disturbance} in {poses:# otherwise static pose} (pose {which:first 8}), "
