@@ -57,7 +57,8 @@ def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried
     offered, missing = offered_beside(model, effects, ())
     price = price_of_choice(model, effects)
     terms = [term for effect in offered for term in terms_of(model, effect, price)]
-    return _best_of_each(terms, model.at_its_strengths(terms, PRIOR_SCALES), model.log_evidence), missing
+    asked = model.at_its_strengths(terms, PRIOR_SCALES)
+    return _best_of_each(terms, asked, model.log_evidence, is_stated=True), missing
 
 
 def candidates_beside(
@@ -84,16 +85,19 @@ def candidates_beside(
     return _best_of_each(terms, [*asked, *under], plain), missing
 
 
-def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float) -> list[Tried]:
-    """The best shape with a plausible size of every effect, best effect first."""
-    best: dict[str, Tried] = {}
+def _best_of_each(
+    terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float, *, is_stated: bool = False
+) -> list[Tried]:
+    """The best shape with a plausible size of every effect, best effect first; where it ``is_stated`` what a log says of
+    an effect also one without evidence whose size is none (a delay far from those that were tried)."""
+    best: dict[str, tuple[bool, float, Tried]] = {}
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.cost
-        known = best.get(term.effect.id)
         is_plausible = term.effect.is_plausible(term.variant, one.value, one.covariance)
-        if (known is None or score > known.score) and is_plausible:
-            best[term.effect.id] = Tried(term, score, one)
-    return sorted(best.values(), key=lambda one: -one.score)
+        rank = is_plausible, score, Tried(term, score, one)
+        if (is_plausible or (is_stated and score <= 0.0)) and rank[:2] > best.get(term.effect.id, (False, -np.inf))[:2]:
+            best[term.effect.id] = rank
+    return sorted((one for *_, one in best.values()), key=lambda one: -one.score)
 
 
 def offered_beside(

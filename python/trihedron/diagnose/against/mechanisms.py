@@ -100,8 +100,9 @@ def compare_effects(
 
     An effect of one side alone is missing or surplus where the other side's own estimate of it excludes its size;
     ``tried_on_model`` are the candidates of the simulation's own diagnosis. What a recording cannot show is not surplus
-    there, nor is an effect of one session (a disturbed pose, a table that was not level, the arm to the centre of
-    rotation), nor one that shows in a domain in which the recording has unexplained misfit: it may be hidden there.
+    there, unless it would be seen as a drift; nor is an effect of one session (a disturbed pose, a table that was not
+    level, the arm to the centre of rotation), nor one that shows in a domain in which the recording has unexplained
+    misfit: it may be hidden there.
     """
     of_session = {effect.id for effect in catalogue() if effect.of_session is None or effect.is_of_motion}
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
@@ -119,7 +120,7 @@ def compare_effects(
         replace(effect, side="model", share=None, statement=_only_there(effect, found.candidates))
         for effect in left
         if effect.id not in of_session
-        and _is_excluded(effect, found.candidates, alpha, if_not_tried=False)
+        and (_is_excluded(effect, found.candidates, alpha, if_not_tried=False) or _would_drift(effect, found))
         and not {seen.domain for seen in effect.held_out[:1]} & unexplained
     ]
     alike = [
@@ -170,6 +171,18 @@ def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: floa
              if p.unit in sigma and p.name not in names]  # fmt: skip
     differences = _parameters(effect.id, effect.parameters, (*one.size, *zeros), alpha)
     return not differences or any(p.significant for p in differences)
+
+
+def _would_drift(effect: AcceptedEffect, found: Diagnosis) -> bool:
+    """Whether an effect of a channel that the recording did not log, there a drift of the bias, would make more than all
+    of its residuals, and it does not drift."""
+    if all(one.applicable for one in found.candidates if one.id == effect.id):
+        return False
+    drift = f"{effect.id.partition('-')[0]}-bias-drift"
+    misses = {test.domain: test.rms for test in found.domains}
+    return drift not in {one.id for one in found.effects} and any(
+        seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
+    )
 
 
 def _is_free(effect: AcceptedEffect) -> bool:
