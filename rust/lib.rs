@@ -10,7 +10,6 @@ pub mod attitude;
 pub mod audit;
 pub mod autoregression;
 pub mod before_adc;
-pub mod bias_process;
 pub mod block_motion;
 pub mod chi_square;
 pub mod ellipsoid;

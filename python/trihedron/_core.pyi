@@ -631,17 +631,6 @@ class SessionFit:
     ) -> list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]: ...
     def jacobian(self) -> FloatArray: ...
 
-# bias_process
-def bias_process_grams(
-    columns: FloatArray,
-    variance: FloatArray,
-    time: FloatArray,
-    length: FloatArray,
-    pose: npt.NDArray[np.int64],
-    direction: FloatArray,
-    strengths: FloatArray,
-) -> tuple[FloatArray, FloatArray]: ...
-
 # sinusoid
 def sinusoid_power(
     time_s: FloatArray, readings: FloatArray, *, start_hz: float, step_hz: float, count: int

@@ -13,7 +13,6 @@ mod allan;
 mod arrays;
 mod attitude;
 mod audit;
-mod bias_process;
 mod binding;
 mod block_motion;
 mod chi_square;
@@ -80,7 +79,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     telegraph::register(module)?;
     timestamps::register(module)?;
     stillness::register(module)?;
-    bias_process::register(module)?;
     // The stub lists the names; a second list made at run time would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.api.reading import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open, nominal
-from trihedron.diagnose.static_log.answer import diagnose_static_log
+from trihedron.diagnose.static_log import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import LinearModel

@@ -125,7 +125,7 @@ def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acce
         parameters = effect.parameters(variant, value, covariance)
         columns = variant.distortion.force, variant.distortion.rate
         curves = () if effect.is_local else effect_curves(found.model.context, columns, value, covariance, residuals)
-        out.append(_record(
+        out.append(effect_record(
             effect, parameters, effect.statement(parameters), wald_p(value, covariance), found.scores[k],
             held_out_records(found.without[k], found.model), found.rivals[k], curves,
             variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
@@ -149,7 +149,9 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
         held = held_out_records(one.without, model)
         rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
         out.append(
-            _record(one.effect, one.parameters, one.statement, one.p_value, one.score, held, rivals, curves, **extra)
+            effect_record(
+                one.effect, one.parameters, one.statement, one.p_value, one.score, held, rivals, curves, **extra
+            )
         )
     return out
 
@@ -159,11 +161,11 @@ def _of_samples(answer: Answer) -> list[AcceptedEffect]:
     for one in answer.seen:
         said = one.evidence
         parameters = said.parameters if said.restate is None else said.restate(answer.numbers.context)
-        out.append(_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
+        out.append(effect_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
 
 
-def _record(
+def effect_record(
     effect: Effect,
     parameters: tuple[EffectParameter, ...],
     statement: str,
@@ -208,7 +210,7 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
     for key, one in found.tried.items():
         reason = words("relation-instead") if found.related.relations and one.score > 0.0 else ""
         reason = words("held-out-worse") if key in found.dropped else reason
-        out[key] = _candidate(one, found.against.get(key), reason)
+        out[key] = tried_candidate(one, found.against.get(key), reason)
     for key, bias in answer.asked.items():
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
@@ -221,7 +223,7 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
     return tuple(out[key] for key in sorted(out))
 
 
-def _candidate(one: Tried, against: str | None, reason: str) -> Candidate:
+def tried_candidate(one: Tried, against: str | None, reason: str) -> Candidate:
     term, asked = one.term, one.asked
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
     # A parameter reported in another unit (an angle for a direction) has no upper limit here.

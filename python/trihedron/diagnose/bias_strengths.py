@@ -14,11 +14,9 @@ from trihedron.diagnose.candidates import NEAR, Tried, price_of_choice
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
-from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.model import STATIC_ACCEL
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
@@ -78,20 +76,6 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     return sorted(named, key=lambda one: -one.gain), asked
 
 
-def that_poses_bear(model: Hypothesis) -> Hypothesis:
-    """The hypothesis, with biases of the accelerometer bounded to what the part's own noise explains where held-out
-    poses are predicted better so, by more than the standard error of their rms.
-
-    Biases that differ from pose to pose explain any error of rotations, more cheaply than a larger noise of these; but
-    then S and b are fitted to the rotations, at the cost of the poses.
-    """
-    bounded = again(model, model.terms, _bounded(model.obs, model.within, {(0, True), (0, False)}))
-    plain, free = (
-        physical_rms(one.fitted, one.prediction.innovation).get(STATIC_ACCEL, 0.0) for one in (bounded, model)
-    )
-    return bounded if free > plain * (1.0 + 1.0 / np.sqrt(2.0 * max(model.obs.n_poses, 1))) else model
-
-
 def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds:
     """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
@@ -122,7 +106,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
-    price = price_of_choice(other.unavailable(model.context) for other in catalogue())
+    price = price_of_choice(model, catalogue())
     return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, price, is_large)
 
 

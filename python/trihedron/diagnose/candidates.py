@@ -1,24 +1,31 @@
 """Every effect of the catalogue added to a hypothesis: which gain, how much, at which size and shape (eq. 11.19)."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
+from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import chdtrc
+from trihedron.threads import side_by_side
 
+WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
+"""Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
+best score on: one step predicts a large effect poorly."""
+N_RIVALS = 3
+"""Rivals fitted in full."""
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 RESCALED = (3.0, 0.3)
 """Factors on the prior width at which candidates are evaluated again."""
 N_LEADERS = 3
 """Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted."""
+AT_ONCE = 16
+"""Effects whose columns are computed together."""
 SHAPES_KEPT = 2
 """Shapes kept per effect, counted separately for those with a plausible and those with an implausible size."""
 NEAR = 6.0
@@ -45,18 +52,23 @@ def wald_p(value: FloatArray, covariance: FloatArray) -> float:
     return max(chdtrc(len(value), max(wald, 0.0)), TINY)
 
 
-def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
+def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
-    terms, missing = terms_beside(model, ())
-    return _best_of_each(terms, model.at_its_strengths(terms, PRIOR_SCALES), model.log_evidence), missing
+    offered, missing = offered_beside(model, effects, ())
+    price = price_of_choice(model, effects)
+    terms = [term for effect in offered for term in terms_of(model, effect, price)]
+    asked = model.at_its_strengths(terms, PRIOR_SCALES)
+    return _best_of_each(terms, asked, model.log_evidence, is_stated=True), missing
 
 
-def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
+def candidates_beside(
+    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]
+) -> tuple[list[Tried], dict[str, str]]:
     """Candidates to add to a hypothesis, best first, one per effect; and the reasons why others do not apply."""
-    terms, missing = terms_beside(model, exclude)
-    if not terms:
+    offered, missing = offered_beside(model, effects, exclude)
+    leading = _leaders(model, offered, price_of_choice(model, effects))
+    if not leading:
         return [], missing
-    leading = _leaders(model, terms)
     asked = model.with_added(leading)
     # Columns that depend on the size (a delay) are computed again for the fitted size.
     sized = {
@@ -73,59 +85,70 @@ def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list
     return _best_of_each(terms, [*asked, *under], plain), missing
 
 
-def _best_of_each(terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float) -> list[Tried]:
-    """The best shape with a plausible size of every effect, best effect first."""
-    best: dict[str, Tried] = {}
+def _best_of_each(
+    terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float, *, is_stated: bool = False
+) -> list[Tried]:
+    """The best shape with a plausible size of every effect, best effect first; where it ``is_stated`` what a log says of
+    an effect also one without evidence whose size is none (a delay far from those that were tried)."""
+    best: dict[str, tuple[bool, float, Tried]] = {}
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.cost
-        known = best.get(term.effect.id)
         is_plausible = term.effect.is_plausible(term.variant, one.value, one.covariance)
-        if (known is None or score > known.score) and is_plausible:
-            best[term.effect.id] = Tried(term, score, one)
-    return sorted(best.values(), key=lambda one: -one.score)
+        rank = is_plausible, score, Tried(term, score, one)
+        if (is_plausible or (is_stated and score <= 0.0)) and rank[:2] > best.get(term.effect.id, (False, -np.inf))[:2]:
+            best[term.effect.id] = rank
+    return sorted((one for *_, one in best.values()), key=lambda one: -one.score)
 
 
-def terms_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
-    """Every shape of every effect that applies and is not included; and the reasons why others do not apply."""
-    context = model.context
+def offered_beside(
+    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]
+) -> tuple[list[Effect], dict[str, str]]:
+    """The effects that apply and are not included; and the reasons why others do not apply."""
     held = {t.effect.id for t in model.terms if not t.effect.is_local} | set(exclude)
-    places = {(t.effect.id, t.variant.label) for t in model.terms}
-    reasons = {effect.id: effect.unavailable(context) for effect in catalogue()}
-    terms, missing = [], {key: reason for key, reason in reasons.items() if reason is not None and key not in held}
-    price = price_of_choice(reasons.values())
-    for effect in catalogue():
-        if effect.id in held or reasons[effect.id] is not None:
-            continue
-        variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
-        cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
-        # A shape that represents a family, a filter of any order, needs odds of twenty to one beside plain ones.
-        terms += [Term(effect, v, effect.sizes(context, v), cost + NEAR * v.is_family) for v in variants]
-    return terms, missing
+    reasons = {effect.id: effect.unavailable(model.context) for effect in effects}
+    missing = {key: reason for key, reason in reasons.items() if reason is not None and key not in held}
+    return [one for one in effects if one.id not in held and reasons[one.id] is None], missing
 
 
-def price_of_choice(reasons: Iterable[str | None]) -> float:
-    """Selection penalty of one effect, in twice a log-likelihood: 2 ln of the number of effects that apply. It is the
+def terms_of(model: Hypothesis, effect: Effect, price: float) -> list[Term]:
+    """Every shape of an effect; ``price`` is the correction for the choice among effects."""
+    context, places = model.context, {(t.effect.id, t.variant.label) for t in model.terms}
+    variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
+    cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
+    return [Term(effect, v, effect.sizes(context, v), cost) for v in variants]
+
+
+def price_of_choice(model: Hypothesis, effects: Sequence[Effect]) -> float:
+    """Selection penalty of one of some effects, in twice a log-likelihood: 2 ln of the number that apply. It is the
     same for all of them and independent of their order."""
-    return 2.0 * float(np.log(max(sum(reason is None for reason in reasons), 1)))
+    return 2.0 * float(np.log(max(sum(one.unavailable(model.context) is None for one in effects), 1)))
 
 
-def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
+def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list[Term]:
     """Candidates that gain most one linear step from the fit, at its noise strengths and others, at their best size."""
-    looks = model.gains(terms, PRIOR_SCALES)
-    gains = np.stack([look.gain for look in looks], axis=1)
-    possible = [_can_be(model, term, look) for term, look in zip(terms, looks, strict=True)]
-    kept: dict[int, int] = {}
-    for look in range(gains.shape[2]):
-        best = gains[:, :, look].max(axis=0)
+    kept: list[tuple[Term, bool, FloatArray]] = []
+    # A few at a time: the columns of all relations together need more memory than the log.
+    for first in range(0, len(offered), AT_ONCE):
+        terms = [term for effect in offered[first : first + AT_ONCE] for term in terms_of(model, effect, price)]
+        looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
+        kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in looks)])
+    scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
+    return [replace(term, sizes=term.sizes * scale) for (term, *_), scale in zip(kept, scales, strict=True)]
+
+
+def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, FloatArray]]:
+    """Those of some terms that lead at any strengths, by their gains (prior scales, strengths)."""
+    kept: dict[int, tuple[Term, bool, FloatArray]] = {}
+    for best in np.array([gain.max(axis=0) for *_, gain in seen]).T:
         count: Counter[tuple[str, bool]] = Counter()
         led: set[str] = set()
-        for k in np.argsort(-best).tolist():
-            shape = terms[k].effect.id, possible[k]
+        for k in np.argsort(-best, kind="stable").tolist():
+            shape = seen[k][0].effect.id, seen[k][1]
             if count[shape] < SHAPES_KEPT and (shape[0] in led or len(led) < N_LEADERS):
                 count[shape] += 1
                 led.add(shape[0])
-                kept.setdefault(k, int(gains[:, k, look].argmax()))
-    return [replace(terms[k], sizes=terms[k].sizes * PRIOR_SCALES[scale]) for k, scale in kept.items()]
+                kept[k] = seen[k]
+    return list(kept.values())
 
 
 def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
@@ -133,6 +156,27 @@ def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
     effect = term.effect
     is_plausible = effect.is_plausible(term.variant, look.value, look.covariance)
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
+
+
+def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
+    """The hypothesis with the best of the candidates near the first, each fitted in full."""
+    first = standing[0].score
+    near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
+    best: tuple[float, Hypothesis, Term] | None = None
+    for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
+        value, covariance = larger.value(len(larger.terms) - 1)
+        if not term.effect.is_plausible(term.variant, value, covariance):
+            continue
+        score = 2.0 * larger.log_evidence - term.cost
+        if best is None or score > best[0]:
+            best = score, larger, term
+    return (model, None) if best is None else best[1:]
+
+
+def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
+    term, known = as_fits_best(model, tried), model.fitted
+    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
+    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
 
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.

@@ -10,11 +10,10 @@ from scipy.special import ndtr
 
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
-from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds, that_poses_bear
+from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import DirectEffect
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
@@ -25,7 +24,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidde
 from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
-from trihedron.diagnose.search import Found, search, threshold
+from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
@@ -38,7 +37,6 @@ from trihedron.records.finding import FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
-from trihedron.session.noise import strengths_of_all
 
 
 def diagnose_recording(
@@ -147,45 +145,27 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
-    domains = _all_domains(plain.context, alpha, settles, observed.rejected)
+    of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.rejected)
+    domains = _disagreeing((*judge_rows(plain.fitted, alpha), *of_samples), settles)
     notify(0.3, "letting effects compete")
-    bare, found = _searched(observed, alpha)
-    # Effects hidden by another effect, or mistaken for it, are tested once more.
-    sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
-    more, _ = look(observed, found.model.context, alpha, start, sought)
-    if len(more.seen) > len(observed.seen):
-        observed = more
-        bare, found = _searched(observed, alpha)
+    bare = hypothesis(observed.obs, observed.fitted.state, prior)
+    found = search(bare, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
-    related = that_poses_bear(found.related.model)
-    biases, asked = bias_strengths(related, alpha)
+    biases, asked = bias_strengths(found.related.model, alpha)
     notify(0.9, "checking the unexplained part")
     judged = again(found.model, found.model.terms, noise_bounds(found.model.obs, tuple(one.effect for one in biases)))
-    numbers = with_shapes(renewed(again(found.model, found.model.terms, related.within)))
+    numbers = with_shapes(renewed(found.model))
     answer = Answer(
         plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
     )  # fmt: skip
-    named = {one.effect.id for one in observed.seen}
     if "accel-hysteresis" in answer.ids:
         settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
-    remaining = _all_domains(judged.context, alpha, settles, observed.rejected | (sought - named))
-    remaining = with_relations(accounted_for(answer, remaining), found.related)
+    rows, inside = (_disagreeing(some, settles) for some in (judge_rows(judged.fitted, alpha), of_samples))
+    remaining = with_relations((*rows, *_explained(answer, inside)), found.related)
     if not answer.ids:
         domains = remaining  # nothing was added to the linear model: one judgement of it
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
-
-
-LOUD = strengths_of_all(2.0, scatter=5.0, moves=5.0)
-
-
-def _searched(observed: Observed, alpha: float) -> tuple[Hypothesis, Found]:
-    obs, prior = observed.obs, observed.fitted.prior
-    first = hypothesis(obs, observed.fitted.state, prior)
-    # Two starts, low and high noise strengths: the evidence may have an optimum at each.
-    loud = hypothesis(obs, first.fitted.state, prior, strengths=LOUD)
-    bare = max(first, loud, key=lambda one: one.log_evidence)
-    return bare, search(bare, alpha)
 
 
 def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:
@@ -202,15 +182,6 @@ def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[F
     return predicted, shown
 
 
-def _all_domains(
-    context: Context, alpha: float, settles: Mapping[Domain, float], rejected: Collection[str]
-) -> tuple[DomainTest, ...]:
-    """Every domain's test; ``settles`` p-values of biases that settle, ``rejected`` ids of effects that did not improve
-    the prediction of held-out moves: jolts look like lost samples."""
-    rows, inside = judge_rows(context.fitted, alpha), judge_within_poses(context.obs, alpha)
-    return (*_disagreeing((*rows, inside), settles), _judge_timing(context, alpha, rejected))
-
-
 def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, float]) -> tuple[DomainTest, ...]:
     """The domains, where those of another test's ``p_values`` disagree: noise of any strength had absorbed it."""
     return tuple(
@@ -222,7 +193,10 @@ def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, floa
 
 
 def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:
-    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests."""
+    """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests.
+
+    ``rejected`` ids of effects that did not improve the prediction of held-out moves: jolts look like lost samples.
+    """
     value, spread, n = common_time_variance(context.obs)
     if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
@@ -240,21 +214,17 @@ def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> 
 
 # The verdict: which domains could be tested, which disagree still, and one word.
 
-SAMPLE_DOMAINS = ("within-static", "timing")
-"""Domains of the samples themselves, to which no parameter of the model is fitted."""
 POSE_DOMAINS = ("static-accel", "moves", "dynamics")
 """Domains that compare the model with gravity or zero velocity: without them nothing can contradict it."""
 LEAST_DOF = 1.0
 """Degrees of freedom below which the fit has used up a domain's rows."""
 
 
-def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """The domains, where those of the samples agree once an accepted effect explains their disagreement."""
+def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainTest]:
+    """The domains of the samples, which agree once an accepted effect explains their disagreement."""
     explained = {one.evidence.domain for one in answer.seen}
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
-    return tuple(
-        replace(d, disagrees=False) if d.domain in explained and d.domain in SAMPLE_DOMAINS else d for d in remaining
-    )
+    return [replace(d, disagrees=False) if d.domain in explained else d for d in of_samples]
 
 
 def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:

@@ -120,14 +120,9 @@ class Hypothesis:
         found = self.fitted.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
         return [AddedTerms(*one) for one in found]
 
-    def gains(
-        self, terms: Sequence[Term], scales: Sequence[float], parts: Sequence[Sequence[int]] | None = None
-    ) -> list[AtStrengths]:
-        """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times each of ``scales``.
-
-        With ``parts``, lists of column numbers, the gain of each of these subsets.
-        """
-        found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE], parts)
+    def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AtStrengths]:
+        """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times ``scales``."""
+        found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE])
         return [AtStrengths(*one) for one in found]
 
     def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
@@ -178,7 +173,7 @@ def hypothesis(
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
-    fitted = solved(obs, start, prior, distortion, strengths, within, sizes, has_free_strengths=True)
+    fitted = solved(obs, start, prior, distortion, strengths, within, sizes, is_scatter_free=True)
     return Hypothesis(tuple(terms), fitted, within)
 
 
@@ -202,7 +197,7 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
     for d, name in ROW_DOMAINS.items():
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
-        gain = float(np.log(rms_before[d] / max(rms_after[d], TINY)))
+        gain = float(np.log(max(rms_before[d], TINY) / max(rms_after[d], TINY)))
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
         left = float(now.chi2[d] / now.n_rows[d])
         before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2

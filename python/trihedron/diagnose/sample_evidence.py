@@ -50,14 +50,13 @@ class Observed:
 
 
 def look(
-    observed: Observed, context: Context, alpha: float, start: SessionState, only: Collection[str] = ()
+    observed: Observed, context: Context, alpha: float, start: SessionState
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations corrected for every effect that its own test detects, and the result of every test."""
-    held = {one.effect.id for one in observed.seen if not one.effect.is_local} | observed.rejected
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
-        if not isinstance(effect, DirectEffect) or effect.id in held or (only and effect.id not in only):
+        if not isinstance(effect, DirectEffect):
             continue
         reason = effect.unavailable(context)
         if reason is not None:

@@ -6,30 +6,30 @@ the shapes and effects tried. It is accepted above the threshold that the false-
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
-from trihedron.diagnose.candidates import NEAR, Tried, all_beside, as_fits_best, candidates_beside
+from trihedron.diagnose.candidates import (
+    N_RIVALS,
+    NEAR,
+    WORTH_FITTING,
+    Tried,
+    all_beside,
+    as_fits_best,
+    candidates_beside,
+    with_best,
+)
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis, without_each
+from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
 from trihedron.diagnose.relations.search import Related, related
-from trihedron.threads import side_by_side
 
-WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
-"""Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
-best score on: one step predicts a large effect poorly."""
-N_RIVALS = 3
-"""Rivals fitted in full."""
 N_SENSORS = 2
 """Processes that may be replaced by effects: one of either sensor."""
-MOST_EFFECTS = 4
-"""Largest number of mechanisms in one session; disturbed poses do not count."""
-MOST_STEPS = 8
-"""Largest number of effects and disturbed poses together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,195 +68,137 @@ def threshold(alpha: float) -> float:
     return float(-2.0 * np.log(2.0 * alpha))
 
 
-def search(base: Hypothesis, alpha: float) -> Found:
-    """The effects of a session: the best is added repeatedly, then each is removed or exchanged if that is better."""
-    found = _sought(_State(_Judged(base, ())), alpha)
+def search(base: Hypothesis, alpha: float, effects: Sequence[Effect] | None = None) -> Found:
+    """The effects of a session: the best of the catalogue, or of ``effects``, is added repeatedly, then each is removed
+    or exchanged if that is better."""
+    one = _Search(alpha, catalogue() if effects is None else effects)
+    found = one.concluded(one.added(base))
     for _ in range(N_SENSORS):
-        instead = _instead_of_a_process(found, alpha)
+        instead = one.instead_of_a_process(found)
         if instead is None:
             break
-        found = _sought(instead, alpha)
+        found = one.concluded(one.added(instead))
     return found
 
 
-def _sought(state: _State, alpha: float) -> Found:
-    drifts = {one.id for one in catalogue() if isinstance(one, BiasProcess)}
-    mechanisms = _added(state, alpha, drifts)
-    # Every hypothesis contains bias drift as a walk: a smooth curve is tried after the effects that explain more.
-    return _concluded(_added(mechanisms, alpha, {one.id for one in catalogue()} - drifts), alpha)
-
-
-def _instead_of_a_process(found: Found, alpha: float) -> _State | None:
-    """The hypothesis with an effect in place of a bias process that would be named, where that is likelier.
-
-    With such an effect the bias process is no stronger than the part's own noise explains.
-    """
-    model = found.model
-    tried = [one for one in found.tried.values() if not isinstance(one.term.effect, BiasProcess)]
-    tried = [one for one in tried if one.score > -WORTH_FITTING]
-    if not tried:
-        return None
-    for process in bias_strengths(model, alpha)[0]:
-        standing = explain_as_much(process, model, tried)
-        larger, chosen = _with_best(model, standing) if standing else (model, None)
-        if chosen is None:
-            continue
-        bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
-        judged = _Judged(bounded, without_each(bounded))
-        least = judged.without[-1]
-        is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.cost > -process.price
-        gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.cost
-        if is_likelier and gained > threshold(alpha) and bounded.is_shown(least, len(bounded.terms) - 1):
-            curve = found.tried.get(process.effect.id)
-            return _State(judged, rivals={} if curve is None else {chosen.effect.id: [curve]})
-    return None
-
-
-def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
-    """Add effects one at a time until none scores above the threshold; one that lowers no held-out rms is dropped."""
-    limit, judged = threshold(alpha), state.judged
-    tried, missing = candidates_beside(judged.model, exclude)
-    for _ in range(MOST_STEPS):
-        standing = [one for one in tried if one.score > limit and one.term.effect.id not in state.dropped]
-        if not standing or sum(not t.effect.is_local for t in judged.model.terms) >= MOST_EFFECTS:
-            break
-        larger, chosen = _with_best(judged.model, standing)
-        if chosen is None:
-            break
-        if not larger.is_shown(judged.model, len(larger.terms) - 1):
-            state.dropped.add(chosen.effect.id)
-            continue
-        judged = _Judged(larger, (*judged.without, judged.model))
-        others = [one for one in standing if one.term.effect is not chosen.effect]
-        state.rivals[chosen.effect.id] = others[:N_RIVALS]
-        state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
-        tried, missing = candidates_beside(judged.model, exclude)
-    if judged is not state.judged:
-        state.tried.clear()  # these were tried beside another hypothesis
-    state.tried.update({one.term.effect.id: one for one in reversed(tried)})
-    state.missing.update(missing)
-    return replace(state, judged=judged)
-
-
-def _concluded(state: _State, alpha: float) -> Found:
-    """Exchange every effect for the best of its rivals, and score all candidates beside the answer."""
-    judged = state.judged
-    if len(judged.model.terms) > 1:
-        judged = _pruned(judged.model, threshold(alpha))
-    swapped, named = _swapped(judged, state.rivals)
-    if swapped is not judged.model:
-        judged = _pruned(swapped, threshold(alpha))
-    judged, beside = _beside_relations(judged, threshold(alpha))
-    model = judged.model
-    tried, missing = all_beside(model)
-    # Results with noise strengths refitted replace those at the strengths of the answer.
-    beside_it = {one.term.effect.id: one for one in tried} | (state.tried if model is state.judged.model else {})
-    held = {term.effect.id for term in model.terms}
-    return Found(
-        model, beside, beside_it,
-        {key: other for key, other in state.against.items() if other in held and key not in held}, missing,
-        frozenset(state.dropped),
-        tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
-        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
-    )  # fmt: skip
-
-
-def _beside_relations(judged: _Judged, limit: float) -> tuple[_Judged, Related]:
-    """Relations without a mechanism; an effect that does not score beside them is dropped where relations in its place
-    explain clearly more than it does."""
-    best = related(judged.model, limit)
-    if not best.relations:
-        return judged, best
-    alone = best.score - sum(one.score for one in best.relations)
-    for k, fewer in enumerate(judged.without):
-        terms = best.model.terms
-        without = again(best.model, [*terms[:k], *terms[k + 1 :]])
-        beside = 2.0 * (best.model.log_evidence - without.log_evidence) - terms[k].cost
-        if beside > limit and not best.has_own_likelihood:
-            continue
-        other = related(fewer, limit)
-        if other.names == best.names:
-            beside = best.score - other.score
-        if other.relations and other.score > alone + NEAR and beside <= limit:
-            return _beside_relations(_pruned(fewer, limit), limit)
-    return judged, best
-
-
 @dataclass(frozen=True, eq=False)
-class _Judged:
-    """A hypothesis, and the hypotheses without each of its terms."""
+class _Search:
+    """A search among ``effects``; ``dropped`` are ids of those that lower no held-out rms."""
 
-    model: Hypothesis
-    without: tuple[Hypothesis, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """State of the search: its hypothesis, ids dropped, rivals of every term, candidates last tried."""
-
-    judged: _Judged
+    alpha: float
+    effects: Sequence[Effect]
     dropped: set[str] = field(default_factory=set)
-    rivals: dict[str, list[Tried]] = field(default_factory=dict)
-    against: dict[str, str] = field(default_factory=dict)
-    tried: dict[str, Tried] = field(default_factory=dict)
-    missing: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def limit(self) -> float:
+        return threshold(self.alpha)
 
-def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
-    """The hypothesis with the best of the candidates near the first, each fitted in full."""
-    first = standing[0].score
-    near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
-    best: tuple[float, Hypothesis, Term] | None = None
-    for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
-        value, covariance = larger.value(len(larger.terms) - 1)
-        if not term.effect.is_plausible(term.variant, value, covariance):
-            continue
-        score = 2.0 * larger.log_evidence - term.cost
-        if best is None or score > best[0]:
-            best = score, larger, term
-    return (model, None) if best is None else best[1:]
+    def added(self, model: Hypothesis) -> Hypothesis:
+        """The hypothesis with effects added one at a time until none scores above the threshold."""
+        drifts = {one.id for one in self.effects if isinstance(one, BiasProcess)}
+        # Every hypothesis contains bias drift as a walk: a smooth curve is tried after the effects that explain more.
+        for exclude in (drifts, {one.id for one in self.effects} - drifts):
+            larger: Hypothesis | None = model
+            while larger is not None:
+                model, larger = larger, self._with_one_more(larger, exclude)
+        return model
 
+    def _with_one_more(self, model: Hypothesis, exclude: Collection[str]) -> Hypothesis | None:
+        """The hypothesis with the best effect that lowers a held-out rms, or none."""
+        tried, _ = candidates_beside(model, self.effects, {*exclude, *self.dropped})
+        standing = [one for one in tried if one.score > self.limit]
+        while standing:
+            larger, chosen = with_best(model, standing)
+            if chosen is None or larger.is_shown(model, len(model.terms)):
+                return None if chosen is None else larger
+            self.dropped.add(chosen.effect.id)
+            standing = [one for one in standing if one.term.effect.id != chosen.effect.id]
+        return None
 
-def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term, known = as_fits_best(model, tried), model.fitted
-    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
-    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
+    def instead_of_a_process(self, found: Found) -> Hypothesis | None:
+        """The hypothesis with an effect in place of a bias process that would be named, where that is likelier.
 
+        With such an effect the bias process is no stronger than the part's own noise explains.
+        """
+        model = found.model
+        tried = [one for one in found.tried.values() if not isinstance(one.term.effect, BiasProcess)]
+        tried = [one for one in tried if one.score > -WORTH_FITTING]
+        for process in bias_strengths(model, self.alpha)[0] if tried else ():
+            standing = explain_as_much(process, model, tried)
+            larger, chosen = with_best(model, standing) if standing else (model, None)
+            if chosen is None:
+                continue
+            bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
+            least = again(bounded, bounded.terms[:-1])
+            is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.cost > -process.price
+            gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.cost
+            if is_likelier and gained > self.limit and bounded.is_shown(least, len(model.terms)):
+                return bounded
+        return None
 
-def _pruned(model: Hypothesis, limit: float) -> _Judged:
-    """The hypothesis without terms that the others made redundant, the lowest score removed first."""
-    while True:
-        without = without_each(model)
-        scores = [
-            2.0 * (model.log_evidence - one.log_evidence) - term.cost if model.is_shown(one, k) else -np.inf
-            for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
-        ]
-        if not scores or min(scores) > limit:
-            return _Judged(model, without)
-        model = without[int(np.argmin(scores))]
+    def concluded(self, model: Hypothesis) -> Found:
+        """Remove effects that others made redundant, exchange each for the best of its rivals, and score all candidates
+        beside the answer."""
+        model, without = self._pruned(model)
+        swapped, rivals, against = self._swapped(model, without)
+        if swapped is not model:
+            model, without = self._pruned(swapped)
+        model, without, beside = self._beside_relations(model, without)
+        tried, missing = all_beside(model, self.effects)
+        # Results with noise strengths refitted replace those at the strengths of the answer.
+        tried += candidates_beside(model, self.effects, ())[0]
+        held = {term.effect.id for term in model.terms}
+        return Found(
+            model, beside, {one.term.effect.id: one for one in tried},
+            {key: other for key, other in against.items() if other in held and key not in held}, missing,
+            frozenset(self.dropped), tuple(2.0 * (model.log_evidence - one.log_evidence) for one in without), without,
+            tuple(rivals.get(term.effect.id, ()) for term in model.terms),
+        )  # fmt: skip
 
+    def _pruned(self, model: Hypothesis) -> tuple[Hypothesis, tuple[Hypothesis, ...]]:
+        """The hypothesis without terms that the others made redundant, the lowest score removed first; and without each
+        of the others."""
+        while True:
+            without = without_each(model)
+            scores = [
+                2.0 * (model.log_evidence - one.log_evidence) - term.cost if model.is_shown(one, k) else -np.inf
+                for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
+            ]
+            if not scores or min(scores) > self.limit:
+                return model, without
+            model = without[int(np.argmin(scores))]
 
-def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesis, dict[str, list[str]]]:
-    """Exchange every term for its best rival beside all others; and list the rivals that explain as much."""
-    model = judged.model
-    named: dict[str, list[str]] = {}
-    for k, without in enumerate(judged.without):
-        term = model.terms[k]
-        scored = [(2.0 * model.log_evidence - term.cost, model, term)]
-        for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
-            fitted = as_fits_best(without, other)
-            swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
-            if fitted.effect.is_plausible(fitted.variant, *swapped.value(k)):
-                scored.append((2.0 * swapped.log_evidence - fitted.cost, swapped, fitted))
-        _, model, chosen = max(scored, key=lambda one: one[0])
-        least = model.log_evidence - 0.5 * NEAR
-        named[chosen.effect.id] = [
-            t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect
-        ]
-    return model, named
+    def _swapped(
+        self, model: Hypothesis, without: Sequence[Hypothesis]
+    ) -> tuple[Hypothesis, dict[str, tuple[str, ...]], dict[str, str]]:
+        """Exchange every term for its best rival beside all others. By id: rivals that explain as much as a term, and
+        the term that stands in the place of a candidate."""
+        rivals: dict[str, tuple[str, ...]] = {}
+        against: dict[str, str] = {}
+        for k, fewer in enumerate(without):
+            term = model.terms[k]
+            scored = [(2.0 * model.log_evidence - term.cost, model, term)]
+            tried, _ = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms})
+            own = 2.0 * (model.log_evidence - fewer.log_evidence) - term.cost
+            for other in [one for one in tried if one.score > own - WORTH_FITTING][:N_RIVALS]:
+                fitted = as_fits_best(fewer, other)
+                changed = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
+                if fitted.effect.is_plausible(fitted.variant, *changed.value(k)):
+                    scored.append((2.0 * changed.log_evidence - fitted.cost, changed, fitted))
+            _, model, chosen = max(scored, key=lambda one: one[0])
+            least = model.log_evidence - 0.5 * NEAR
+            rivals[chosen.effect.id] = tuple(
+                t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect
+            )
+            against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
+        return model, rivals, against
 
-
-def _others(rivals: Iterable[Tried], held: set[str]) -> list[Tried]:
-    """Rivals that are not in the hypothesis and score near the first of them."""
-    free = [one for one in rivals if one.term.effect.id not in held]
-    return [one for one in free if one.score > free[0].score - WORTH_FITTING] if free else []
+    def _beside_relations(
+        self, model: Hypothesis, without: tuple[Hypothesis, ...]
+    ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
+        """Relations without a mechanism; an effect stays where it scores beside those that are found without it."""
+        best = related(model, self.limit)
+        for fewer in without if best.relations else ():
+            if best.score - related(fewer, self.limit).score <= self.limit:
+                return self._beside_relations(*self._pruned(fewer))
+        return model, without, best

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, terms_beside
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, offered_beside, price_of_choice, terms_of
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import DirectEffect, Effect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
-from trihedron.diagnose.search import MOST_EFFECTS, threshold
+from trihedron.diagnose.search import threshold
 from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.shared_effects import SharedCandidate, SharedEffect
@@ -49,17 +49,19 @@ class Information:
         return cls(gain - 0.5 * float(slope @ np.linalg.solve(posterior, slope)) + float(odds), slope, precision)
 
     @property
-    def known(self) -> tuple[FloatArray, FloatArray]:
-        """Eigenvalues and eigenvectors of the precision for the directions that this recording determines."""
-        values, vectors = np.linalg.eigh(self.precision)
-        keeps = values > KNOWN * max(float(values[-1]), TINY)
-        return values[keeps], vectors[:, keeps]
+    def inverse(self) -> FloatArray:
+        """Inverse of the precision over the directions that this recording determines."""
+        return np.asarray(np.linalg.pinv(self.precision, rcond=KNOWN, hermitian=True))
+
+    @property
+    def rank(self) -> int:
+        """Number of these directions."""
+        return round(float(np.trace(self.inverse @ self.precision)))
 
     @property
     def peak(self) -> float:
-        """``slope·precision⁻¹·slope`` over the determined directions."""
-        values, vectors = self.known
-        return float(((vectors.T @ self.slope) ** 2 / values).sum())
+        """``slope·precision⁻¹·slope`` over these directions."""
+        return float(self.slope @ self.inverse @ self.slope)
 
 
 def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatArray, FloatArray]:
@@ -75,7 +77,7 @@ def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatAr
 def agreement(parts: Sequence[Information]) -> float:
     """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
     whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
-    dof = sum(len(one.known[0]) for one in parts) - len(whole.known[0])
+    dof = sum(one.rank for one in parts) - whole.rank
     return chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0)) if dof > 0 else 1.0
 
 
@@ -144,7 +146,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
     names: set[str] = set()
     while True:
         tried = _tried(held.models, names)
-        if not tried or tried[0].score <= limit or held.n_added >= MOST_EFFECTS:
+        if not tried or tried[0].score <= limit:
             return held, tried
         best = tried[0]
         names.add(best.effect.id)
@@ -175,8 +177,11 @@ def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
 
 def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Joint]:
     """Effects that can be added to the hypotheses of all recordings, best first, one shape each."""
-    ids = {one.id for one in catalogue() if not may_be_shared(one)} | set(exclude)
-    found = [{_key(t): t for t in terms_beside(m, ids)[0]} for m in models]
+    sought = [one for one in catalogue() if may_be_shared(one)]
+    found = []
+    for model in models:
+        offered, price = offered_beside(model, sought, exclude)[0], price_of_choice(model, catalogue())
+        found.append({_key(t): t for effect in offered for t in terms_of(model, effect, price)})
     common = [key for key in found[0] if all(key in one for one in found)]
     if not common:
         return []

@@ -27,9 +27,9 @@ def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
     return Words(ask("effect_words", effect_id, case, values))
 
 
-def experiment_for(effect_id: str, *, is_static: bool = False) -> Words:
+def experiment_for(effect_id: str) -> Words:
     """The recording that separates an effect from others; empty where the catalogue has none."""
-    return Words(ask("experiment", effect_id, is_static=is_static))
+    return Words(ask("experiment", effect_id))
 
 
 def why_not(name: str, /, **values: Any) -> Words:

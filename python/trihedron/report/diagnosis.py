@@ -41,7 +41,7 @@ from trihedron.report.diagnosis_words import (
     whole_verdict,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.effect_charts import alike, effect_chart, rest_panels
+from trihedron.report.effect_charts import alike, effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
@@ -308,8 +308,6 @@ def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _drawn_in_words(effect: AcceptedEffect) -> str:
-    if rest_panels(effect):
-        return "the bias of the log (dots: means of neighbouring intervals) and the curve that it follows"
     if not effect.curves:
         return "the residual without effects, and the part of it that all effects together explain"
     beside = any(len(one.data) for one in effect.curves)

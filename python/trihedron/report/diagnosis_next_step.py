@@ -104,7 +104,7 @@ def _in_the_next_log(diagnosis: Diagnosis) -> str:
     own = [one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings")]
     own = [one for one in own if one.id not in IN_FULL]
     shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
-    advice = ((one.id, experiment(one.id, is_static=False)) for one in shown)
+    advice = ((one.id, experiment(one.id)) for one in shown)
     return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
 
 

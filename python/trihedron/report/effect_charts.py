@@ -11,15 +11,11 @@ from trihedron.records.domains import DomainResiduals
 from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.names import channel_in_print
-from trihedron.report.numbers import SHOWN, plain_number, shown
+from trihedron.report.numbers import plain_number, shown
 from trihedron.units import degrees_from_radians
 
 HALF_WINDOW_S = 0.3
 """Half the interval [s] about an instant over which readings are averaged."""
-MOST = 200
-"""Most dots per axis of a static log; neighbours in time are averaged."""
-POWERS = ("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")
-"""Parameters of the polynomial of temperature, about the mean temperature of the log."""
 # Driving variable for the chart of effects that are not functions of a single variable.
 _FORCE = ("accel-saturation", "accel-hysteresis", "quantisation", "earth-rate")
 _RATE = (
@@ -37,10 +33,8 @@ def effect_chart(
 ) -> Chart | None:
     """Curves of an effect over the variable that drives it, with the data of poses; for one without such data also the
     residual that it explains over force, rate or time."""
-    of_static_log = rest_panels(effect)
-    panels = _curve_panels(effect.curves) or of_static_log
-    is_unseen = not of_static_log and not any(len(one.data) for one in effect.curves)
-    if is_unseen and (seen := _seen_in(effect, residuals)) is not None:
+    panels = _curve_panels(effect.curves)
+    if not any(len(one.data) for one in effect.curves) and (seen := _seen_in(effect, residuals)) is not None:
         drivers = _drivers(_driver(effect, seen), seen, recording, segments, calibration)
         panels += [_against(seen, label, unit, x) for label, unit, x in drivers]
     return Chart(tuple(panels), columns=min(3, len(panels))) if panels else None
@@ -106,7 +100,7 @@ def alike(effects: Sequence[AcceptedEffect], residuals: Sequence[DomainResiduals
     """Effects in groups of one picture: those without curves of their own share that of a residual over one driver."""
     groups: dict[tuple[str, str], list[AcceptedEffect]] = {}
     for effect in effects:
-        seen = None if effect.curves or rest_panels(effect) else _seen_in(effect, residuals)
+        seen = None if effect.curves else _seen_in(effect, residuals)
         key = (effect.id, "") if seen is None else (seen.domain, _driver(effect, seen))
         groups.setdefault(key, []).append(effect)
     return list(groups.values())
@@ -194,70 +188,3 @@ def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> P
             tips = [said(f"{seen.kind} {n}, model", float(v), unit) for n, v in enumerate(data - after, 1)]
             marks.append(Points(x, data - after, tips, None, f"{channel}: explained by the effects", colour, True))
     return Panel(Scale(label, unit_x), Scale(f"{seen.quantity} [{unit}]", unit), tuple(marks), height_px=220)
-
-
-def rest_panels(effect: AcceptedEffect) -> list[Panel]:
-    """Of a static log: bias about its mean and its polynomial of temperature, axis by axis, or its drift over time."""
-    variant, series = effect.model.get("variant"), effect.model.get("curve", {})
-    if variant == "static-curve" and "temperature_degc" in series:
-        return _over_temperature(effect)
-    return [_over_time(effect)] if variant == "static-drift" else []
-
-
-def _over_temperature(effect: AcceptedEffect) -> list[Panel]:
-    series = effect.model["curve"]
-    heat = np.asarray(series["temperature_degc"], dtype=np.float64)
-    values = np.asarray(series["value"], dtype=np.float64)
-    pose = np.asarray(series["pose"])
-    factor, unit = SHOWN.get(series["unit"], (1.0, "counts"))
-    about = float(heat.mean())
-    along = np.linspace(heat.min(), heat.max(), 80)
-    sizes = {one.name: one.value for one in effect.parameters}
-    at = _averaged(heat)
-    panels = []
-    for k, axis in enumerate(XYZ):
-        slopes = [sizes.get(f"{name}_{axis.lower()}", 0.0) for name in POWERS]
-        # Biases are relative to the mean of their orientation: add the mean of the curve there.
-        of_heat = _polynomial(heat - about, slopes)
-        mean = np.array([of_heat[pose == p].mean() for p in range(pose.max() + 1)])[pose]
-        dots = factor * _averaged(values[k] + mean - of_heat.mean())
-        curve = factor * (_polynomial(along - about, slopes) - of_heat.mean())
-        tips = [f"{said(axis, float(v), unit)} at {plain_number(float(t))} °C" for t, v in zip(at, dots, strict=True)]
-        marks: tuple[Mark, ...] = (
-            Level(y=0.0),
-            Points(at, dots, tips, None, f"{axis}: log", AXIS_COLOURS[k]),
-            Line(along, curve, "curve, at constant temperature", "ink"),
-        )
-        y = Scale(f"bias, about its mean [{unit}]", unit)
-        panels.append(
-            Panel(Scale("temperature [°C]", "°C"), y, marks, title=f"{_sensor_of(effect)} {axis}", height_px=220)
-        )
-    return panels
-
-
-def _over_time(effect: AcceptedEffect) -> Panel:
-    series = effect.model["curve"]
-    factor, unit = SHOWN.get(series["unit"], (1.0, "counts"))
-    time_s = np.asarray(series["time_s"], dtype=np.float64)
-    marks: list[Mark] = [Level(y=0.0)]
-    for k, axis in enumerate(XYZ):
-        value, half = (factor * np.asarray(series[name][k], dtype=np.float64) for name in ("value", "sigma"))
-        marks.append(Band(time_s, value - TWO_SIGMA * half, value + TWO_SIGMA * half, "2 σ of the curve"))
-        marks.append(Line(time_s, value, axis, AXIS_COLOURS[k]))
-    y = Scale(f"bias, about its mean [{unit}]", unit)
-    return Panel(Scale("time [s]", "s"), y, tuple(marks), title=_sensor_of(effect), height_px=220)
-
-
-def _sensor_of(effect: AcceptedEffect) -> str:
-    return "gyro" if effect.id.startswith("gyro") else "accelerometer"
-
-
-def _polynomial(apart: FloatArray, slopes: list[float]) -> FloatArray:
-    return np.asarray(apart[:, None] ** np.arange(1, len(slopes) + 1) @ np.array(slopes))
-
-
-def _averaged(values: FloatArray) -> FloatArray:
-    """(..., m) means of neighbours of (..., n), m no more than ``MOST``."""
-    starts = np.unique(np.linspace(0, values.shape[-1], MOST, endpoint=False).astype(int))
-    counts = np.diff([*starts, values.shape[-1]])
-    return np.asarray(np.add.reduceat(values, starts, axis=-1) / counts)

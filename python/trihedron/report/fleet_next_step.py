@@ -36,7 +36,7 @@ def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[s
 def _remedy(summary: FleetSummary) -> list[tuple[str, str]]:
     """The commonest effect with what to record against it, where most devices have it."""
     common = [one for one in summary.effects[:1] if 2 * one.n_devices > summary.n_devices_diagnosed]
-    return [(one.id, said) for one in common if (said := experiment(one.id, is_static=False))]
+    return [(one.id, said) for one in common if (said := experiment(one.id))]
 
 
 def files_of(serial: str, summary: FleetSummary) -> str:

@@ -10,9 +10,8 @@ import numpy as np
 
 from trihedron.diagnose.accepted import HEADLINE
 from trihedron.diagnose.effects import by_id, catalogue
-from trihedron.probability import f_upper, ndtr
+from trihedron.probability import ndtr
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, ParameterDifference
-from trihedron.records.domains import Domain
 from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -99,26 +98,13 @@ def compare_effects(
 ) -> ComparedEffects:
     """Pair the effects of a model with those ``found`` in a recording, by id or by what was confounded with them.
 
-    Effects of one session (a disturbed pose, a table that was not level, the arm to the centre of rotation) are never
-    surplus. Nor is an effect that shows in a domain in which the recording has unexplained misfit: it may be hidden
-    there. An effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than
-    the rms of the recording's residuals before any effect; a scatter only beyond the chance difference of two draws.
-    ``tried_on_model``: candidates of the simulation's own diagnosis. An effect of the recording is not missing if the
-    simulation's own test calls it likely and no other effect there could be mistaken for it.
+    An effect of one side alone is missing or surplus where the other side's own estimate of it excludes its size;
+    ``tried_on_model`` are the candidates of the simulation's own diagnosis. What a recording cannot show is not surplus
+    there, unless it would be seen as a drift; nor is an effect of one session (a disturbed pose, a table that was not
+    level, the arm to the centre of rotation), nor one that shows in a domain in which the recording has unexplained
+    misfit: it may be hidden there.
     """
     of_session = {effect.id for effect in catalogue() if effect.of_session is None or effect.is_of_motion}
-    misses = {test.domain: test.rms for test in found.domains}
-    # An effect that the recording's own test calls likely, corrected for multiple testing, is not called surplus,
-    # even where it was not accepted.
-    tried = [c for c in found.candidates if c.applicable]
-    excluded = {c.id for c in tried if c.p_value is None or len(tried) * c.p_value > alpha}
-    not_logged = {c.id for c in found.candidates if not c.applicable}
-    drifts = excluded - {effect.id for effect in found.effects}
-    excluded |= {
-        effect.id
-        for effect in model
-        if effect.id in not_logged and by_id()[effect.id].drifts_as in drifts and _would_show(effect, misses)
-    }
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
     missing: list[AcceptedEffect] = []
     left = list(model)
@@ -127,44 +113,21 @@ def compare_effects(
         if partner is not None:
             left.remove(partner)
             pairs.append((partner, effect))
-        elif not _is_likely(effect, tried_on_model, model, alpha):
+        elif _is_excluded(effect, tried_on_model, alpha, if_not_tried=True):
             missing.append(effect)
     unexplained = {test.domain for test in found.remaining if test.disagrees}
-    # Largest rms of a second draw of the recording's scatter.
-    by_chance = {
-        test.domain: test.rms * (math.sqrt(f_upper(test.dof, test.dof, alpha)) if test.dof >= 1.0 else 1.0)
-        for test in found.domains
-    }
     surplus = [
         replace(effect, side="model", share=None, statement=_only_there(effect, found.candidates))
         for effect in left
         if effect.id not in of_session
-        and effect.id in excluded
-        and _is_excluded(effect, tried, alpha)
-        and not _shows_in(effect) & unexplained
-        and (not by_id()[effect.id].is_spread or _would_show(effect, by_chance))
+        and (_is_excluded(effect, found.candidates, alpha, if_not_tried=False) or _would_drift(effect, found))
+        and not {seen.domain for seen in effect.held_out[:1]} & unexplained
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
     ]
     parameters = [p for m, r in alike for p in _parameters(m.id, m.parameters, r.parameters, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
-
-
-def _shows_in(effect: AcceptedEffect) -> set[Domain]:
-    """The domain that the effect improves most."""
-    return {seen.domain for seen in effect.held_out[:1]}
-
-
-def _is_likely(
-    effect: AcceptedEffect, tried: Sequence[Candidate], others: Sequence[AcceptedEffect], alpha: float
-) -> bool:
-    """Whether a log's own test, corrected for multiple testing, calls an effect likely that was not accepted there."""
-    applicable = [c for c in tried if c.applicable]
-    own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
-    # Any effect of the poses looks like a scatter until it is identified.
-    is_shown_otherwise = any(_shows_in(effect) & _shows_in(one) for one in others if not by_id()[one.id].is_spread)
-    return bool(own) and len(applicable) * own[0] < alpha and not is_shown_otherwise
 
 
 def is_footnote(effect: AcceptedEffect) -> bool:
@@ -184,13 +147,6 @@ def _is_beside(effect: AcceptedEffect) -> bool:
     return by_id()[effect.id].is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
 
 
-def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
-    """Whether an effect of this size makes some domain's residuals larger than all of the recording's."""
-    return any(
-        seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
-    )
-
-
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
     reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
     return effect_words(
@@ -198,19 +154,35 @@ def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
     )
 
 
-def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: float) -> bool:
-    """Whether the recording excludes the effect at the model's size: its own estimate differs.
+def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: float, *, if_not_tried: bool) -> bool:
+    """Whether a log's own estimate of an effect excludes its size; by the p-value where that has no size.
 
     Parameters that its best shape lacks (rows of a matrix) are 0 there, as uncertain as those that it has.
     """
-    one = next((c for c in tried if c.id == effect.id), None)
-    size = () if one is None else one.size
-    sigma = {p.unit: max(q.std for q in size if q.unit == p.unit) for p in size}
-    names = {p.name for p in size}
+    applicable = [c for c in tried if c.applicable]
+    one = next((c for c in applicable if c.id == effect.id), None)
+    if one is None:
+        return if_not_tried
+    if not one.size:
+        return one.p_value is None or len(applicable) * one.p_value > alpha
+    sigma = {p.unit: max(q.std for q in one.size if q.unit == p.unit) for p in one.size}
+    names = {p.name for p in one.size}
     zeros = [EffectParameter(p.name, 0.0, sigma[p.unit], p.unit) for p in effect.parameters
              if p.unit in sigma and p.name not in names]  # fmt: skip
-    differences = _parameters(effect.id, effect.parameters, (*size, *zeros), alpha)
+    differences = _parameters(effect.id, effect.parameters, (*one.size, *zeros), alpha)
     return not differences or any(p.significant for p in differences)
+
+
+def _would_drift(effect: AcceptedEffect, found: Diagnosis) -> bool:
+    """Whether an effect of a channel that the recording did not log, there a drift of the bias, would make more than all
+    of its residuals, and it does not drift."""
+    if all(one.applicable for one in found.candidates if one.id == effect.id):
+        return False
+    drift = f"{effect.id.partition('-')[0]}-bias-drift"
+    misses = {test.domain: test.rms for test in found.domains}
+    return drift not in {one.id for one in found.effects} and any(
+        seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
+    )
 
 
 def _is_free(effect: AcceptedEffect) -> bool:

@@ -110,6 +110,13 @@ class BiasDrift(BiasProcess):
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         return per_axis_parameters("range", size, std, self.unit), self.reported("walk", range=size)
 
+    def of_curve(
+        self, size: FloatArray, std: FloatArray, *, is_counts: bool
+    ) -> tuple[tuple[EffectParameter, ...], Words]:
+        """The same for a smooth curve in a log of one orientation, whose readings may be counts of unknown scale."""
+        case = "static-counts" if is_counts else "static"
+        return per_axis_parameters("range", size, std, self.unit), self.reported(case, range=size)
+
 
 class AccelBiasDrift(BiasDrift):
     """Accelerometer bias drift: seen in the norm of gravity from pose to pose."""

@@ -49,8 +49,7 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape parameters it was computed with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; the score corrects for their number.
-    ``scale`` converts a linear parameter to the reported unit. ``is_family`` marks a shape that represents a family (a
-    filter of any order and damping): a plain mechanism that explains as much is preferred.
+    ``scale`` converts a linear parameter to the reported unit.
     """
 
     distortion: Distortion
@@ -60,11 +59,10 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
-    is_family: bool = False
 
 
 class Effect:
-    id: ClassVar[str]
+    id: str = ""
     mechanism: ClassVar[str] = ""
     """Name of an effect from a user's own file; the texts of the built-in effects are in ``report/effects``."""
     experiment: ClassVar[str] = ""
@@ -88,8 +86,6 @@ class Effect:
     confounded_with: ClassVar[tuple[str, ...]] = ()
     """Ids of parameters whose value depends on the reference point of the effect: the bias at the session's mean
     temperature is not the bias at 25 °C."""
-    drifts_as: ClassVar[str] = ""
-    """Id of the effect that replaces it where its channel is not logged: without a temperature it is a bias drift."""
     is_of_true_motion: ClassVar[bool] = False
     """Whether its columns are functions of the true motion, not of the reading: derivatives of the reading invert a
     low-pass."""
@@ -196,8 +192,6 @@ class Evidence:
 class DirectEffect(Effect):
     """An effect detected by a test on the samples, with evidence of its own, not by columns over poses."""
 
-    is_sought_again: ClassVar[bool] = False
-    """Whether the test is repeated after the search: another effect may have hidden it or been mistaken for it."""
     is_proof: ClassVar[bool] = False
     """Whether the samples alone prove it (a range limit); otherwise its correction must improve held-out moves."""
 
@@ -217,12 +211,9 @@ def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: st
     return tuple(EffectParameter(name, float(v), float(s), unit) for name, v, s in named)
 
 
-def force_only(columns: FloatArray) -> Distortion:
-    return Distortion(columns, None)
-
-
-def rate_only(columns: FloatArray) -> Distortion:
-    return Distortion(None, columns)
+def acting_on(sensor: int, columns: FloatArray) -> Distortion:
+    """Columns (points, 3, k) that a sensor (0 accelerometer, 1 gyro) alone reads."""
+    return Distortion(None, columns) if sensor else Distortion(columns, None)
 
 
 def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
@@ -233,4 +224,4 @@ def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
         for one in values
     ]
     whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
-    return rate_only(whole) if sensor else force_only(whole)
+    return acting_on(sensor, whole)

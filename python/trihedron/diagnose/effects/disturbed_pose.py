@@ -1,24 +1,19 @@
 """A pose that was disturbed or not static: a property of the experiment, not of the sensor."""
 
-from dataclasses import replace
-
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import (
-    MIN_FALL,
     MOST_NAMED,
     DirectEffect,
     Evidence,
     Variant,
-    force_only,
+    acting_on,
     per_axis,
 )
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
-from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit, predict_held_out
+from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
@@ -26,8 +21,6 @@ from trihedron.session.model import STATIC_ACCEL
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
-MUST_FALL = 0.9
-"""Largest share of a domain's held-out chi-square per row that may remain after cutting the disturbances."""
 OWN_SIGMA = 4.0
 """Deviation of a pose's own readings, in sigma, from which a disturbance of it is considered."""
 BUMP_SIGMA = 7.0
@@ -71,27 +64,6 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     middle = np.hstack(inside)[~outer] if (~outer).any() else np.hstack(inside)
     before, after = float(np.mean(middle**2)), float(np.mean(np.hstack(outside) ** 2))
     return HeldOut("within-static", before, after, float(np.sqrt(before)), float(np.sqrt(after)), "sigma")
-
-
-def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
-    """Held-out prediction with whole poses against poses cut at their disturbances; empty if cutting does not help."""
-    obs, state = context.obs, context.fitted.state
-    if len(state.effect):
-        return ()
-    whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
-    start = whole.at_means(state.gravity, state.accel_S, state.accel_b, state.gyro_S)
-    start = replace(start, strengths=state.strengths)
-    fits = (fit(whole, start, context.fitted.prior), context.fitted)
-    before, after = (predict_held_out(one) for one in fits)
-    gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
-    if gain.max() < MIN_FALL or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
-        return ()
-    was, now = physical_rms(fits[0], before.residual), physical_rms(fits[1], after.residual)
-    return tuple(
-        HeldOut(ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), was[d], now[d], ROW_UNITS[d])
-        for d in np.argsort(-gain)
-        if d in was and d in now
-    )
 
 
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
@@ -146,9 +118,7 @@ class DisturbedPose(DirectEffect):
         seen = [(span, bump) for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None]
         bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
         disturbed = list(bumps)
-        held = _gained_by_cutting(context) if disturbed else ()
-        if disturbed:
-            held = (*held, max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before))
+        held = (max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before),) if disturbed else ()
         restless, predicted = _restless(obs)
         if len(restless) > MOST * obs.n_poses:
             restless = []
@@ -180,7 +150,7 @@ class DisturbedPose(DirectEffect):
             (name,) = context.obs.pose_names([int(i)])
             # Numbered as in the recording, from 1: an earlier pose may have been cut at a disturbance.
             shape = {"pose": (float(name.removeprefix("pose ")) if name.startswith("pose ") else i + 1.0, "number")}
-            out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
+            out.append(Variant(acting_on(0, columns), per_axis("push"), ("m/s^2",) * 3, shape, name))
         return out
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
+from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
@@ -78,7 +78,7 @@ class EarthRate(Effect):
         attitude = context.pose_attitude
         attitude = np.where(np.isfinite(attitude), attitude, 0.0)
         names = ("horizontal_x", "horizontal_y", "vertical")
-        return [Variant(rate_only(context.between_poses(attitude)), names, ("rad/s",) * 3)]
+        return [Variant(acting_on(1, context.between_poses(attitude)), names, ("rad/s",) * 3)]
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         # The length of Earth rate is known: any other vector is another effect.

@@ -4,7 +4,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import GYRO, Effect, Variant, on_axes, per_axis, rate_only
+from trihedron.diagnose.effects.contract import GYRO, Effect, Variant, acting_on, on_axes, per_axis
 from trihedron.records.words import why_not
 
 LEAST_RATE = 1e-3
@@ -26,10 +26,10 @@ class GyroGSensitivity(Effect):
         unit = "(rad/s)/(m/s^2)"
         columns = np.einsum("kij,nj->nik", np.eye(9).reshape(9, 3, 3), context.force)
         names = tuple(f"G_{i}{j}" for i in AXES for j in AXES)
-        whole = Variant(rate_only(columns), names, (unit,) * 9)
+        whole = Variant(acting_on(1, columns), names, (unit,) * 9)
         # One gyro axis of three may have it, or show it.
         rows = [
-            Variant(rate_only(columns[:, :, 3 * k : 3 * k + 3]), names[3 * k : 3 * k + 3], (unit,) * 3, label=axis)
+            Variant(acting_on(1, columns[:, :, 3 * k : 3 * k + 3]), names[3 * k : 3 * k + 3], (unit,) * 3, label=axis)
             for k, axis in enumerate(AXES)
         ]
         return [whole, *rows]

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import DirectEffect, Effect, Evidence, Variant, force_only, per_axis_parameters
+from trihedron.diagnose.effects.contract import DirectEffect, Effect, Evidence, Variant, acting_on, per_axis_parameters
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
@@ -90,4 +90,4 @@ class AccelSizeEffect(Effect):
             sides.append(axes[:, j, None] * along[:, None, :])
         columns = np.concatenate(sides, axis=2)
         names = tuple(f"r{j + 1}{axis}-r1{axis}" for j in (1, 2) for axis in AXES)
-        return [Variant(force_only(columns), names, ("m",) * 6)]
+        return [Variant(acting_on(0, columns), names, ("m",) * 6)]

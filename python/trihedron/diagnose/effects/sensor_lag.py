@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, force_only, on_axes, per_axis, rate_only
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
@@ -41,7 +41,7 @@ class SensorLag(Effect):
     def variants(self, context: Context) -> list[Variant]:
         unit, out = FIRST_ORDER_S, []
         for sensor, slope in enumerate((context.force_rate, context.angular_acceleration)):
-            columns = (rate_only if sensor else force_only)(-unit * slope[:, :, None])
+            columns = acting_on(sensor, -unit * slope[:, :, None])
             name = SENSORS[sensor].label
             out.append(Variant(columns, (f"{name}_lag",), ("s",), label=name, scale=unit))
         for sensor, label in enumerate(("accelerometer, per axis", "gyro, per axis")):
@@ -76,8 +76,8 @@ def _second_order(context: Context, sensor: int, time_s: float, label: str) -> V
     step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
     twice = context.shifted(values, step) - 2.0 * values + context.shifted(values, -step)
     column = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
-    distortion = (rate_only if sensor else force_only)(column[:, :, None])
-    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s, is_family=True)
+    distortion = acting_on(sensor, column[:, :, None])
+    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s)
 
 
 class AccelGyroTimeOffset(Effect):
@@ -101,4 +101,4 @@ class AccelGyroTimeOffset(Effect):
 def _offset(context: Context, delay_s: float, label: str) -> Variant:
     """What a delay adds to readings: y(t) - y(t + δ)."""
     column = context.force - context.shifted(context.force, delay_s)
-    return Variant(force_only(column[:, :, None]), ("accelerometer_delay",), ("s",), label=label, scale=delay_s)
+    return Variant(acting_on(0, column[:, :, None]), ("accelerometer_delay",), ("s",), label=label, scale=delay_s)

@@ -21,8 +21,6 @@ MOST_ACROSS = 0.25
 """Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
 FEWEST_TURNS, NEARLY_ALL = 4, 0.7
 """Hand moves end near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
-P_LIMIT = 1e-4
-"""False-alarm rate of the χ² tests on a level table and on all angles together: none in 24 healthy sessions."""
 HALF_RIGHT_RAD = np.pi / 4
 """45°: a smaller angle is nearer to 0° than to 90°."""
 
@@ -68,8 +66,6 @@ class TableEffect(DirectEffect):
         return None if is_there else why_not("no-table-turns")
 
 
-FEWEST_TO_SCATTER = 3
-"""Rotations from which their scatter is used."""
 LEAST_SINE = 0.3
 """Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
 ORDINARY_DEG = 0.05
@@ -77,19 +73,15 @@ ORDINARY_DEG = 0.05
 
 
 def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
-    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise.
-
-    Neighbouring rotations share a pose, and a scatter of four values has an uncertainty of 40 %. It is widened so that
-    two standard errors of a t distribution cover as much as those of a normal one.
-    """
-    share = weights / weights.sum()
-    by_noise = float(np.sqrt((share**2 * noise**2).sum()))
-    n = len(values)
-    if n < FEWEST_TO_SCATTER:
+    """Standard error of a weighted mean of few values: the larger of that by their scatter and that by their noise, as
+    neighbouring rotations share a pose. Two standard errors cover as much as those of a normal distribution."""
+    share, n = weights / weights.sum(), len(values)
+    by_noise = float(np.sqrt(share**2 @ noise**2))
+    if n < 2:
         return by_noise
-    variance = float((share * (values - (share * values).sum()) ** 2).sum()) * n / (n - 1)
+    variance = float(share @ (values - share @ values) ** 2) * n / (n - 1)
     wider = float(stdtrit(n - 1, ndtr(2.0)) / 2.0)
-    return max(by_noise, wider * float(np.sqrt(variance * (share**2).sum())))
+    return max(by_noise, wider * float(np.sqrt(variance * (share @ share))))
 
 
 class TableTilt(TableEffect):
@@ -99,33 +91,31 @@ class TableTilt(TableEffect):
 
     def find(self, context: Context) -> Evidence | None:
         state, obs = context.fitted.state, context.obs
-        chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
+        found = []
         for turn in table_turns(context):
             before, after = obs.move_poses[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
-            if half < LEAST_SINE:
-                continue
-            change = state.up[after] - state.up[before]
-            variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
-            sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
-            chi2 += float(change @ change) / sigma**2
-            dof += 2
-            tilts.append(float(np.linalg.norm(change)) / (2.0 * half))
-            weights.append(half**2)
-            noises.append(sigma / (2.0 * half))
-        if dof == 0:
+            if half >= LEAST_SINE:
+                variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
+                sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
+                found.append((np.linalg.norm(state.up[after] - state.up[before]), sigma, 2.0 * half))
+        if not found:
             return None
-        p = float(chdtrc(dof, chi2))
-        tilt = float(np.degrees(np.average(tilts, weights=weights)))
-        scatter = _error_of_mean(np.degrees(tilts), np.array(weights), np.degrees(noises))
-        if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * scatter:
+        change, sigmas, gain = np.array(found).T
+        chi2, weights = float(((change / sigmas) ** 2).sum()), gain**2 / (gain**2).sum()
+        p, tilts = float(chdtrc(2 * len(found), chi2)), np.degrees(change / gain)
+        tilt = float(weights @ tilts)
+        error = _error_of_mean(tilts, gain**2, np.degrees(sigmas / gain))
+        if tilt < ORDINARY_DEG or tilt < 3.0 * error:
             return None
         return Evidence(
-            p, chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
+            p, chi2, (EffectParameter("tilt", tilt, max(error, 1e-4), "deg"),),
             self.reported("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip
 
 
+LEAST_RAD = 1e-3
+"""Error of an angle by the stop and the feet, a twentieth of a degree."""
 OFF_SIGMA = 4.0
 """Deviation in sigma from which a rotation is named: by chance one of 16 000."""
 
@@ -142,7 +132,7 @@ class TurnAngleError(TableEffect):
         chi2 = float((z**2).sum())
         p = float(chdtrc(len(z), chi2))
         bad = np.flatnonzero(np.abs(z) > OFF_SIGMA)
-        if p > P_LIMIT or len(bad) == 0:
+        if len(bad) == 0:
             return None
         names = context.obs.move_names([turns[k].move for k in bad])
         parameters = tuple(
@@ -169,20 +159,15 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
     quantum, scatter = context.obs.recording.facts.of("gyroscope").step, context.obs.segments.gyroscope_sigma
     assert scatter is not None
-    is_hidden = undithered_axes(quantum, scatter)
-    steps = np.where(is_hidden, quantum, 0.0) * np.linalg.norm(context.fitted.state.gyro_S, axis=0)
-    rounding = np.sqrt(UNIFORM) * float(steps.max())
-    axes = np.array(
-        [int(np.abs(context.fitted.state.up[context.obs.move_poses[turn.move][0]]).argmax()) for turn in turns]
+    steps = np.where(undithered_axes(quantum, scatter), quantum, 0.0) * np.linalg.norm(
+        context.fitted.state.gyro_S, axis=0
     )
+    up, moves = context.fitted.state.up, [context.moves[turn.move] for turn in turns]
+    axes = np.abs([up[context.obs.move_poses[turn.move][0]] for turn in turns]).argmax(axis=1)
     errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
-    sigmas = np.zeros(len(turns))
-    for k, turn in enumerate(turns):
-        where = context.moves[turn.move]
-        duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
-        # Inside one LSB that noise does not dither, the rate has one error throughout.
-        hidden = rounding * duration
-        sigmas[k] = np.sqrt(noise**2 * duration + hidden**2 + 1e-6)
+    lasts_s = np.array([context.time_s[where.stop - 1] - context.time_s[where.start] for where in moves])
+    # Inside one LSB that noise does not dither, the rate has one error throughout.
+    sigmas = np.sqrt(noise**2 * lasts_s + UNIFORM * (float(steps.max()) * lasts_s) ** 2 + LEAST_RAD**2)
     for axis in range(3):
         rows = axes == axis
         if rows.sum() < 2:

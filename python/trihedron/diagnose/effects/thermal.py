@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.records.words import why_not
@@ -44,24 +44,23 @@ class ThermalScale(Thermal):
 class AccelThermalScale(ThermalScale):
     id, sensor = "accel-thermal-scale", ACCELEROMETER
     confounded_with = ("accel-bias", "accel-scale")
-    drifts_as = "accel-bias-drift"
 
 
 class GyroThermalScale(ThermalScale):
     id, sensor = "gyro-thermal-scale", GYRO
     confounded_with = ("gyro-bias", "gyro-scale")
-    drifts_as = "gyro-bias-drift"
 
 
 class ThermalBias(Thermal):
-    """Bias linear or quadratic in temperature; with its rate of change, or with another branch while it cools."""
+    """Bias over temperature, with its rate of change, or with another branch while it cools."""
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         """Quadratic, rate and hysteresis terms change the bias by a third of what the linear term does."""
         assert context.temperature is not None
         swing, per_kelvin = float(np.ptp(context.temperature)), PER_KELVIN[self.sensor]
         beside = per_kelvin * swing / 3.0
-        by_name = {"bias_per_kelvin": per_kelvin, "bias_per_kelvin2": beside / swing**2, "half_gap": beside}
+        by_name = {"bias_per_kelvin": per_kelvin, "half_gap": beside}
+        by_name |= {f"bias_per_kelvin{k}": beside / swing**k for k in (2, 3)}
         if context.temperature_rate is not None:
             by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
         return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
@@ -70,18 +69,30 @@ class ThermalBias(Thermal):
         """Forward models, simplest first. Temperature is relative to its mean over the poses, its rate to 0."""
         assert context.temperature is not None
         t, speed, unit = context.temperature[:, None], context.temperature_rate, SENSORS[self.sensor].unit
-        beside = [("quadratic", "bias_per_kelvin2", f"{unit}/K^2", t**2)]
+        powers = [("bias_per_kelvin", t, f"{unit}/K"), ("bias_per_kelvin2", t**2, f"{unit}/K^2"),
+                  ("bias_per_kelvin3", t**3, f"{unit}/K^3")]  # fmt: skip
+        shapes = {"linear": powers[:1], "quadratic": powers[:2]}
         # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
-        is_fitted = context.obs.n_poses > 0
+        is_fitted, beside = context.obs.n_poses > 0, {}
         if speed is not None and (not is_fitted or _varies(speed)):
-            beside.append(("rate", "bias_per_kelvin_per_s", f"{unit}/(K/s)", speed[:, None]))
+            beside["rate"] = [("bias_per_kelvin_per_s", speed[:, None], f"{unit}/(K/s)")]
             if not is_fitted or (speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S):
-                beside.append(("hysteresis", "half_gap", unit, np.tanh(speed / BRANCH_K_S)[:, None]))
-        names, units = per_axis("bias_per_kelvin"), (f"{unit}/K",) * 3
-        return [Variant(on_axes(context, self.sensor, t), names, units, label="linear")] + [
-            Variant(on_axes(context, self.sensor, t, more), names + per_axis(name), units + (of,) * 3, label=label)
-            for label, name, of, more in beside
-        ]
+                beside["hysteresis"] = [("half_gap", np.tanh(speed / BRANCH_K_S)[:, None], unit)]
+        shapes |= {label: [*powers[:1], *more] for label, more in beside.items()}
+        if not context.moves:
+            # A log of a temperature cycle in one orientation shows more of the curve than S and b leave to a session.
+            beside |= {"rate, hysteresis": [*beside["rate"], *beside["hysteresis"]]} if len(beside) > 1 else {}
+            shapes |= {"cubic": powers}
+            shapes |= {f"{name}, {label}": [*powers[:n], *more] for label, more in beside.items()
+                       for name, n in (("quadratic", 2), ("cubic", 3))}  # fmt: skip
+        return [
+            Variant(
+                on_axes(context, self.sensor, *(values for _, values, _ in parts)),
+                tuple(name for symbol, *_ in parts for name in per_axis(symbol)),
+                tuple(of for *_, of in parts for _ in AXES), label=label,
+            )
+            for label, parts in shapes.items()
+        ]  # fmt: skip
 
 
 def _varies(speed: FloatArray) -> bool:
@@ -91,10 +102,8 @@ def _varies(speed: FloatArray) -> bool:
 class AccelThermalBias(ThermalBias):
     id, sensor = "accel-thermal-bias", ACCELEROMETER
     confounded_with = ("accel-bias",)
-    drifts_as = "accel-bias-drift"
 
 
 class GyroThermalBias(ThermalBias):
     id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
-    drifts_as = "gyro-bias-drift"

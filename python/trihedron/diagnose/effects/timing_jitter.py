@@ -35,7 +35,6 @@ class TimingJitter(DirectEffect):
 
     id = "timing-jitter"
     needs_moves = True
-    is_sought_again = True
 
     def find(self, context: Context) -> Evidence | None:
         value, spread, _ = common_time_variance(context.obs)

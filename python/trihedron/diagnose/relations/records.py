@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
+from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import NOT_TURNED, WORLD_VECTOR
@@ -12,38 +13,36 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.words import relation_experiment, relation_resembles, words
 
-OUT = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 WORLD_SIGMAS = 3.0
 """Standard uncertainties within which a coupling is that of Earth rate."""
 
 
 def records(found: Related) -> tuple[Relation, ...]:
     """Every relation with its coefficients and its held-out prediction of poses and moves, largest share first."""
-    models = [*found.steps[1:], found.model] if found.relations else []
+    models = [*(one.before for one in found.relations[1:]), found.model]
     first = len(found.model.terms) - len(found.relations)
     out = []
-    for k, (one, before, after) in enumerate(zip(found.relations, found.steps, models, strict=True)):
+    for k, (one, after) in enumerate(zip(found.relations, models[: len(found.relations)], strict=True)):
         value, covariance = found.model.value(first + k)
-        held = next((h for h in held_out_records(before, after) if h.domain == one.domain), None)
+        held = next((h for h in held_out_records(one.before, after) if h.domain == one.domain), None)
         # Share of the held-out sum of squares of its domain that the relation removes.
         left = 1.0 if held is None or not held.rms_before > 0.0 else held.rms_after / held.rms_before
         share = float(np.clip(1.0 - left**2, 0.0, 1.0))
-        made = _of_world_vector if one.signal.family == "world" else _of_signal
+        made = _of_world_vector if one.effect.family == "world" else _of_variables
         out.append(replace(made(one, value, covariance, share), held_out=held))
     return tuple(sorted(out, key=lambda relation: -relation.share))
 
 
-def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
-    signal, sigma = one.signal, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
+    effect, sigma = one.effect, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    axes = tuple(one.term.variant.label)
     # The column of poses without a known previous rotation is no coefficient of the relation.
-    told = [k for k, name in enumerate(signal.names) if name != NOT_TURNED]
-    size, error = (x.reshape(len(one.axes), -1)[:, told] for x in (value, sigma))
-    names = tuple(signal.names[k] for k in told)
-    out = OUT[signal.sensor]
-    units = [out if signal.units[k] == "1" else f"({out})/({signal.units[k]})" for k in told]
-    axes = tuple(AXES[a] for a in one.axes)
+    told = [k for k, name in enumerate(effect.names) if name != NOT_TURNED]
+    size, error = (x.reshape(len(axes), -1)[:, told] for x in (value, sigma))
+    names, out = tuple(effect.names[k] for k in told), SENSORS[effect.sensor].unit
+    units = [out if effect.units[k] == "1" else f"({out})/({effect.units[k]})" for k in told]
     return Relation(
-        sensor=signal.sensor,
+        sensor="gyroscope" if effect.sensor else "accelerometer",
         depends_on=names,
         form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)]),
         coefficients=tuple(
@@ -53,11 +52,11 @@ def _of_signal(one: Follows, value: FloatArray, covariance: FloatArray, share: f
         ),
         share=share,
         held_out=None,
-        resembles=relation_resembles(signal.family),
-        experiment=relation_experiment(signal.family),
+        resembles=relation_resembles(effect.family),
+        experiment=relation_experiment(effect.family),
         statement=words(
-            "relation-follows", sensor="gyro" if signal.sensor == "gyroscope" else signal.sensor,
-            is_static=not signal.is_motion, axes=axes, depends=names, share=share,
+            "relation-follows", sensor=SENSORS[effect.sensor].label, is_static=not effect.is_motion, axes=axes,
+            depends=names, share=share,
         ),
     )  # fmt: skip
 

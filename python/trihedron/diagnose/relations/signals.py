@@ -1,55 +1,76 @@
-"""Physical variables outside the catalogue that readings may depend on, as columns at every point (docs/relations.md).
+"""Physical variables outside the catalogue that readings may depend on, as effects without a mechanism
+(docs/relations.md).
 
 Variables of the catalogue's effects (temperature, supply, the square of an axis's own force) are not included: there
 the effect is the better explanation.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
+from trihedron.records.domains import Domain
 
-Sensor = Literal["accelerometer", "gyroscope"]
+ALL_AXES = (0, 1, 2)
 WORLD_VECTOR = "vector fixed in the world frame"
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
 """Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
-
-
-@dataclass(frozen=True, eq=False)
-class Signal:
-    """Variables that belong together: ``values`` (points, k), ``names`` and ``units`` (k,) as reported.
-
-    ``family`` selects the text of the experiment; ``is_motion`` marks variables that are zero in static poses.
-    """
-
-    sensor: Sensor
-    family: str
-    names: tuple[str, ...]
-    values: FloatArray
-    units: tuple[str, ...]
-    is_motion: bool = False
-
-
+ANY_BY_ANY = ("rate", HISTORY, "rate products")
+"""Families of vectors: three of their variables together may act on any axis."""
 Column = tuple[str, FloatArray, str]
 """Name, values (points,) and unit of one variable."""
 
 
-def signals(context: Context) -> list[Signal]:
-    """Every variable of this session, for both sensors; those present in poses minus their mean over the poses."""
+class Dependence(Effect):
+    """Dependence of a sensor on variables, without a mechanism: an effect that is in no catalogue.
+
+    ``names`` and ``units`` (k,) as reported, ``values`` (points, k). ``family`` selects the text of the experiment;
+    ``is_motion`` marks variables that are zero in static poses. ``axes`` are the sets of sensor axes that may depend on
+    them: parameters run over the axes, and for each over the names.
+    """
+
+    def __init__(
+        self, sensor: int, family: str, columns: Sequence[Column], *, is_motion: bool = False,
+        axes: Sequence[tuple[int, ...]] = ((0,), (1,), (2,), ALL_AXES),
+    ) -> None:  # fmt: skip
+        self.sensor, self.family, self.is_motion, self.axes = sensor, family, is_motion, axes
+        self.names, self.units = tuple(name for name, *_ in columns), tuple(unit for *_, unit in columns)
+        self.values = np.stack([values for _, values, _ in columns], axis=1)
+        self.id = f"{('accelerometer', 'gyroscope')[sensor]}: {', '.join(self.names)}"
+
+    @property
+    def domain(self) -> Domain:
+        """The domain of residuals in which it shows."""
+        if self.is_motion:
+            return "moves" if self.sensor else "dynamics"
+        return "static-gyro" if self.sensor else "static-accel"
+
+    def variants(self, context: Context) -> list[Variant]:
+        values = self.values if self.is_motion else self.values - self.values[: context.obs.n_poses].mean(axis=0)
+        out = []
+        for axes in self.axes:
+            own = (context.gyro_axes if self.sensor else context.accel_axes)[:, list(axes)]
+            columns = np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1)
+            names = tuple(f"{AXES[a]}: {name}" for a in axes for name in self.names)
+            units, label = self.units * len(axes), "".join(AXES[a] for a in axes)
+            out.append(Variant(acting_on(self.sensor, columns), names, units, label=label))
+        return out
+
+
+def dependences(context: Context) -> list[Dependence]:
+    """Every variable of this session, for both sensors, and vectors of three."""
     w, u = context.rate.T, context.force.T / context.fitted.state.gravity
     products, history, warming = _products("u", u, "g^2"), _history(context), _warming(context)
     rates: list[Column] = [(f"w_{AXES[a]}", w[a], "rad/s") for a in range(3)]
-    scale = _over_time("u", u, context.elapsed, "g")
     out = [
-        *_each("accelerometer", HISTORY, history), *_each("accelerometer", "temperature", warming),
-        *_each("accelerometer", "scale", scale),
-        *_each("accelerometer", "force", products), *_each("accelerometer", "rate", rates, is_motion=True),
-        *_each("accelerometer", "rate products", [("|w|^2", (w**2).sum(axis=0), "(rad/s)^2")], is_motion=True),
+        *_each(0, "scale", _over_time("u", u, context.elapsed, "g")),
+        *_each(0, HISTORY, history), *_each(0, "temperature", warming), *_each(0, "force", products),
+        *_each(0, "rate", rates, is_motion=True),
+        *_each(0, "rate products", [("|w|^2", (w**2).sum(axis=0), "(rad/s)^2")], is_motion=True),
     ]  # fmt: skip
     if context.obs.raw_rate is not None:
         own = [(f"u_{AXES[a]}^2", u[a] ** 2, "g^2") for a in range(3)]
@@ -60,21 +81,23 @@ def signals(context: Context) -> list[Signal]:
         previous = [(f"previous u_{AXES[a]}", before[a], "g") for a in range(3)]
         mixed = [(f"w_{AXES[a]} f_{AXES[b]}", w[a] * u[b], "rad/s g") for a in range(3) for b in range(3)]
         size = [("|w|", np.linalg.norm(w, axis=0), "rad/s")]
-        drifting = _over_time("w", w, context.elapsed, "rad/s")
         out += [
-            *_each("gyroscope", "scale", drifting, is_motion=True),
-            *_each("gyroscope", "force", [*products, *own]), *_each("gyroscope", "previous pose", previous),
-            *_each("gyroscope", HISTORY, history), *_each("gyroscope", "temperature", warming),
-            *_each("gyroscope", "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
-            *_each("gyroscope", "rate times force", mixed, is_motion=True),
-            *_each("gyroscope", "rate", size, is_motion=True),
+            *_each(1, "scale", _over_time("w", w, context.elapsed, "rad/s"), is_motion=True),
+            *_each(1, "force", [*products, *own]), *_each(1, "previous pose", previous), *_each(1, HISTORY, history),
+            *_each(1, "temperature", warming), *_each(1, "rate times force", mixed, is_motion=True),
+            *_each(1, "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
+            *_each(1, "rate", size, is_motion=True), *_world_vector(context),
         ]  # fmt: skip
-    h = context.obs.n_poses
-    return [_centred(one, h) for one in out if np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0).all()]
+    return [one for one in out if np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0.0).all()]
 
 
-def _each(sensor: Sensor, family: str, columns: Sequence[Column], *, is_motion: bool = False) -> list[Signal]:
-    return [Signal(sensor, family, (name,), v[:, None], (unit,), is_motion) for name, v, unit in columns]
+def _each(sensor: int, family: str, columns: Sequence[Column], *, is_motion: bool = False) -> list[Dependence]:
+    always = [one for one in columns if one[0] == NOT_TURNED and np.ptp(one[1]) > 0.0]
+    alone = [one for one in columns if one[0] != NOT_TURNED]
+    out = [Dependence(sensor, family, [one, *always], is_motion=is_motion) for one in alone]
+    three = range(0, len(alone) - 2, 3) if family in ANY_BY_ANY else ()
+    vectors = [[*alone[k : k + 3], *always] for k in three]
+    return out + [Dependence(sensor, family, one, is_motion=is_motion, axes=(ALL_AXES,)) for one in vectors]
 
 
 def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:
@@ -107,16 +130,16 @@ def _warming(context: Context) -> list[Column]:
     return [] if speed is None else [("dT/dt", speed, "K/s")]
 
 
-def world_vector(context: Context) -> FloatArray | None:
-    """(points, 3, 3) axes of the level frame in body coordinates: two horizontal ones, then the vertical one.
+def _world_vector(context: Context) -> list[Dependence]:
+    """Rates that depend on a vector fixed in the world frame, each gyro separately; none where a chain of moves is
+    broken.
 
-    ``None`` where a chain of moves is broken.
+    Its vertical part alone is a g-sensitivity, an effect of the catalogue: the horizontal parts must add to it.
     """
     attitude = context.pose_attitude
-    return context.between_poses(attitude) if np.isfinite(attitude).all() else None
-
-
-def _centred(signal: Signal, n_poses: int) -> Signal:
-    if signal.is_motion:
-        return signal
-    return replace(signal, values=signal.values - signal.values[:n_poses].mean(axis=0))
+    if not np.isfinite(attitude).all():
+        return []
+    # Axes of the level frame in body coordinates: two horizontal ones, then the vertical one.
+    seen = context.between_poses(attitude).reshape(context.n_points, 9).T
+    columns = [(f"{WORLD_VECTOR} {AXES[j]}{h}", seen[3 * j + h], "1") for j in range(3) for h in range(3)]
+    return [Dependence(1, "world", columns, axes=(ALL_AXES,))]

@@ -8,29 +8,28 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.relations.signals import Sensor, Signal
+from trihedron.diagnose.relations.signals import Dependence
 from trihedron.diagnose.session.observations import Observations
 
 TELEGRAPH = "telegraph"
 """Family of the variable."""
 
 
-def telegraphs(context: Context) -> Iterator[tuple[Signal, int, float]]:
-    """The likeliest path on each axis of each sensor that has both levels, that axis, and its score: twice the
-    log-likelihood that it gains over biases that scatter and drift, less the penalty of the choice among axes.
+def telegraphs(context: Context) -> Iterator[tuple[Dependence, float]]:
+    """The likeliest path on each axis of each sensor that has both levels, and its score: twice the log-likelihood that
+    it gains over biases that scatter and drift, less the penalty of the choice among axes.
 
     The score is that of the poses alone: in moves the signal switches at times that no column tells.
     """
-    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
-    sensors = sensors[: 1 if context.obs.raw_rate is None else 2]
-    for number, sensor in enumerate(sensors):
+    n_sensors = 1 if context.obs.raw_rate is None else 2
+    for sensor in range(n_sensors):
         for axis in range(3):
-            levels = _levels(context, number, axis)
+            levels = _levels(context, sensor, axis)
             if levels is not None:
                 state, gain = levels
-                column = context.between_poses(state - state.mean())[:, None]
-                signal = Signal(sensor, TELEGRAPH, ("a random telegraph signal",), column, ("1",))
-                yield signal, axis, 2.0 * (gain - float(np.log(3 * len(sensors))))
+                column = "a random telegraph signal", context.between_poses(state), "1"
+                score = 2.0 * (gain - float(np.log(3 * n_sensors)))
+                yield Dependence(sensor, TELEGRAPH, [column], axes=((axis,),)), score
 
 
 def _levels(context: Context, sensor: int, axis: int) -> tuple[FloatArray, float] | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -71,16 +72,13 @@ def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     return out
 
 
-N_BINS = 80
-"""Bins of a variable's range in which a column is taken as constant: the square of a force changes by 0.3 % in one."""
+N_SHOWN = 80
+"""Points of a curve."""
 LEAST_TOLD = 0.98
-"""Least share of a column's variance explained by its variable; a column of two variables leaves tenths."""
-STRAIGHT = 0.99
-"""Least share of a column along one direction: an effect on one sensor axis has all of it there."""
+"""Least share of a column's variance that its variable explains, and of it along one direction; a column of two
+variables leaves tenths."""
 LEAST_PART = 0.4
 """Component of gravity along an axis, relative to g, below which a pose does not determine that axis."""
-BEYOND = 0.1
-"""Extension of a curve beyond the poses, as a share of their range."""
 SIDES = (("accelerometer", "static-accel"), ("gyroscope", "static-gyro"))
 
 
@@ -92,6 +90,11 @@ class Driver:
     axis: int
     values: FloatArray
 
+    @cached_property
+    def order(self) -> IntArray:
+        """(points,) points by increasing value."""
+        return np.argsort(self.values, kind="stable")
+
 
 @dataclass(frozen=True, eq=False)
 class _Column:
@@ -101,12 +104,17 @@ class _Column:
     g: FloatArray
     direction: FloatArray
     driver: Driver
-    is_relative: bool
+    is_relative: bool = False
 
     @property
     def key(self) -> tuple[int, str, int, bool]:
         """Columns with this key are drawn as one curve."""
         return int(np.abs(self.direction).argmax()), self.driver.name, self.driver.axis, self.is_relative
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """The column as a function of its driver."""
+        order = self.driver.order[np.isfinite(self.g[self.driver.order])]
+        return np.interp(x, self.driver.values[order], self.g[order])
 
 
 def drivers(context: Context) -> list[Driver]:
@@ -138,7 +146,6 @@ def effect_curves(
     variable has no curve.
     """
     known = drivers(context)
-    by_domain = {one.domain: one for one in residuals}
     out = []
     for (sensor, domain), side in zip(SIDES, columns, strict=True):
         if side is None:
@@ -147,7 +154,7 @@ def effect_curves(
         for key in dict.fromkeys(one.key for one in found):
             group = [one for one in found if one.key == key]
             at = [one.parameter for one in group]
-            left = by_domain.get(domain)  # type: ignore[call-overload]
+            left = next((one for one in residuals if one.domain == domain), None)
             out.append(_curve(context, sensor, group, (value[at], covariance[np.ix_(at, at)]), left))
     return tuple(out)
 
@@ -157,13 +164,11 @@ def bias_curves(
 ) -> tuple[EffectCurve, ...]:
     """A bias random walk as curves over time: ``path`` (poses, 3) with standard uncertainties (3,), SI."""
     name, domain = SIDES[sensor]
-    h = context.obs.n_poses
+    h, time = context.obs.n_poses, Driver("time", 0, context.time_s)
     left = next((one for one in residuals if one.domain == domain), None)
-    time = Driver("time", 0, context.time_s)
     out = []
     for axis in range(3):
-        column = _Column(axis, np.zeros(context.n_points), np.eye(3)[axis], time, False)
-        poses, data = _of_poses(context, name, column, left)
+        poses, data = _of_poses(context, name, _Column(axis, time.values, np.eye(3)[axis], time), left)
         at = tuple(poses.tolist()), time.values[poses], data + path[poses, axis]
         curve = time.values[:h], path[:, axis], np.full(h, std[axis])
         out.append(EffectCurve(name, axis, "time", 0, False, *curve, *at))  # type: ignore[arg-type]
@@ -173,55 +178,31 @@ def bias_curves(
 def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: int) -> _Column | None:
     """The variable that a column (points, 3) is a function of, directly or as a share of the sensor's own reading."""
     _, strength, rows = np.linalg.svd(column, full_matrices=False)
-    if strength[0] <= 0.0 or strength[0] ** 2 < STRAIGHT * float(strength @ strength):
+    if strength[0] <= 0.0 or strength[0] ** 2 < LEAST_TOLD * float(strength @ strength):
         return None
     direction = rows[0] * np.sign(rows[0][np.abs(rows[0]).argmax()])
     g = column @ direction
     for driver in known:
-        if _is_determined(context, driver, g):
-            return _Column(k, g, direction, driver, False)
+        if _is_determined(driver, g):
+            return _Column(k, g, direction, driver)
     axis = int(np.abs(direction).argmax())
     for motion in (context.axis_force[:, axis], context.axis_rate[:, axis]):
-        part = np.where(
-            np.abs(motion) > LEAST_PART * np.abs(motion).max(), g / np.where(motion == 0.0, 1.0, motion), np.nan
-        )
+        size = np.abs(motion)
+        part = np.where(size > LEAST_PART * size.max(), g / np.where(motion == 0.0, 1.0, motion), np.nan)
         for driver in known:
-            if driver.name not in ("force", "rate") and _is_determined(context, driver, part):
-                return _Column(k, part, direction, driver, True)
+            if driver.name not in ("force", "rate") and _is_determined(driver, part):
+                return _Column(k, part, direction, driver, is_relative=True)
     return None
 
 
-def _range(context: Context, driver: Driver) -> tuple[float, float]:
-    """The range of the poses, slightly extended; the whole range of a variable that is constant in poses."""
-    posed = driver.values[: context.obs.n_poses]
-    low, high = float(posed.min()), float(posed.max())
-    if high - low <= 1e-6 * float(np.ptp(driver.values)):
-        return float(driver.values.min()), float(driver.values.max())
-    return low - BEYOND * (high - low), high + BEYOND * (high - low)
-
-
-def _bins(context: Context, driver: Driver, g: FloatArray) -> tuple[IntArray, IntArray]:
-    """Bin of every point (points,), -1 outside, and the number of points in each bin."""
-    low, high = _range(context, driver)
-    place = np.floor((driver.values - low) / max(high - low, 1e-300) * (N_BINS - 1e-9)).astype(np.intp)
-    place[~np.isfinite(g) | (place < 0) | (place >= N_BINS)] = -1
-    return place, np.bincount(place[place >= 0], minlength=N_BINS)
-
-
-def _means(place: IntArray, count: IntArray, values: FloatArray) -> FloatArray:
-    inside = place >= 0
-    return np.asarray(np.bincount(place[inside], values[inside], N_BINS) / np.maximum(count, 1))
-
-
-def _is_determined(context: Context, driver: Driver, g: FloatArray) -> bool:
-    """Whether a column is a function of a variable: almost none of its variance is within bins."""
-    place, count = _bins(context, driver, g)
-    inside = place >= 0
-    if inside.sum() < 2 * N_BINS or np.ptp(driver.values[inside]) <= 0.0:
-        return False
-    whole = float(np.var(g[inside]))
-    within = float(np.mean((g[inside] - _means(place, count, g)[place[inside]]) ** 2))
-    return whole > 0.0 and within < (1.0 - LEAST_TOLD) * whole
+def _is_determined(driver: Driver, g: FloatArray) -> bool:
+    """Whether a column is a function of a variable: points next to one another by its value, of as many as are shown,
+    hardly differ (von Neumann's ratio)."""
+    seen = g[driver.order]
+    seen = seen[np.isfinite(seen)]
+    seen = seen[:: max(len(seen) // N_SHOWN, 1)]
+    whole = float(np.var(seen)) if len(seen) >= N_SHOWN else 0.0
+    return whole > 0.0 and float(np.mean(np.diff(seen) ** 2)) < 2.0 * (1.0 - LEAST_TOLD) * whole
 
 
 def _curve(
@@ -233,23 +214,24 @@ def _curve(
 ) -> EffectCurve:
     value, covariance = fitted
     first, (axis, name, driver_axis, is_relative) = group[0], group[0].key
-    place, count = _bins(context, first.driver, first.g)
-    seen = count > 0
-    table = np.stack([_means(place, count, one.g)[seen] for one in group], axis=1)
+    # Over the range of the poses; over the whole one of a variable that is constant in poses.
+    variable, h = first.driver.values, context.obs.n_poses
+    ends = variable[:h] if np.ptp(variable[:h]) > 1e-6 * np.ptp(variable) else variable
+    x = np.linspace(float(ends.min()), float(ends.max()), N_SHOWN)
+    table = np.stack([one.at(x) for one in group], axis=1)
     poses, data = _of_poses(context, sensor, first, left)
-    posed = np.stack([one.g[: context.obs.n_poses] for one in group], axis=1)
+    posed = np.stack([one.g[:h] for one in group], axis=1)
     if name not in ("force", "rate"):
         # The level is absorbed by bias or scale: the curve is relative to its mean.
         level = np.nanmean(posed, axis=0) if np.isfinite(posed).any(axis=0).all() else table.mean(axis=0)
         table, posed = table - level, posed - level
     return EffectCurve(
         sensor=sensor,  # type: ignore[arg-type]
-        axis=axis, driver=name, driver_axis=driver_axis, is_relative=is_relative,
-        x=_means(place, count, first.driver.values)[seen],
+        axis=axis, driver=name, driver_axis=driver_axis, is_relative=is_relative, x=x,
         value=table @ value,
         sigma=np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", table, covariance, table), 0.0)),
         poses=tuple(int(k) for k in poses),
-        data_x=first.driver.values[poses],
+        data_x=variable[poses],
         data=data + posed[poses] @ value,
     )  # fmt: skip
 

@@ -47,15 +47,8 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * excess**2
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
-        limit: float | None = f_upper(dof, NOISE_DOF, share)
-        disagrees = p < share
-        where = locate(fitted, label) if disagrees else Where()
-        if not disagrees and label in (STATIC_ACCEL, STATIC_GYRO):
-            ratio = _strayed(fitted, label)
-            if ratio is not None:
-                p, disagrees, where = 0.0, True, Where(_CHANNELS[label])
-                per_dof, limit = max(per_dof, ratio), None
-        tests.append(DomainTest(name, per_dof, dof, p, disagrees, where, physical[label], ROW_UNITS[label], limit))
+        limit, where = f_upper(dof, NOISE_DOF, share), locate(fitted, label) if p < share else Where()
+        tests.append(DomainTest(name, per_dof, dof, p, p < share, where, physical[label], ROW_UNITS[label], limit))
     return tuple(tests)
 
 
@@ -74,19 +67,6 @@ def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArr
 
 AT_END = 1.01
 """Ratio to a bound below which a strength counts as at the bound."""
-AT_EDGE = 1.5
-"""Rms of a walk at its upper bound, in standard errors of a pose mean, from which it disagrees: at most 1.05 in 120
-healthy sessions (60 with consumer 1/f noise), where 57 gyros and 74 accelerometers are at the bound; a bias that
-jumps between poses, or drifts by two such errors, exceeds it."""
-
-
-def _strayed(fitted: Fit, label: int) -> float | None:
-    """Ratio of variances where a bias random walk at its upper bound absorbs another effect."""
-    k = 0 if label == STATIC_ACCEL else 1
-    stray = None if fitted.has_free_strengths else hidden_biases(fitted)[k]
-    if stray is None or not stray.is_at_edge or stray.rms < AT_EDGE * stray.noise:
-        return None
-    return (stray.rms / stray.noise) ** 2
 
 
 @dataclass(frozen=True)

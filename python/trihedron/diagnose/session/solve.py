@@ -106,7 +106,6 @@ class Fit:
     distortion: Distortion
     prior: Prior | None
     core: _core.SessionFit = field(repr=False)
-    has_free_strengths: bool = False
 
     @cached_property
     def system(self) -> System:
@@ -144,12 +143,8 @@ class Fit:
 
         It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
-        free = self
-        if not self.has_free_strengths:
-            strengths = self.core.strengths[0], *START_STRENGTHS[1:]
-            free = solved(self.obs, self.state, self.prior, self.distortion, strengths, has_free_strengths=True)
         origins = (np.ascontiguousarray(one) for one in (self.obs.force_origin, self.obs.rate_origin))
-        return free.core.linear_covariance(*origins)
+        return self.core.linear_covariance(*origins)
 
 
 def solved(
@@ -161,24 +156,24 @@ def solved(
     within: Bounds | None = None,
     sizes: FloatArray | None = None,
     *,
-    has_free_strengths: bool,
+    is_scatter_free: bool,
 ) -> Fit:
     """Gauss-Newton on every row to convergence (eq. 11.9); noise strengths as given or likeliest ``within`` bounds.
 
     ``sizes`` are the prior σ of the effects' parameters.
     """
-    core = obs.model(start.gravity, prior, is_scatter_free=has_free_strengths).fit(
+    core = obs.model(start.gravity, prior, is_scatter_free=is_scatter_free).fit(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),
     )  # fmt: skip
-    return Fit(obs, state_of(core, start.gravity), distortion, prior, core, has_free_strengths)
+    return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
 
 
 def fit(obs: Observations, start: SessionState, prior: Prior | None, within: Bounds | None = None) -> Fit:
     """The session without effects, noise corners as in ``start``, or free ``within`` bounds."""
     start = replace(start, effect=np.zeros(0))
     strengths = start.strengths[0], *START_STRENGTHS[1:]
-    return solved(obs, start, prior, NO_DISTORTION, strengths, within, has_free_strengths=False)
+    return solved(obs, start, prior, NO_DISTORTION, strengths, within, is_scatter_free=False)
 
 
 def tune_noise(obs: Observations, start: SessionState, prior: Prior | None) -> Fit:

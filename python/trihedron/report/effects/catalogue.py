@@ -52,10 +52,10 @@ def effect_words(effect_id: str, case: str, values: Mapping[str, Any]) -> str:
     return filled(entry.said[case], values, entry.lines)
 
 
-def experiment(effect_id: str, *, is_static: bool) -> str:
+def experiment(effect_id: str) -> str:
     """The recording that separates the effect from others; empty for one from outside the package."""
     entry = CATALOGUE.get(effect_id)
-    return "" if entry is None else entry.static_experiment if is_static else entry.experiment
+    return "" if entry is None else entry.experiment
 
 
 def why_not(name: str, values: Mapping[str, Any]) -> str:

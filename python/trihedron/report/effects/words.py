@@ -9,15 +9,14 @@ class EffectWords:
     """Words of one effect.
 
     ``mechanism`` completes "the model lacks this: ..."; ``experiment`` is the recording that separates it from other
-    effects, ``static_experiment`` the same for a log of one or two orientations. ``said`` are sentences about the
-    accepted effect by case, with placeholders for values (``report/findings/wording.py``); without one the sentence is
-    the mechanism with its strongest term. ``lines`` are the parts of placeholders ``{name:each}``.
+    effects. ``said`` are sentences about the accepted effect by case, with placeholders for values
+    (``report/findings/wording.py``); without one the sentence is the mechanism with its strongest term. ``lines`` are
+    the parts of placeholders ``{name:each}``.
     """
 
     mechanism: str
     experiment: str = ""
     said: Mapping[str, str] = field(default_factory=dict)
-    static_experiment: str = ""
     lines: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -34,40 +33,14 @@ SHAKE = "shake the sensor about one axis at several frequencies: a delay grows w
 
 
 def drifts(sensor: str, unit: str, walk: str, static: str = "") -> Mapping[str, str]:
-    """Bias drift from pose to pose, by its kind; in a log of one orientation ``static`` is added."""
+    """Bias drift from pose to pose, by its kind; in a log of one orientation ``static`` is added. There readings of
+    unknown scale stay counts."""
     whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
     sizes = f"{{range:all .2g {unit}}}"
-    rest = {case: whole.format(how="smoothly", sizes=_static_size("range", own)) + static for case, own in _units(unit)}
-    return {"walk": whole.format(how=walk, sizes=sizes)} | rest
-
-
-def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
-    """Bias over temperature in a log of one or two orientations, and effects that it is confounded with."""
-    return {case: _thermal(sensor, own) for case, own in _units(unit)}
-
-
-def _units(unit: str) -> tuple[tuple[str, str], ...]:
-    """Cases of a static log, with their unit: readings of unknown scale stay counts."""
-    return (("static", unit), ("static-counts", "counts"))
-
-
-def _static_size(place: str, unit: str) -> str:
-    if unit == "counts":
-        return f"{{{place}:all .3g}} counts"
-    return f"{{{place}:all {'.2g' if unit == '°/s' else '.3g'} {unit}}}"
-
-
-def _thermal(sensor: str, unit: str) -> str:
-    swing, left, raw, gap = (_static_size(place, unit) for place in ("swing", "left", "raw", "gap"))
-    return (
-        f"The {sensor} bias follows the temperature from {{low_degc:.0f}} to {{high_degc:.0f}} °C by "
-        "{is_straight:?a straight line|{is_parabola:?a parabola|a curve of third order}}"
-        "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it changes by "
-        f"{swing} (X, Y, Z); {left} rms remain of {raw}."
-        f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis or drift in time; "
-        "one cycle does not separate them.|}{is_one_pose:? One orientation does not separate bias, scale and a tilt of "
-        "the fixture.|}"
-    )
+    cases = {"static": sizes, "static-counts": "{range:all .3g} counts"}
+    return {"walk": whole.format(how=walk, sizes=sizes)} | {
+        case: whole.format(how="smoothly", sizes=own) + static for case, own in cases.items()
+    }
 
 
 def saturates(sensor: str) -> EffectWords:
@@ -101,9 +74,7 @@ ACCELEROMETER = {
     ),
     "accel-thermal-bias": EffectWords(
         "the accelerometer bias depends on temperature",
-        UP_AND_DOWN,
-        follows_temperature("accelerometer", "mm/s²"),
-        "repeat the cycle with the sensor turned over",
+        f"{UP_AND_DOWN}; with one orientation repeat the cycle turned over",
     ),
     "accel-thermal-scale": EffectWords("the accelerometer scale depends on temperature", TWO_TEMPERATURES),
     "accel-bias-drift": EffectWords(
@@ -138,9 +109,7 @@ GYROSCOPE = {
     "gyro-scale-nonlinearity": EffectWords(
         "the gyro scale depends on rate", "turn by the same angle slowly and fast, both ways, about each axis"
     ),
-    "gyro-thermal-bias": EffectWords(
-        "the gyro bias depends on temperature", UP_AND_DOWN, follows_temperature("gyro", "°/s")
-    ),
+    "gyro-thermal-bias": EffectWords("the gyro bias depends on temperature", UP_AND_DOWN),
     "gyro-thermal-scale": EffectWords("the gyro scale depends on temperature", TWO_TEMPERATURES),
     "gyro-bias-drift": EffectWords(
         "the gyro bias drifts smoothly in time; no logged channel explains it",

@@ -64,8 +64,6 @@ def _effect(effect_id: str, entry: EffectWords) -> str:
     lines = [f"\n## {effect_id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
     lines += [f"*Said:* {_shown(text)}" for text in entry.said.values()]
     lines.append(f"*Separating experiment:* {entry.experiment}.")
-    if entry.static_experiment:
-        lines.append(f"*In a log of one or two orientations:* {entry.static_experiment}.")
     return "<br>\n".join(lines) + "\n"
 
 

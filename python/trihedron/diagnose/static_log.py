@@ -1,0 +1,317 @@
+"""The diagnosis of a log with one or two orientations: biases over temperature and time, and spectral lines
+(docs/static-logs.md).
+
+The log is cut into pieces. They are the poses of a session without moves, in which either sensor reads a bias on three
+axes, as a gyro does in static poses: effects, noise strengths and evidence are those of every session.
+"""
+
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.arrays import AXES, TINY, FloatArray, IntArray
+from trihedron.defaults import FALSE_ALARM
+from trihedron.diagnose.accepted import effect_record, tried_candidate
+from trihedron.diagnose.bias_strengths import bias_strengths
+from trihedron.diagnose.candidates import wald_p
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import by_id, catalogue
+from trihedron.diagnose.effects.bias_process import BiasDrift
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant
+from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
+from trihedron.diagnose.hypothesis import Hypothesis, held_out_records, hypothesis
+from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves, residuals_before_after
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
+from trihedron.diagnose.residuals.within_poses import judge_within_poses
+from trihedron.diagnose.search import search
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import Distortion
+from trihedron.records import Pose, Recording, Segments
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, LinearModel
+from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
+from trihedron.records.words import why_not
+from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
+from trihedron.session.model import LOWER, Prior
+from trihedron.units import rate_to_si
+
+DOMAINS: tuple[Domain, Domain] = ("static-accel", "static-gyro")
+N_PIECES, FEWEST_PIECES = 80, 24
+"""Pieces of a log, enough for both branches of a temperature cycle; and below which no curve is determined."""
+FEWEST_SAMPLES = 16
+"""Samples of a piece from which the standard error of its mean is known."""
+LOUD = 4.0
+"""Variance of first differences over the median, above which a piece is moving: the noise of a part changes by a factor
+of two over a hundred kelvin."""
+TURNS_RAD = 0.02
+"""Angle between the halves of a moving piece, at least: a bias that drifts by 0.1 g in a log causes a tenth of it."""
+MOSTLY_STILL = 0.6
+"""Share of a log that must be static: in one that moves, slow motion would count as static."""
+EXACT = 1e-6
+"""Relative prior σ of S, which converts sizes only."""
+
+
+def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
+    """Biases against temperature and time, and spectral lines, of a log with too few orientations for a calibration.
+
+    ``model`` has nominal or given S, b of both sensors, used only for sizes in physical units.
+    """
+    pieces = static_pieces(recording)
+    sides: list[_Side] = []
+    within: list[tuple[DomainTest, AcceptedEffect | None]] = []
+    tried = {effect.id: Candidate(effect.id, None, False, why_not("few-orientations")) for effect in catalogue()}
+    if pieces is not None:
+        obs = observe(recording, pieces.segments)
+        sides = [_judged(obs, pieces, model, gravity_m_s2, k, alpha) for k in range(1 if obs.pose_rate is None else 2)]
+        within = [_lines(sides[-1].plain, obs, alpha)]
+        of_lines = Candidate("periodic-interference", within[0][0].p_value, True)
+        tried |= {one.id: one for one in (*(c for side in sides for c in side.candidates), of_lines)}
+    effects = [
+        *(effect for side in sides for effect in side.effects),
+        *(line for _, line in within if line is not None),
+    ]
+    noise: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
+                             "accelerometer_corner_s": None, "gyroscope_density": None,
+                             "gyroscope_unit": "rad/s/sqrt(Hz)", "gyroscope_corner_s": None}  # fmt: skip
+    for name, side in zip(("accelerometer", "gyroscope"), sides, strict=False):
+        noise[f"{name}_density"] = side.plain.context.noise_density[GYRO].tolist()
+    calm = [test if line is None else replace(test, disagrees=False, where=Where()) for test, line in within]
+    return Diagnosis(
+        verdict="missing-physics" if effects else "not-testable",
+        domains=(*(side.before for side in reversed(sides)), *(test for test, _ in within)),
+        effects=tuple(sorted(effects, key=lambda effect: -(effect.share or 0.0))),
+        remaining=(*(side.after for side in reversed(sides)), *calm),
+        candidates=tuple(tried[key] for key in sorted(tried)),
+        baseline=model, extended=model, noise=MappingProxyType(noise), gravity_m_s2=gravity_m_s2, alpha=alpha,
+        recording_source=recording.source, recording_sha256=recording.sha256,
+        references=MappingProxyType(dict(sides[0].plain.context.references) if sides else {}),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class StaticPieces:
+    """Static pieces of a log as poses; ``orientation`` (n,) of each, the most frequent first."""
+
+    segments: Segments
+    orientation: IntArray
+
+    def about_orientations(self, values: FloatArray) -> FloatArray:
+        """Values (n, ...) minus their mean in every orientation."""
+        level = np.array([values[self.orientation == k].mean(axis=0) for k in range(self.orientation.max() + 1)])
+        return np.asarray(values - level[self.orientation])
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One sensor of a static log: the session in which it reads a bias, tests of it without and with the effects."""
+
+    plain: Hypothesis
+    effects: tuple[AcceptedEffect, ...]
+    candidates: tuple[Candidate, ...]
+    before: DomainTest
+    after: DomainTest
+
+
+def _judged(
+    obs: Observations, pieces: StaticPieces, model: LinearModel, gravity_m_s2: float, sensor: int, alpha: float
+) -> _Side:
+    plain = _session(obs, pieces, model, gravity_m_s2, sensor)
+    kinds = [by_id()[f"{SENSORS[sensor].prefix}-{name}"] for name in ("thermal-bias", "bias-drift")]
+    found = search(plain, alpha, [_aside(one, sensor, pieces) for one in kinds])
+    known, terms = found.model, found.model.terms
+    # What a curve of temperature or time leaves changes slowly too: no further cause is named for it.
+    processes = [] if terms else bias_strengths(known, alpha)[0]
+    walks = [one for one in processes if one.effect.sensor == GYRO and one.effect.walks]
+    every = residuals_before_after(plain.fitted, known.fitted, {GYRO} if walks else ())
+    shown = next(one for one in every if one.domain == DOMAINS[GYRO])
+    unit = _unit(obs.recording, model, sensor)
+    explained = float(np.clip(1.0 - (shown.after**2).sum() / (shown.before**2).sum(), 0.0, 1.0))
+    gains = [*found.gains, *(one.gain for one in walks)]
+    made, candidates = [], [tried_candidate(one, found.against.get(key), "") for key, one in found.tried.items()]
+    candidates += [Candidate(key, None, False, reason) for key, reason in found.missing.items()]
+    for k, term in enumerate(terms):
+        value, covariance = known.value(k)
+        parameters = term.effect.parameters(term.variant, value, covariance)
+        curves = effect_curves(known.context, (None, term.distortion.rate), value, covariance, [shown])
+        # One orientation does not separate bias, scale and a tilt of the fixture.
+        rivals = ("accel-thermal-scale",) if term.effect.id == "accel-thermal-bias" else ()
+        p_value, held = wald_p(value, covariance), held_out_records(found.without[k], known)
+        effect, statement = by_id()[term.effect.id], term.effect.statement(parameters)
+        series: dict[str, Any] = {}
+        if isinstance(effect, BiasDrift):
+            along = np.asarray(term.distortion.rate)[: obs.n_poses]
+            sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
+            span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
+            parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
+            series = _series(obs, along @ value, sigma, unit)
+        said = parameters, statement, p_value, found.scores[k]
+        made.append(effect_record(effect, *said, held, rivals, curves, **series))
+        candidates.append(Candidate(effect.id, p_value, True, "", found.scores[k], parameters))
+    for one in walks:
+        drift = kinds[1]
+        assert isinstance(drift, BiasDrift)
+        parameters, statement = drift.of_strength(one.size, one.std)
+        curves = bias_curves(known.context, GYRO, known.fitted.bias(GYRO), one.std, [shown])
+        said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
+        series = _series(obs, known.fitted.bias(GYRO), one.std, unit)
+        made.append(effect_record(drift, *said, held, (), curves, **series))
+    named = [
+        _of_sensor(one, sensor, unit, explained * gain / max(sum(gains), TINY))
+        for one, gain in zip(made, gains, strict=True)
+    ]
+    tests = [_domain(sensor, x, shown, unit, is_named=bool(named)) for x in (shown.before, shown.after)]
+    return _Side(plain, tuple(named), tuple(candidates), *tests)
+
+
+def _series(obs: Observations, path: FloatArray, sigma: FloatArray, unit: str) -> dict[str, Any]:
+    """The curve of a drifting bias, ``path`` (pieces, 3) with standard uncertainties (3,), as the result states it."""
+    times, errors = obs.pose_time_s.tolist(), [[float(s)] * len(path) for s in sigma]
+    return {"curve": {"time_s": times, "value": path.T.tolist(), "sigma": errors, "unit": unit}}
+
+
+def _session(
+    obs: Observations, pieces: StaticPieces, model: LinearModel, gravity_m_s2: float, sensor: int
+) -> Hypothesis:
+    """The session in whose place of the gyro a sensor reads its bias about the mean of every orientation; gravity is
+    constant there, and S is known."""
+    of_gravity, of_sensor = (np.diag(_sizes(model, k)) for k in (ACCELEROMETER, sensor))
+    raw, means = ((obs.raw_force, obs.pose_force), (obs.raw_rate, obs.pose_rate))[sensor]
+    density, sigma = ((obs.force_density, obs.pose_force_sigma), (obs.rate_density, obs.pose_rate_sigma))[sensor]
+    assert means is not None
+    aside = replace(
+        obs, raw_rate=raw, pose_rate=pieces.about_orientations(means), pose_rate_sigma=sigma, rate_density=density,
+        pose_force=np.tile([0.0, 0.0, gravity_m_s2 / of_gravity[2, 2]], (obs.n_poses, 1)), force_up=None,
+    )  # fmt: skip
+    mean = np.concatenate([of_gravity[LOWER], np.zeros(3), of_sensor.ravel()])
+    prior = Prior(mean, np.diag((EXACT * np.repeat([of_gravity[0, 0], gravity_m_s2, of_sensor[0, 0]], (6, 3, 9))) ** 2))
+    return hypothesis(aside, aside.at_means(gravity_m_s2, of_gravity, np.zeros(3), of_sensor), prior)
+
+
+def _aside(effect: Effect, sensor: int, pieces: StaticPieces) -> Effect:
+    """An effect whose columns, about their mean in every orientation, are those of the sensor in the gyro's place."""
+    kind: Any = type(effect)
+
+    def turned(variant: Variant | None) -> Variant | None:
+        if variant is None:
+            return None
+        columns = variant.distortion.rate if sensor == GYRO else variant.distortion.force
+        assert columns is not None
+        return replace(variant, distortion=Distortion(None, pieces.about_orientations(columns)))
+
+    def is_plausible(self: Effect, variant: Variant, *fitted: FloatArray) -> bool:
+        own = variant.distortion if sensor == GYRO else Distortion(variant.distortion.rate, None)
+        return bool(kind.is_plausible(self, replace(variant, distortion=own), *fitted))
+
+    own = {
+        "variants": lambda self, context: [turned(one) for one in kind.variants(self, context)],
+        "reshaped": lambda self, context, variant, value: turned(kind.reshaped(self, context, variant, value)),
+        "is_plausible": is_plausible,
+    }
+    out: Effect = type(kind.__name__, (kind,), own)()
+    return out
+
+
+def _of_sensor(effect: AcceptedEffect, sensor: int, unit: str, share: float) -> AcceptedEffect:
+    """The record with the sensor's own domain, channel and unit in place of the gyro's."""
+    given = SENSORS[sensor].unit
+    parameters = tuple(replace(one, unit=one.unit.replace(given, unit)) for one in effect.parameters)
+    held = tuple(replace(one, domain=DOMAINS[sensor], unit=unit) for one in effect.held_out if one.domain == DOMAINS[1])
+    name: Any = ("accelerometer", "gyroscope")[sensor]
+    curves = tuple(replace(one, sensor=name) for one in effect.curves)
+    return replace(effect, share=share, parameters=parameters, held_out=held, curves=curves)
+
+
+def _sizes(model: LinearModel, sensor: int) -> FloatArray:
+    """(3,) size of a raw unit along every axis, in the model's unit."""
+    side = (model.accelerometer, model.gyroscope)[sensor]
+    return np.ones(3) if side is None else np.asarray(1.0 / np.linalg.norm(np.linalg.inv(np.array(side["S"])), axis=1))
+
+
+def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:
+    """SI, or ``counts`` where neither the log nor a given calibration states the unit of a gyro's count."""
+    is_counts = sensor == GYRO and rate_to_si(recording.gyroscope_unit) is None
+    return "counts" if is_counts and _sizes(model, GYRO)[0] == 1.0 else SENSORS[sensor].unit
+
+
+def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is_named: bool) -> DomainTest:
+    """Biases about the mean of their orientation; the domain disagrees where an effect was named.
+
+    A bias that walks is no disagreement by itself: without an effect nothing contradicts the model.
+    """
+    z = x / shown.sigma_before[:, None]
+    chi2 = float(np.mean(z**2))
+    p = float(np.exp(-1.5 * max(chi2 - 1.0, 0.0))) if is_named else 1.0
+    where = Where(("ag"[sensor] + AXES[int(z.std(axis=0).argmax())],)) if is_named else Where()
+    rms = float(np.sqrt(np.mean(x**2)))
+    disagrees = p < FALSE_ALARM / N_DOMAINS_TESTED
+    return DomainTest(DOMAINS[sensor], chi2, float(x.size), p, disagrees, where, rms, unit)
+
+
+def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, AcceptedEffect | None]:
+    """Spectral lines of the pieces, and the test of noise that differs between pieces."""
+    test, effect = judge_within_poses(obs, alpha), PeriodicInterference()
+    found = effect.find(plain.context if obs.raw_rate is None else Context(replace(plain.fitted, obs=obs)))
+    if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
+        return test, None
+    record = effect_record(effect, found.parameters, found.statement, found.p_value, found.strength, found.held_out)
+    return test, replace(record, share=found.share)
+
+
+def static_pieces(recording: Recording) -> StaticPieces | None:
+    """The static pieces of a log without rare orientations, whatever its segmentation makes of a bias that drifts;
+    ``None`` where too little of the log is static."""
+    assert recording.accelerometer is not None
+    n, t = recording.n_samples, recording.time_s
+    length = max(n // N_PIECES, FEWEST_SAMPLES)
+    spans = [(a, a + length) for a in range(0, n - length + 1, length)]
+    names = ("accelerometer",) if recording.gyroscope is None else ("accelerometer", "gyroscope")
+    variance, is_calm = {}, np.ones(len(spans), dtype=bool)
+    for name in names:
+        values, step = getattr(recording, name), recording.facts.of(name).step
+        own = np.array([np.nanvar(np.diff(values[a:b], axis=0), axis=0) / 2.0 for a, b in spans])
+        # A log that repeats one code is not free of noise: it has at least that of rounding.
+        variance[name] = np.maximum(np.nanmedian(own, axis=0), step**2 / 12.0)
+        is_calm &= (own <= LOUD * np.maximum(variance[name], step**2)).all(axis=1)
+    force = recording.accelerometer
+    early, late = (_directions(np.array([np.nanmean(force[a + k : a + k + length // 2], axis=0) for a, _ in spans]))
+                   for k in (0, length // 2))  # fmt: skip
+    is_calm &= np.linalg.norm(late - early, axis=1) < TURNS_RAD
+    if is_calm.sum() < max(FEWEST_PIECES, MOSTLY_STILL * len(spans)):
+        return None
+    orientation = np.full(len(spans), -1)
+    orientation[is_calm] = _orientations(_directions(early + late)[is_calm])
+    keep = np.flatnonzero(orientation >= 0)
+    if len(keep) < FEWEST_PIECES:
+        return None
+    used = [spans[k] for k in keep]
+    means = {name: np.array([np.nanmean(getattr(recording, name)[a:b], axis=0) for a, b in used]) for name in names}
+    of: dict[str, Any] = {f"gyroscope_{figure}": None for figure in ("mean", "sigma", "sigma_mean")}
+    for name in names:
+        sigma = np.sqrt(variance[name])
+        error = np.tile(sigma / np.sqrt(length), (len(used), 1))
+        of |= {f"{name}_mean": means[name], f"{name}_sigma": sigma, f"{name}_sigma_mean": error}
+    middle = np.array([0.5 * (t[a] + t[b - 1]) for a, b in used])
+    poses = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(used))
+    lasts = np.full(len(used), length / recording.rate_hz)
+    segments = Segments(poses=poses, moves=(), n_averaged=np.full(len(used), length), time_mid_s=middle,
+                        duration_s=lasts, **of)  # fmt: skip
+    return StaticPieces(segments, orientation[keep])
+
+
+def _directions(force: FloatArray) -> FloatArray:
+    return np.asarray(force / np.linalg.norm(force, axis=1, keepdims=True))
+
+
+def _orientations(up: FloatArray) -> IntArray:
+    """(n,) number of the orientation of every piece, the most frequent first; -1 for handling."""
+    out = np.full(len(up), -1, dtype=np.int64)
+    for number in range(len(up)):
+        free = np.flatnonzero(out < 0)
+        near = up[free] @ up[free].T > np.cos(SAME_POSE_RAD)
+        if not len(free) or near.sum(axis=1).max() < max(LEAST_SHARE * len(up), 2.0):
+            break
+        # A drifting bias widens an orientation: it is selected about the mean of the largest group.
+        centre = _directions(up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)[None])[0]
+        out[free[up[free] @ centre > np.cos(SAME_POSE_RAD)]] = number
+    return out
