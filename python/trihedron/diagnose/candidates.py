@@ -88,8 +88,8 @@ def candidates_beside(
 def _best_of_each(
     terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float, *, is_stated: bool = False
 ) -> list[Tried]:
-    """The best shape with a plausible size of every effect, best effect first; where it ``is_stated`` what a log says of
-    an effect also one without evidence whose size is none (a delay far from those that were tried)."""
+    """The best shape with a plausible size of every effect, best effect first; where it ``is_stated`` what a log says
+    of an effect also one without evidence whose size is none (a delay far from those that were tried)."""
     best: dict[str, tuple[bool, float, Tried]] = {}
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.cost

@@ -174,8 +174,8 @@ def _is_excluded(effect: AcceptedEffect, tried: Sequence[Candidate], alpha: floa
 
 
 def _would_drift(effect: AcceptedEffect, found: Diagnosis) -> bool:
-    """Whether an effect of a channel that the recording did not log, there a drift of the bias, would make more than all
-    of its residuals, and it does not drift."""
+    """Whether an effect of a channel that the recording did not log, there a drift of the bias, would make more than
+    all of its residuals, and it does not drift."""
     if all(one.applicable for one in found.candidates if one.id == effect.id):
         return False
     drift = f"{effect.id.partition('-')[0]}-bias-drift"
