@@ -196,7 +196,6 @@ class DroppedSamples(DirectEffect):
 
     id = "dropped-samples"
     needs_moves = True
-    is_sought_again = True
     of_session = None
 
     def find(self, context: Context) -> Evidence | None:
