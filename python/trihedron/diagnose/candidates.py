@@ -95,7 +95,8 @@ def _best_of_each(
         score = 2.0 * (one.log_evidence - plain) - term.cost
         is_plausible = term.effect.is_plausible(term.variant, one.value, one.covariance)
         rank = is_plausible, score, Tried(term, score, one)
-        if (is_plausible or (is_stated and score <= 0.0)) and rank[:2] > best.get(term.effect.id, (False, -np.inf))[:2]:
+        is_none = is_stated and score <= 0.0 and not term.effect.of_session
+        if (is_plausible or is_none) and rank[:2] > best.get(term.effect.id, (False, -np.inf))[:2]:
             best[term.effect.id] = rank
     return sorted((one for *_, one in best.values()), key=lambda one: -one.score)
 

@@ -41,9 +41,9 @@ N_PIECES, FEWEST_PIECES = 80, 24
 """Pieces of a log, enough for both branches of a temperature cycle; and below which no curve is determined."""
 FEWEST_SAMPLES = 16
 """Samples of a piece from which the standard error of its mean is known."""
-LOUD = 4.0
-"""Variance of first differences over the median, above which a piece is moving: the noise of a part changes by a factor
-of two over a hundred kelvin."""
+QUIET_QUANTILE, LOUD = 0.2, 4.0
+"""Variance of first differences over that of the quietest fifth, above which a piece is moving: the noise of a part
+changes by a factor of two over a hundred kelvin."""
 TURNS_RAD = 0.02
 """Angle between the halves of a moving piece, at least: a bias that drifts by 0.1 g in a log causes a tenth of it."""
 MOSTLY_STILL = 0.6
@@ -271,8 +271,12 @@ def static_pieces(recording: Recording) -> StaticPieces | None:
         values, step = getattr(recording, name), recording.facts.of(name).step
         own = np.array([np.nanvar(np.diff(values[a:b], axis=0), axis=0) / 2.0 for a, b in spans])
         # A log that repeats one code is not free of noise: it has at least that of rounding.
-        variance[name] = np.maximum(np.nanmedian(own, axis=0), step**2 / 12.0)
-        is_calm &= (own <= LOUD * np.maximum(variance[name], step**2)).all(axis=1)
+        rounding = step**2 / 12.0
+        is_quiet = (own <= LOUD * np.maximum(np.nanquantile(own, QUIET_QUANTILE, axis=0), rounding)).all(axis=1)
+        if not is_quiet.any():
+            return None
+        variance[name] = np.maximum(np.nanmedian(own[is_quiet], axis=0), rounding)
+        is_calm &= is_quiet
     force = recording.accelerometer
     early, late = (_directions(np.array([np.nanmean(force[a + k : a + k + length // 2], axis=0) for a, _ in spans]))
                    for k in (0, length // 2))  # fmt: skip
