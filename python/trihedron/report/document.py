@@ -56,6 +56,7 @@ CONSEQUENCE = (
     FindingCode.HELD_OUT_WORSE,
     FindingCode.NOT_OBSERVABLE,
     FindingCode.WEAKLY_OBSERVABLE,
+    FindingCode.FEW_POSES,
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.BIAS_DRIFT,
     FindingCode.GYRO_BIAS_DRIFT,

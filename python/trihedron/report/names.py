@@ -59,7 +59,7 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
-IN_FULL = ("left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
+IN_FULL = ("few-poses", "left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
 """A sentence about one pose or move begins with its number."""

@@ -75,4 +75,9 @@ ENTRIES = {
         "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each.",
         or_severity=SERIOUS,
     ),
+    (Code.FEW_POSES, "untested", WARNING): Words(
+        "{poses} poses determine as many parameters and leave none to test the fit.",
+        "",
+        "Record 3 more poses or more, in other directions.",
+    ),
 }
