@@ -46,6 +46,7 @@ CONSEQUENCE = (
     FindingCode.TWO_LEVELS,
     FindingCode.LOG_DRIFT,
     FindingCode.REFERENCE_NOT_INDEPENDENT,
+    FindingCode.REFERENCE_APART,
     FindingCode.LEFT_HANDED,
     FindingCode.TURN_NOT_A_MULTIPLE,
     FindingCode.TABLE_TILT,
