@@ -163,3 +163,9 @@ def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_
     for findings, is_kept in (((), True), ((imprecise,), False)):
         found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
         assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
+
+
+def test_the_commands_after_another_reading_have_it_too():
+    said = filled("Read it with --columns ax=3,ay=2. Then: `... -o FILE`, `trihedron apply calibration.json LOG`.")
+    assert said.count("--columns ax=3,ay=2") == 3
+    assert "--columns" not in filled("`trihedron check LOG`")
