@@ -111,6 +111,9 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
+    found.findings = (Finding(FindingCode.NOT_FIT, Severity.WARNING, "Two orientations.", "", ""),)
+    assert "trihedron calibrate" not in next_step_in_words(found)
+    found.findings = ()
     found.calibration = SimpleNamespace(findings=(weak,))
     assert next_step_in_words(found).startswith("Add poses.")
 
