@@ -111,6 +111,14 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
+    # What still disagrees with the effects would make their calibration untrusted.
+    effect.model = {"applies_to_other_recordings": False}
+    effect.id, effect.held_out = "dropped-samples", (SimpleNamespace(domain="moves"),)
+    above = Finding(FindingCode.RESIDUAL_ABOVE_NOISE, Severity.SERIOUS, "Seen.", "", "See `trihedron diagnose LOG`.")
+    found.calibration = SimpleNamespace(findings=(above,))
+    assert "--extended" in next_step_in_words(found)
+    found.remaining = (SimpleNamespace(domain="moves", disagrees=True),)
+    assert "--extended" not in next_step_in_words(found)
     found.findings = (Finding(FindingCode.NOT_FIT, Severity.WARNING, "Two orientations.", "", ""),)
     assert "trihedron calibrate" not in next_step_in_words(found)
     found.findings = ()

@@ -85,7 +85,10 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         if remedy and is_file and _disagrees(diagnosis):
             return f"{first}{remedy} {use}"
         if remedy and not is_file and _is_far_from_noise(diagnosis):
-            return f"{first}{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
+            # What the effects leave unexplained leaves their calibration untrusted, too.
+            is_left = any(d.disagrees for d in diagnosis.remaining if d.domain not in OF_SAMPLES)
+            then = "Record again." if is_left else f"S and b of this log, fitted with the effects: {STORED}."
+            return f"{first}{remedy} {then}{beside}"
         of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
         return " ".join(filter(None, (f"{first}{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"
