@@ -56,7 +56,9 @@ def one(seed, kind, seconds):
         one.truth_t - one.truth_t[0], attitude=one.truth, position=one.position, source="truth"
     )  # fmt: skip
     asked = Request(HORIZONS, 25.0, G, known(one.gyroscope), known(one.accelerometer))
-    return {found.sensor: beside(found, getattr(one, found.sensor)) for found in beside_reference(log, motion, asked)}
+    return {
+        found.sensor: beside(found, getattr(one, found.sensor)) for found in beside_reference(log, motion, asked)[0]
+    }
 
 
 def known(sensor):
@@ -145,7 +147,7 @@ def flights(folder, is_backwards):
         if is_backwards:
             backwards(path, motion, asked)
             continue
-        for s in beside_reference(read(path), motion, asked):
+        for s in beside_reference(read(path), motion, asked)[0]:
             N, K = (f"{x.value:.2e} [{x.lower:.1e}, {x.upper:.1e}]" for x in (s.N, s.K))
             nees = ", ".join(f"{c.horizon_s:.0f} s {c.nees:.1f} (static {c.static_nees:.0f})" for c in s.consistency)
             print(f"{path.name.split('.')[0]} {s.sensor}: N {N}, K {K}, {s.bias.kind}; NEES {nees}")

@@ -304,7 +304,7 @@ def test_most_of_what_looks_like_noise_in_a_recorded_flight_is_its_truth():
     minute = log.time_s < 60.0
     log = replace(log, **{name: getattr(log, name)[minute] for name in ("time_s", "accelerometer", "gyroscope")})
     truth, asked = motion_of(EUROC / "V1_02_medium.truth.csv.gz"), beside.Request((10.0,), 50.0, 9.807, static)
-    gyro, accelerometer = beside.beside_reference(log, truth, asked)
+    gyro, accelerometer = beside.beside_reference(log, truth, asked)[0]
     (one,) = gyro.consistency
     assert one.nees < 7.0
     assert one.static_nees > 30.0

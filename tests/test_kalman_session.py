@@ -272,3 +272,14 @@ def test_a_noise_file_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
         read_axis_noise(path)
+
+
+def test_nine_poses_for_nine_parameters_test_nothing():
+    poses = np.random.default_rng(3).normal(size=(9, 3))
+    readings = (GRAVITY * poses / np.linalg.norm(poses, axis=1)[:, None] - B_NORM) @ np.linalg.inv(S_NORM).T
+    at_s = 10.0 * np.arange(9)
+    found = calibrate_without_references(readings, NOISE, start_s=at_s, pose_s=np.full(9, 4.0), gravity_m_s2=GRAVITY)
+    assert found.consistency.n == 0
+    assert {one.code for one in found.findings} == {FindingCode.FEW_POSES}
+    _, alone = calibrate_norm(readings, np.full((9, 3), 0.01), GRAVITY, raw_unit="counts")
+    assert FindingCode.FEW_POSES in {one.code for one in alone}

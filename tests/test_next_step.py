@@ -111,6 +111,17 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
+    # What still disagrees with the effects would make their calibration untrusted.
+    effect.model = {"applies_to_other_recordings": False}
+    effect.id, effect.held_out = "dropped-samples", (SimpleNamespace(domain="moves"),)
+    above = Finding(FindingCode.RESIDUAL_ABOVE_NOISE, Severity.SERIOUS, "Seen.", "", "See `trihedron diagnose LOG`.")
+    found.calibration = SimpleNamespace(findings=(above,))
+    assert "--extended" in next_step_in_words(found)
+    found.remaining = (SimpleNamespace(domain="moves", disagrees=True),)
+    assert "--extended" not in next_step_in_words(found)
+    found.findings = (Finding(FindingCode.NOT_FIT, Severity.WARNING, "Two orientations.", "", ""),)
+    assert "trihedron calibrate" not in next_step_in_words(found)
+    found.findings = ()
     found.calibration = SimpleNamespace(findings=(weak,))
     assert next_step_in_words(found).startswith("Add poses.")
 
@@ -163,3 +174,9 @@ def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_
     for findings, is_kept in (((), True), ((imprecise,), False)):
         found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
         assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
+
+
+def test_the_commands_after_another_reading_have_it_too():
+    said = filled("Read it with --columns ax=3,ay=2. Then: `... -o FILE`, `trihedron apply calibration.json LOG`.")
+    assert said.count("--columns ax=3,ay=2") == 3
+    assert "--columns" not in filled("`trihedron check LOG`")

@@ -131,7 +131,8 @@ def test_truth_is_written_whole(tmp_path):
 
 
 def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, capsys):
-    log, truth = tmp_path / "a.csv", tmp_path / "a.npz"
+    log, truth, singular = tmp_path / "a.csv", tmp_path / "a.npz", tmp_path / "singular.toml"
+    singular.write_text("[accelerometer]\nS = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]\n")
     assert main(["simulate", "table-turns", "-o", str(log), "--truth", str(truth), "--seed", "4"]) == 0
     assert "30 poses" in capsys.readouterr().out
     recording, _ = simulate(scenario_by_name("table-turns"), seed=4)
@@ -149,6 +150,7 @@ def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, 
         ([], "either a SCENARIO"),
         (["--like", str(log), "-o", str(tmp_path / "b.csv")], "--like and --calibration go together"),
         (["none.toml", "-o", str(tmp_path / "b.csv")], "none.toml"),
+        ([str(singular), "-o", str(tmp_path / "b.csv")], "accelerometer: S has no inverse"),
     ):
         assert main(["simulate", *words]) == 1
         told = capsys.readouterr().err

@@ -118,8 +118,8 @@ def filter_noise(
     if reference is not None:
         motion = motion_of(reference, reference_columns)
         asked = Request(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
-        sensors = beside_reference(recording, motion, asked)
-        source, findings = motion.source, (*findings, *motion.findings, *noticed(sensors))
+        sensors, of_motion = beside_reference(recording, motion, asked)
+        source, findings = motion.source, (*findings, *motion.findings, *of_motion, *noticed(sensors))
     else:
         assert own is not None
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))

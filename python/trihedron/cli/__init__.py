@@ -18,11 +18,10 @@ from pathlib import Path
 import typer
 
 from trihedron.cli.help import WIDEST, Command, Group
-from trihedron.cli.output import silence, spell_out
+from trihedron.cli.output import say, silence, spell_out
 from trihedron.cli.run import begin, with_commands
 from trihedron.errors import InputError
 from trihedron.interruption import SENTENCE, Interrupted, status_of
-from trihedron.sanitise import escaped
 
 # In the order in which they are used.
 _NAMES = (
@@ -224,5 +223,5 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
 
 
 def _reject(sentence: str) -> int:
-    typer.echo(f"trihedron: {escaped(sentence)}", err=True)
+    say(f"trihedron: {sentence}")
     return COULD_NOT_RUN

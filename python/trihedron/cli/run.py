@@ -28,6 +28,8 @@ _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
 _NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
 """A command with one of several logs by its name: this place is also its own."""
+_READ_WITH = re.compile(r"Read it with (--columns \S+)[.;] ")
+"""A next step that begins with another reading: its other commands have that option too, and the last one counts."""
 UNSTORED = "calibration.json"
 UNKNOWN_PLACE = "--latitude DEG"
 """Option of the next command where gravity was not given."""
@@ -53,6 +55,7 @@ class _Run:
     place: str = ""
     beside: str = ""
     file: str = ""
+    read_with: str = ""
     excluded: tuple[str, ...] = ()
 
 
@@ -143,6 +146,8 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
             said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
             what_next = replace(document, next_step=said).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
+    advised = _READ_WITH.match(what_next)
+    _now().read_with = "" if advised is None else advised[1]
     return replace(document, next_step=with_commands(what_next), sections=sections)
 
 
@@ -166,7 +171,7 @@ def _filled(command: str) -> str:
         return f"`{_on_a_new_log()}`" if _now().typed else command
     verb = command.strip("`").split(" ")[1]
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
-    log = " ".join(filter(None, (_now().log, *more)))
+    log = " ".join(filter(None, (_now().log, _now().read_with, *more)))
     given = [word for word in _now().typed if word not in _now().excluded]
     if verb in _WITH_PLACE and _NAMES_A_LOG.search(command):
         named = shlex.split(command.strip("`"))[2:]
@@ -175,6 +180,7 @@ def _filled(command: str) -> str:
     same = (
         again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_ITS_COMMAND).split()[2:])
     )
+    same += f" {_now().read_with}" if _now().read_with else ""
     same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)

@@ -10,7 +10,7 @@ import typer
 
 from trihedron.cli.options import LogSource, ReadingOptions, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_report
-from trihedron.cli.run import name_log
+from trihedron.cli.run import name_log, note_file, with_commands
 
 if TYPE_CHECKING:
     from trihedron.records import Finding, Recording, Truth
@@ -118,16 +118,22 @@ def simulate(
     beside = ""
     findings: tuple[Finding, ...] = ()
     if like is not None and calibration is not None:
-        from trihedron.api.applying import doubted
+        from trihedron.api.applying import apply
         from trihedron.api.reading import segment
         from trihedron.files.calibration import read_calibration
+        from trihedron.records import Severity
         from trihedron.records.recording import as_arguments
 
         repeated = LogSource(**asdict(how), log=like).read()
         of_unit = read_calibration(calibration)
         recording, known = twin(repeated, of_unit, seed)
         beside = as_arguments(repeated.source)
-        findings = (*repeated.findings, *segment(repeated).findings, *doubted(of_unit))
+        findings = (*apply(of_unit, repeated).findings, *segment(repeated).findings)
+        note_file(calibration)
+        for finding in findings:
+            if finding.severity is Severity.WARNING:
+                say(with_commands(str(finding)))
+        note_file(output)
     else:
         recording, known = run(str(scenario), seed)
     if output is not None:

@@ -110,6 +110,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
         row.get("seconds"),
         numbers,
         std,
+        row.get("reread", ""),
     )
 
 

@@ -76,6 +76,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         "diagnosis": diagnosis,
         "warnings": sorted(f.code.value for f in findings if f.severity.value == "warning"),
         "serious": sorted(f.code.value for f in findings if f.severity.value == "serious"),
+        "reread": " ".join(f.action for f in findings if f.code.value == "unit-contradicted"),
     }
 
 

@@ -10,7 +10,8 @@ from trihedron.records.sessions import Change, Parameter, Repeated
 @dataclass(frozen=True, eq=False)
 class FleetLog:
     """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, codes of ``serious``
-    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where not calibrated."""
+    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where not calibrated;
+    ``reread`` is the action against a contradicted unit."""
 
     name: str
     serial: str
@@ -26,6 +27,7 @@ class FleetLog:
     seconds: float | None
     numbers: FloatArray | None
     std: FloatArray | None
+    reread: str = ""
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,14 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         if imprecise(findings_of(diagnosis)):
             keep = f"Take over the parameters of this log, which are more certain: {_taken_by(model)}."
         return dependent(diagnosis) or (keep if diagnosis.parameters else use)
+    # A log of one or two orientations determines neither S nor b.
+    is_static = any(one.code is FindingCode.NOT_FIT for one in findings_of(diagnosis))
+    record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)."
+    noise = "For the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "not-testable":
-        record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)"
         log = getattr(diagnosis, "recording", None)
         is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
-        return f"{record}." if is_short else f"{record}; the noise of this log: `trihedron allan LOG`."
+        return record if is_short else f"{record} {noise}"
     if diagnosis.verdict == "unexplained":
         experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
         left = {one.domain for one in diagnosis.domains if one.disagrees}
@@ -69,6 +72,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return " ".join(steps) + _by_themselves(diagnosis)
     misread = _misread(diagnosis)
     first = "" if misread is None else f"{action_in_words(misread)} "
+    if is_static and not is_file:
+        remedy = _in_the_next_log(diagnosis)
+        return " ".join(filter(None, (f"{first}{record} {noise}", remedy)))
     # The fit corrects axes, whose finding has an action of its own.
     of_session = [one for one in of_session if one not in IN_FULL]
     use = f"Keep using {model}: its parameters agree with this log." if is_file else use
@@ -79,7 +85,10 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         if remedy and is_file and _disagrees(diagnosis):
             return f"{first}{remedy} {use}"
         if remedy and not is_file and _is_far_from_noise(diagnosis):
-            return f"{first}{remedy} S and b of this log, fitted with the effects: {STORED}.{beside}"
+            # What the effects leave unexplained leaves their calibration untrusted, too.
+            is_left = any(d.disagrees for d in diagnosis.remaining if d.domain not in OF_SAMPLES)
+            then = "Record again." if is_left else f"S and b of this log, fitted with the effects: {STORED}."
+            return f"{first}{remedy} {then}{beside}"
         of_log = f"Another log is not corrected for {ids_in_print(dict.fromkeys(of_session))}."
         return " ".join(filter(None, (f"{first}{use} {of_log}{beside}", remedy)))
     store = f"Store the effects with the calibration: {STORED}"

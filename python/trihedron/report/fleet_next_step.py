@@ -1,5 +1,7 @@
 """The next action for a fleet: logs to record again, devices to check, effects to look at."""
 
+from collections import Counter
+
 from trihedron.records.finding import FindingCode
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.report.effects.catalogue import experiment
@@ -8,7 +10,7 @@ from trihedron.report.numbers import capital, first_of
 
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
-BY_FILE = "`... --serial '([^/]+)$'`: one unit a file"
+BY_FILE = "`... --serial '([^/]+)$' -o NEW_FOLDER`: one unit a file"
 RATE_ASSUMED = FindingCode.RATE_ASSUMED.value
 OPEN = ("missing-physics", "unexplained")
 """Verdicts with effects or residuals that the calibration does not include."""
@@ -18,11 +20,18 @@ def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[s
     usable = [log for log in summary.logs if is_usable(log)]
     unusable = [log for log in summary.logs if not is_usable(log)]
     rates = [_called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
-    again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if RATE_ASSUMED not in log.serious]
+    unusable = [log for log in unusable if RATE_ASSUMED not in log.serious]
+    again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if not log.reread]
     opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
     mixed = [one.serial for one in summary.mixed]
-    steps = [f"name the devices of {first_of(mixed)} ({BY_FILE}), or give each a folder"] if mixed else []
-    steps += [f"state the units if {first_of(moved)} contains several ({BY_FILE})"] if moved else []
+    # One device a file separates all folders, also those of one device.
+    counts = Counter(log.serial for log in summary.logs)
+    by_file = f" ({BY_FILE})" if all(n == 1 or name in (*mixed, *moved) for name, n in counts.items()) else ""
+    steps = [f"give each device of {first_of(mixed)} a folder of its own{by_file}"] if mixed else []
+    steps += [f"if {first_of(moved)} contains several units, give each a folder{by_file}"] if moved else []
+    for action in dict.fromkeys(log.reread for log in unusable if log.reread):
+        names = first_of([_called(log, summary) for log in unusable if log.reread == action])
+        steps += [f"for {names}: {action[:1].lower()}{action[1:].rstrip('.')}"]
     steps += [f"give --rate for {first_of(rates)}"] if rates else []
     steps += [f"record again, if it was to be a calibration: {first_of(again)}"] if again else []
     odd = [f"{one} ({files_of(one, summary)})" for one in outliers]

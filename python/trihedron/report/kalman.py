@@ -34,6 +34,8 @@ CLOSE = 0.01
 """Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
 _INNOVATIONS = """Normalised innovations squared (NIS), innovation² / predicted variance: every pose that is judged, \
 their running mean, and where 99 % of such means lie when the noise model is right."""
+_AS_PREDICTED = "the innovations are as large and as white as the noise model predicts"
+_SMALLER = "the innovations are smaller than the noise model predicts, the uncertainties too wide"
 _CORRECTED = "Corrected minus reference specific force of every pose."
 
 
@@ -49,13 +51,15 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
     ]
     _, residual = consistency = _headlines(outcome)
+    is_small = any(one.code is FindingCode.INNOVATIONS_TOO_SMALL for one in calibration.findings)
+    is_tested = all(one.n for _, one, _ in _consistencies(outcome))
     return Document(
         title="Calibration by Kalman filter",
         subtitle=calibration.recording_source or "no recording named",
         verdict=verdict_of(
             calibration.findings,
-            "OK: the innovations are as large and as white as the noise model predicts.",
-            f"{WITHIN}{residual.what} {residual.value} {residual.unit} rms",
+            f"OK: {_SMALLER if is_small else _AS_PREDICTED}.",
+            f"{WITHIN}{residual.what} {residual.value} {residual.unit} rms" if is_tested else "Usable",
             "NOT TO BE TRUSTED",
         ),
         is_trustworthy=calibration.is_trustworthy,
@@ -82,7 +86,7 @@ uncertainties are multiplied by {widening} for it. {verified}"
 def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:
     """Normalised innovations, and the residual of the poses."""
     seen = _consistencies(outcome)
-    name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
+    name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))) if one[1].n else np.inf)
     beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of cases): "
     beside += _meaning(worst)
     of = "" if len(seen) == 1 else f", {name.upper()}"
@@ -103,6 +107,8 @@ def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[t
 
 def _meaning(seen: Consistency) -> str:
     """The mean NIS in words: whether the filter's noise is too large or too small."""
+    if not seen.n:
+        return "nothing is tested"
     if seen.nis_mean < seen.nis_low:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:

@@ -81,7 +81,7 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
         nis = result.nis[result.is_settled]
         window = max(1, min(WINDOW, len(pose) // 2))
         n = max(n, len(result.is_settled))
-        mean = np.convolve(nis, np.ones(window) / window, mode="valid")
+        mean = np.convolve(nis, np.ones(window) / window, mode="valid") if len(nis) else nis
         name = XYZ[result.axis] if isinstance(result, AxisKalmanResult) else "norm of gravity"
         tips = [
             said(f"pose {p:.0f}, {name}", float(v), "times its predicted variance")

@@ -59,7 +59,7 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
-IN_FULL = ("left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
+IN_FULL = ("few-poses", "left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
 """A sentence about one pose or move begins with its number."""
@@ -83,9 +83,9 @@ def finding_in_print(code: str) -> str:
     return FINDINGS.get(code) or id_in_print(code)
 
 
-def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str]) -> str:
+def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str], n: int) -> str:
     """Warnings of one code, ``sentences`` their first clauses of ``seen``, by name, with the sensors, poses or moves
-    that they name, or else their number: ``clipping (accelerometer and gyro)``, ``outlier poses 3, 7``; one of
+    that they name, or else their number ``n``: ``clipping (accelerometer and gyro)``, ``outlier poses 3, 7``; one of
     ``IN_FULL`` by its sentence."""
     if code in IN_FULL and len(sentences) == 1:
         return sentences[0]
@@ -96,7 +96,7 @@ def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str]) 
     places = [found for one in seen for found in PLACE.findall(one)]
     if places and name.endswith((" pose", " move")):
         return f"{name}{'s' if len(places) > 1 else ''} {first_of(places)}"
-    return name if len(sentences) == 1 else f"{name} ({len(sentences)})"
+    return name if n == 1 else f"{name} ({n})"
 
 
 def label_of(group: str, name: str) -> str:

@@ -72,7 +72,10 @@ def sessions_report(model: SessionsModel) -> Document:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
         is_one = all(finding.code is not FindingCode.SEVERAL_DEVICES for finding in model.findings)
         word = "Usable with the spread below" if is_one else "Several devices"
+        odd = {change.where if change.kind == "apart" else "" for change in changed}
         usable = f"{word}: {parameters} changed between {used}"
+        if len(odd) == 1 and any(odd):
+            usable = f"{word}: {odd.pop()} differs from the others of {used} in {parameters}"
     usable += _worst(model)
     return Document(
         title="Calibration from many recordings",

@@ -144,6 +144,8 @@ def _sensor(base: Any, table: Mapping[str, Any], name: str) -> Any:
     """The profile's sensor with fields of a table; in another unit its own ADC has the same steps and range."""
     values = table.get(name, {})
     made = _changed(base, values, name)
+    if np.linalg.matrix_rank(np.asarray(made.S)) < 3:
+        raise InputError(f"{name}: S has no inverse, so that an axis would read nothing: give each axis its scale")
     if made.unit is base.unit or "adc" in values:
         return made
     adc, (old, new) = base.adc, (np.abs(np.diag(np.asarray(one.S))).mean() for one in (base, made))

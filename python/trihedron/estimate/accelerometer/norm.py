@@ -116,6 +116,8 @@ def _assemble(
         *verdict.residual_findings(chi2, quality),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
+    if dof == 0:
+        findings.append(Finding.of(FindingCode.FEW_POSES, "untested", poses=N_PARAMETERS))
     if not fit.is_converged:
         why = words(fit.stopped_because)
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=why))

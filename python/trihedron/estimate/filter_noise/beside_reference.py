@@ -23,7 +23,8 @@ from trihedron.estimate.filter_noise.stretches import angle_stretches, velocity_
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
-from trihedron.records import Recording
+from trihedron.estimate.reference.worth import error_of, of_error
+from trihedron.records import Finding, Recording
 from trihedron.records.filter_noise import (
     CAUSES,
     BiasModel,
@@ -66,8 +67,11 @@ class Request:
     accelerometer: StaticNoise | None = None
 
 
-def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Request) -> tuple[SensorFilterNoise, ...]:
-    """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude.
+def beside_reference(
+    recording: Recording, motion: ReferenceMotion, asked: Request
+) -> tuple[tuple[SensorFilterNoise, ...], tuple[Finding, ...]]:
+    """Filter noise of the gyro, and with a reference position of the accelerometer, beside a reference attitude; and
+    findings of the reference.
 
     Raises ``InputError`` when the reference has no attitude, or log and reference share less than ``LEAST_S``.
     """
@@ -93,7 +97,7 @@ def beside_reference(recording: Recording, motion: ReferenceMotion, asked: Reque
         more = beside_temperature(more, recording)
         of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
         out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
-    return tuple(out)
+    return tuple(out), tuple(of_error(error_of(found)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,7 +80,7 @@ def calibrate_without_references(
     sigmas[-1] = _sigma(covariance)
     S, b = parameters[-1, :9].reshape(3, 3).copy(), parameters[-1, 9:].copy()
     innovation, innovation_sigma = one.innovations[:, 0].copy(), np.sqrt(one.innovations[:, 1])
-    seen = check_innovations(innovation, innovation_sigma)
+    seen = check_innovations(innovation, innovation_sigma, N_PARAMETERS)
     findings: list[Finding] = []
     if n_runs is None:
         findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
@@ -96,7 +96,7 @@ def calibrate_without_references(
         sigma=sigmas,
         innovation=innovation,
         innovation_sigma=innovation_sigma,
-        is_settled=is_settled(innovation_sigma),
+        is_settled=is_settled(innovation_sigma, N_PARAMETERS),
         n_runs=n_runs or 0,
         residual_m_s2=residual,
         consistency=seen,

@@ -52,17 +52,21 @@ DIFFUSE_RATIO = 30.0
 """Ratio of an innovation's σ to the later ones' above which the diffuse start dominates it, and not the noise."""
 
 
-def is_settled(innovation_sigma: FloatArray) -> BoolArray:
-    """Innovations (n,) that the data predict; the σ of the others is dominated by the diffuse start."""
-    typical = float(np.median(innovation_sigma[len(innovation_sigma) // 2 :]))
+def is_settled(innovation_sigma: FloatArray, n_unknowns: int) -> BoolArray:
+    """Innovations (n,) that the data predict; the σ of the others, one for each unknown or more, is dominated by the
+    diffuse start."""
+    rest = np.delete(innovation_sigma, np.argsort(-innovation_sigma, kind="stable")[:n_unknowns])
+    typical = float(np.median(rest)) if len(rest) else 0.0
     return innovation_sigma <= DIFFUSE_RATIO * typical
 
 
-def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> Consistency:
+def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray, n_unknowns: int) -> Consistency:
     """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12), from
     one-step prediction errors (n,) and their predicted standard deviations (n,) in any unit."""
-    z = (innovation / innovation_sigma)[is_settled(innovation_sigma)]
+    z = (innovation / innovation_sigma)[is_settled(innovation_sigma, n_unknowns)]
     n = len(z)
+    if n == 0:
+        return Consistency(np.nan, np.nan, np.nan, 0, np.nan, 0, ())
     tail = (1.0 - CONFIDENCE) / 2.0
     low, high = chdtri(n, 1.0 - tail) / n, chdtri(n, tail) / n
     n_lags = min(20, n // 5)
@@ -87,6 +91,8 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
     """
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
     mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high
+    if seen.n == 0:
+        yield Finding.of(FindingCode.FEW_POSES, "untested", poses=9 if axis is None else 4)
     if seen.n and mean > high:
         yield Finding.of(
             FindingCode.INNOVATIONS_TOO_LARGE,
@@ -210,12 +216,12 @@ def _one_axis(
         },
         innovation=innovation,
         innovation_sigma=innovation_sigma,
-        is_settled=is_settled(innovation_sigma),
+        is_settled=is_settled(innovation_sigma, len(mean)),
         drift=drift,
         drift_sigma=drift_sigma,
         smoothed_drift=smoothed,
         smoothed_drift_sigma=smoothed_sigma,
-        consistency=check_innovations(innovation, innovation_sigma),
+        consistency=check_innovations(innovation, innovation_sigma, len(mean)),
     )
 
 

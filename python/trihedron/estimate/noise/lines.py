@@ -162,6 +162,8 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
     level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
     count = spectrum.count[top].sum()
+    if not count or not level > 0.0:
+        return False
     mean = float(np.sum(ratio[top] * spectrum.count[top]) / count) / level
     return mean < 1.0 - max(TOLERANCE, 3.0 * math.sqrt(2.0 / count + 4.0 / below.count.sum()))
 

@@ -145,14 +145,19 @@ def remarks(result: AgainstReference, is_turned: bool) -> Iterator[Finding]:
             is_square="mounted-without-error" in seen,
             angle_rad=seen.get("mounted-without-error", float("nan")),
         )
-    if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
-        rows = error.rows + error.rows_left_out
-        yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
-    for start, end in error.apart_s:
-        yield Finding.of(FindingCode.REFERENCE_APART, start_s=start, end_s=end)
+    yield from of_error(error)
     force = result.accelerometer
     if force is not None and force.widened > COLOURED:
         yield Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened)
+
+
+def of_error(error: ReferenceError) -> Iterator[Finding]:
+    """Findings of the reference alone: outliers and deviating intervals."""
+    if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
+        rows = error.rows + error.rows_left_out
+        yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
+    if apart := error.apart_s:
+        yield Finding.of(FindingCode.REFERENCE_APART, start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))
 
 
 def _up(result: AgainstReference) -> Iterator[Finding]:

@@ -43,15 +43,19 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
     ``good``."""
     serious = serious_ones(findings)
-    warned: dict[str, list[str]] = {}
+    warned: dict[str, list[Finding]] = {}
     for one in by_weight(findings):
         if one.severity is Severity.WARNING:
-            warned.setdefault(one.code.value, []).append(one.seen)
+            warned.setdefault(one.code.value, []).append(one)
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
         return good
-    named = [warnings_in_print(code, [*map(opening, seen)], seen) for code, seen in warned.items()]
+    named = []
+    for code, same in warned.items():
+        # Findings of one code with several causes are about one thing: a time gap, and the move that it is in.
+        n = 1 if len({one.cause for one in same}) > 1 else len(same)
+        named.append(warnings_in_print(code, [opening(one.seen) for one in same], [one.seen for one in same], n))
     total = sum(map(len, warned.values()))
     return f"{usable}, with {how_many(total, 'warning')}: {listed(named)}."
 

@@ -99,8 +99,9 @@ _VERIFIED = {
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
-        "calibration|A wrong file, unit, axis or sign, or a calibration of too few rotations}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
+        "calibration|A wrong file, unit, axis, sign or clock, or a calibration of too few rotations}.",
+        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units, "
+        "with its right clock (--rate, --time-unit)}.",
     ),
     (Code.NOT_TESTED, "", WARNING): Words(
         "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "

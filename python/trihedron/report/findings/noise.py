@@ -37,7 +37,7 @@ _LOG = {
         "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: the log given as static moves.",
         "the sensor was carried, turned or flown.",
         "Its N, B and K are those of the motion; record a static log, or compare the motion with a reference: "
-        "`trihedron noise LOG --reference FILE`.",
+        "`trihedron noise LOG --reference MOTION`.",
     ),
     (Code.TEMPERATURE_DRIVEN, "noise", WARNING): Words(
         "The temperature runs from {low_degc:.0f} to {high_degc:.0f} °C and explains up to {share:.0f %} of the slow "

@@ -16,9 +16,9 @@ ENTRIES = {
         "Take S and b as confirmed by the reference, not as measured; use the tracker's own poses to measure them.",
     ),
     (Code.REFERENCE_APART, "", WARNING): Words(
-        "From {start_s:.0f} to {end_s:.0f} s of the log the reference deviates from the remaining log.",
+        "The reference deviates from the remaining log in {n:# interval} from {start_s:.0f} to {end_s:.0f} s.",
         "A tracker that lost its markers or was re-initialised, or an interval that was computed otherwise.",
-        "Look at the reference's own quality flags there, or leave the interval out.",
+        "Look at the reference's own quality flags from {start_s:.0f} to {end_s:.0f} s, or leave that part out.",
     ),
     (Code.REFERENCE_MISFIT, "", WARNING): Words(
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "

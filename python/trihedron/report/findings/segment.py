@@ -72,7 +72,12 @@ ENTRIES = {
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
         "Other poses were not logged, or held for less than {least_s:.2g} s.",
-        "Log the six faces and twelve edges of a cube (18 poses), 3 to 5 s each.",
+        "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`).",
         or_severity=SERIOUS,
+    ),
+    (Code.FEW_POSES, "untested", WARNING): Words(
+        "{poses} poses determine as many parameters and leave none to test the fit.",
+        "",
+        "Record 3 more poses or more, in other directions.",
     ),
 }
