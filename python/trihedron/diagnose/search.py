@@ -198,7 +198,12 @@ class _Search:
     ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
         """Relations without a mechanism; an effect stays where it scores beside those that are found without it."""
         best = related(model, self.limit)
-        for fewer in without if best.relations else ():
-            if best.score - related(fewer, self.limit).score <= self.limit:
+        sensors = {one.effect.sensor for one in best.relations}
+        for term, fewer in zip(model.terms, without, strict=True):
+            sides = (term.distortion.force, term.distortion.rate)
+            # What a relation could stand for has left something on its sensor.
+            if not any(sides[one] is not None for one in sensors):
+                continue
+            if best.score - related(fewer, self.limit, best.relations).score <= self.limit:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from trihedron.diagnose.candidates import candidates_beside, with_best
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.signals import Dependence, dependences
-from trihedron.diagnose.relations.telegraph import telegraphs
+from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
 from trihedron.records.domains import Domain
 
 MOST_RELATIONS = 3
@@ -40,12 +41,16 @@ class Related:
     score: float
 
 
-def related(model: Hypothesis, limit: float) -> Related:
-    """Relations added to a hypothesis one at a time while the best scores more than ``limit``."""
-    found: list[Follows] = []
+def related(model: Hypothesis, limit: float, begin: Sequence[Follows] = ()) -> Related:
+    """Relations added to a hypothesis one at a time while the best scores more than ``limit``; beside those of another
+    hypothesis, ``begin``, one more."""
+    found = [one for one in begin if one.effect.family != TELEGRAPH]
+    most = MOST_RELATIONS + bool(found)
+    if found:
+        model = again(model, [*model.terms, *(one.term for one in found)])
     score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
-    while len(found) < MOST_RELATIONS and model.context.moves:
-        best = max(_leading(model, {one.effect.id for one in found}), key=lambda one: one.score, default=None)
+    while len(found) < most and model.context.moves:
+        best = max(_leading(model, {one.effect.id for one in found}, limit), key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
             break
         found.append(best)
@@ -54,12 +59,13 @@ def related(model: Hypothesis, limit: float) -> Related:
     return Related(model, tuple(found), score)
 
 
-def _leading(model: Hypothesis, known: set[str]) -> list[Follows]:
+def _leading(model: Hypothesis, known: set[str], limit: float) -> list[Follows]:
     """The relation of most evidence, if it predicts what is held out; random telegraph signals by their own score."""
     every: dict[str, Dependence] = {one.id: one for one in dependences(model.context)}
     out = []
     tried, _ = candidates_beside(model, list[Effect](every.values()), known)
-    larger, term = with_best(model, tried) if tried else (model, None)
+    standing = [one for one in tried if one.score > limit]
+    larger, term = with_best(model, standing) if standing else (model, None)
     if term is not None and larger.is_shown(model, len(model.terms)):
         score = 2.0 * (larger.log_evidence - model.log_evidence) - term.cost
         out.append(Follows(every[term.effect.id], term, score, model))
