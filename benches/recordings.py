@@ -102,7 +102,7 @@ def as_row(name, d, why, seconds):
         h = e.held_out[0] if e.held_out else None
         held.append("–" if h is None else f"{h.domain} {h.chi2_per_dof_before:.2g} → {h.chi2_per_dof_after:.2g}")
     left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)
-    related = "".join(f"; relation: {', '.join(one.depends_on)}" for one in d.relations)
+    related = "".join(f"; relation: {', '.join(one.depends_on)}" for one in d.relations).replace("|", r"\|")
     named = "; ".join(ids) + related
     return (f"| {name} | {d.segments.n_poses} | {d.verdict}{': ' if named else ''}{named} | {'; '.join(sizes)} "
             f"| {'; '.join(held)} | {left or '–'} | {seconds:.0f} s |")  # fmt: skip
