@@ -33,6 +33,7 @@ from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
 from trihedron.estimate.session.start import GyroClippedError
 from trihedron.estimate.verification import reference_findings, sense_findings
+from trihedron.estimate.verified_static_rate import with_static_rate
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -170,6 +171,7 @@ def calibrate(
         *_as_they_weigh(segments),
         *_of_fit(calibration, recording, segments),
     )
+    calibration = with_static_rate(calibration, segments)
     return _result(calibration, _with_doubtful_columns(findings), segments, recording)
 
 

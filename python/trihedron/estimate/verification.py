@@ -1,4 +1,4 @@
-"""A calibration against another recording: gravity error in static poses and tilt error after rotations."""
+"""A calibration against another recording: gravity error in static poses, tilt error after rotations, static rate."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,6 +20,7 @@ from trihedron.estimate.verified_parameters import (
     shifted_parameters,
     uncalibrated,
 )
+from trihedron.estimate.verified_static_rate import bias_findings, expected_change, rate_findings, static_rate
 from trihedron.records import (
     Calibration,
     Finding,
@@ -62,18 +63,19 @@ def verify_calibration(
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
-    rest = np.zeros((0, 3))
     gyroscope = calibration.gyroscope
-    if gyroscope is not None and segments.gyroscope_mean is not None:
-        rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
-        if any(move.stop - move.start >= 2 for move in segments.moves):
-            moves = _carried(calibration, gyroscope, recording, segments)
+    rest, rest_noise = static_rate(gyroscope, segments)
+    rest_sigma = expected_change(calibration, recording, segments, rest_noise)
+    if gyroscope is not None and len(rest) and any(move.stop - move.start >= 2 for move in segments.moves):
+        moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     changed = _changed(parameters)
     judged = (calibration, without, recording, segments)
     worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
+    force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
+    of_rates = tuple(rate_findings(rest, rest_sigma, force))
     beyond_noise = (*of_poses, *_angle_findings(moves, changed, segments))
     return Verification(
         source=recording.source,
@@ -88,13 +90,15 @@ def verify_calibration(
         angle_noise_deg=moves.noise_deg,
         angle_sigma_deg=moves.sigma_deg,
         static_rate=rest,
+        static_rate_sigma=rest_sigma,
         moves=moves.which,
         moves_left_out=moves.left_out,
         parameters=parameters,
         findings=(
             *beyond_noise,
+            *of_rates,
             *worse,
-            *_bias_findings(calibration.gyroscope, rest, is_alone=not beyond_noise),
+            *bias_findings(gyroscope, rest, FAR_BEYOND, is_alone=not beyond_noise),
             *shift_findings(parameters),
             *_untested(calibration, own, segments),
             *(() if beyond_noise else imprecision_findings(error, moves.angle_deg, own)),
@@ -195,23 +199,6 @@ def sense_findings(calibration: Calibration, recording: Recording, segments: Seg
     if _is_larger(stated, other):
         rms, rms_other = rms_of(stated), rms_of(other)
         yield Finding.of(FindingCode.LEFT_HANDED, "turns-reversed", rms_deg=rms, rms_other_deg=rms_other)
-
-
-def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray, *, is_alone: bool) -> Iterator[Finding]:
-    """Finding where the gyro bias differs by more than ``FAR_BEYOND`` σ, of the poses' scatter and stated uncertainty.
-
-    Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif). ``is_alone``: poses and moves agree.
-    """
-    if gyroscope is None or len(rest) < 2:
-        return
-    sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2)))
-    shift = rms_of(np.mean(rest, axis=0))
-    if shift <= FAR_BEYOND * sigma:
-        return
-    times = shift / sigma if sigma > 0.0 else float("inf")
-    yield Finding.of(
-        FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times, is_alone=is_alone
-    )
 
 
 def _is_larger(errors: FloatArray, others: FloatArray) -> bool:

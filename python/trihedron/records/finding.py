@@ -138,6 +138,7 @@ class FindingCode(str, Enum):
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     CALIBRATION_SHIFT = "calibration-shift"
+    STATIC_RATE_ABOVE_NOISE = "static-rate-above-noise"
     WORSE_THAN_UNCALIBRATED = "worse-than-uncalibrated"
     LIMIT_EXCEEDED = "limit-exceeded"
     NOT_TESTED = "not-tested"

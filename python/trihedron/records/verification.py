@@ -48,7 +48,8 @@ class Verification(Presented):
     after a rotation: the angle between gravity predicted by the gyro and gravity measured after the move;
     ``angle_noise_deg`` and ``angle_sigma_deg`` (m,) its expected size, by noise and in total; ``moves`` (m,) their
     indices: a move with long clipping of the gyro is excluded and in ``moves_left_out``. ``static_rate`` (n, 3) is the
-    calibrated rate in every pose [rad/s], truth 0: the change of the gyro's bias. ``parameters`` compares each one.
+    calibrated rate in every pose [rad/s], truth 0: its mean is the change of the gyro's bias, ``static_rate_sigma``
+    (n, 3) what is expected about the mean. ``parameters`` compares each one.
     """
 
     source: str
@@ -63,6 +64,7 @@ class Verification(Presented):
     angle_noise_deg: FloatArray
     angle_sigma_deg: FloatArray
     static_rate: FloatArray
+    static_rate_sigma: FloatArray
     moves: IntArray
     moves_left_out: tuple[int, ...]
     parameters: tuple[JudgedParameter, ...] = ()
@@ -77,6 +79,11 @@ class Verification(Presented):
     def angle_chi2_per_dof(self) -> float:
         """Mean square of the tilt error over its expected size; NaN without moves."""
         return float(np.mean((self.angle_deg / self.angle_sigma_deg) ** 2)) if len(self.angle_deg) else float("nan")
+
+    @property
+    def static_rate_change(self) -> FloatArray:
+        """(n, 3) rate in every pose about its mean [rad/s]: what one bias for the session leaves."""
+        return self.static_rate - self.static_rate.mean(axis=0) if len(self.static_rate) else self.static_rate
 
     @property
     def norm_rms(self) -> float:

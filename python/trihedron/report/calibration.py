@@ -108,7 +108,7 @@ def scale_headlines(calibration: Calibration) -> list[Headline]:
 
 
 def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
-    """Gravity and tilt error, how many times the noise alone they are, and whether they are cross-validated."""
+    """Gravity and tilt error and static rate, how many times the noise alone they are, and whether they are cross-validated."""
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:
@@ -128,6 +128,11 @@ def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
         without = f" ({is_out.sum()} of {how_many(len(is_out), 'move')} excluded)" if is_out.any() else ""
         line = Headline(f"tilt error after a rotation{without}", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
+    if moved is not None and moved.static_rate_rms is not None and moved.static_rate_floor is not None:
+        rms, floor = moved.static_rate_rms, moved.static_rate_floor
+        beside = f"rms, {HELD_OUT}, {AT_REST}; noise alone {plain_number(degrees_from_radians(floor))} °/s"
+        line = Headline("gyro rate in static poses", plain_number(degrees_from_radians(rms)), "°/s", beside)
+        out.append((line, rms / max(floor, TINY), True))
     return out
 
 

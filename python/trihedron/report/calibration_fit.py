@@ -36,6 +36,10 @@ def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
         rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
     else:
         rows.append(("residual", _angle_words(quality)))
+    if quality.static_rate_rms is not None and quality.static_rate_floor is not None:
+        seen, noise = (degrees_from_radians(x) for x in (quality.static_rate_rms, quality.static_rate_floor))
+        said = f"{plain_number(seen)} °/s rms {HELD_OUT}; noise alone {plain_number(noise)} °/s; {AT_REST}"
+        rows.append(("gyro rate in static poses", said))
     return rows
 
 

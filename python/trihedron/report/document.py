@@ -55,6 +55,7 @@ CONSEQUENCE = (
     FindingCode.OUTLIER_MOVE,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
+    FindingCode.STATIC_RATE_ABOVE_NOISE,
     FindingCode.NOT_OBSERVABLE,
     FindingCode.WEAKLY_OBSERVABLE,
     FindingCode.FEW_POSES,

@@ -94,6 +94,7 @@ def verification_record(verification: Verification) -> dict[str, Any]:
         "moves": v.moves,
         "moves_excluded": list(v.moves_left_out),
         "static_rate_rad_s": v.static_rate,
+        "static_rate_sigma_rad_s": v.static_rate_sigma,
         "parameters": [vars(one) for one in v.parameters],
         "findings": [finding.to_dict() for finding in v.findings],
     }

@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import XYZ, BoolArray, FloatArray, rms_of
+from trihedron.probability import chdtri
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
@@ -20,7 +21,8 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 _ABOVE_NOISE = {
     FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
-    FindingCode.HELD_OUT_WORSE: "tilt error after rotations",
+    FindingCode.HELD_OUT_WORSE: "tilt error after a rotation",
+    FindingCode.STATIC_RATE_ABOVE_NOISE: "gyro rate in static poses",
 }
 USES = "`trihedron apply FILE LOG -o corrected.csv`, `trihedron export FILE --to c -o calibration.h`"
 """What a calibration is for, in the next steps of reports."""
@@ -29,14 +31,17 @@ WITH_DRIFT = "X, Y, Z, ± 1 σ with the drift between sessions"
 LIMIT_RMS = float(np.sqrt(-np.log(0.0027)))
 """Limit of the length of a two-component Gaussian error, over its rms, with the probability of 3σ (0.27 %)."""
 
+LIMIT_OF_THREE = float(np.sqrt(chdtri(3, 0.0027) / 3.0))
+"""The same of a three-component error."""
+
 
 def verification_report(
     verification: Verification, segments: Segments | None = None, recording: Recording | None = None
 ) -> Document:
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    caption = "Gravity error in every pose and tilt error after every rotation, beside what noise and uncertainty "
-    caption += "allow: one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them "
+    caption = "Gravity error and change of the gyro rate in every pose and tilt error after every rotation, beside what "
+    caption += "noise and uncertainty allow: one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them "
     caption += "together; an rms can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
@@ -70,11 +75,13 @@ def imprecise(findings: Sequence[Finding]) -> list[Finding]:
 
 def verified_in_words(v: Verification) -> str:
     """The verdict in one sentence."""
-    above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in above_noise(v)]
+    beyond = above_noise(v)
+    above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in beyond]
     word = "Not contradicted" if imprecise(v.findings) or _is_untested(v) else "Verified"
     verified = f"{word}: errors are within noise and uncertainty"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
-    return verdict_of(v.findings, f"{verified}.", usable, "NOT VERIFIED")
+    others = [one for one in v.findings if one not in beyond or one.severity is Severity.SERIOUS]
+    return verdict_of(others, f"{usable}.", usable, "NOT VERIFIED")
 
 
 def _is_untested(v: Verification) -> bool:
@@ -94,8 +101,8 @@ def use_in_words(v: Verification, what: str) -> str:
 
 
 def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
-    """Gravity error in static poses and tilt error after rotations: name, rms, its unit, over how many, the expected
-    rms with χ²/dof, the worst."""
+    """Gravity error in static poses, tilt error after rotations, change of the static rate: name, rms, its unit, over
+    how many, the expected rms with χ²/dof, the worst."""
     k, of = int(np.argmax(np.abs(v.norm_error))), how_many(len(v.norm_error), "pose")
     expected, worst = float(np.sqrt(np.mean(v.norm_sigma**2))), f"{in_mm_s2(float(v.norm_error[k]))} in pose {k + 1}"
     allowed = f"{in_mm_s2(expected)}, χ²/dof {plain_number(v.norm_chi2_per_dof, 2)}"
@@ -108,28 +115,39 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
         worst += f"; without move {without}, where the gyro was at its limit" if without else ""
         allowed = f"{plain_number(v.angle_expected_deg)}°, χ²/dof {plain_number(v.angle_chi2_per_dof, 2)}"
         out.append(("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", of, allowed, worst))
+    change, sigma = np.degrees(v.static_rate_change), np.degrees(v.static_rate_sigma)
+    if len(change) > 1:
+        k, axis = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)
+        of = f"{how_many(len(change), 'pose')}, about its mean"
+        chi2 = float(np.sum((change / sigma) ** 2)) / (change.size - 3)
+        worst = f"{plain_number(float(change[k, axis]))} °/s ({XYZ[axis]}) in pose {k + 1}"
+        allowed = f"{plain_number(rms_of(sigma))} °/s, χ²/dof {plain_number(chi2, 2)}"
+        out.append(("gyro rate in static poses", plain_number(rms_of(change)), "°/s", of, allowed, worst))
     return out
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """Gravity and tilt error with their expected size, the one that fails first: by its limit, else the farther above
-    noise and uncertainty; then the change of the gyro's bias."""
-    errors = _errors(v)
+    """The errors with their expected size, the one that fails first: by its limit, else the farthest above noise and
+    uncertainty; then the change of the gyro's bias."""
     out = [
-        Headline(what, rms, unit, f"rms over {of}; expected {allowed}") for what, rms, unit, of, allowed, _ in errors
+        Headline(what, rms, unit, f"rms over {of}; expected {allowed}")
+        for what, rms, unit, of, allowed, _ in _errors(v)
     ]
-    limits = [finding.numbers for finding in v.findings if finding.code is FindingCode.LIMIT_EXCEEDED]
-    is_farther = v.angle_chi2_per_dof > v.norm_chi2_per_dof
-    is_tilt = "limit_deg" in limits[0] if limits else bool(above_noise(v)) and is_farther
+    farthest = max(above_noise(v), key=lambda one: one.numbers["times"], default=None)
+    code = FindingCode.RESIDUAL_ABOVE_NOISE if farthest is None else farthest.code
+    for one in v.findings:
+        if one.code is FindingCode.LIMIT_EXCEEDED:
+            code = FindingCode.HELD_OUT_WORSE if "limit_deg" in one.numbers else FindingCode.RESIDUAL_ABOVE_NOISE
+            break
     moved = [
         Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)
         for changes in _bias_changes(v)
     ]
-    return (*out[:: -1 if is_tilt else 1], *moved)
+    return (*sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code]), *moved)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
-    """Gravity and tilt errors with their expected size, and the change of the gyro's bias."""
+    """The errors with their expected size, and the change of the gyro's bias."""
     facts = [("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}")]
     for what, rms, unit, of, allowed, worst in _errors(v):
         facts.append((what, f"{with_unit(rms, unit)} rms over {of}, worst {worst}"))
@@ -186,7 +204,7 @@ def _tables(v: Verification, segments: Segments | None) -> list[Block]:
 
 
 def verification_chart(verification: Verification) -> Chart:
-    """Gravity error of every pose and tilt error after every move, with their expected size."""
+    """Gravity error and rate of every pose and tilt error after every move, with their expected size."""
     v = verification
     pose, error, sigma = np.arange(1.0, len(v.norm_error) + 1.0), mm_s2(v.norm_error), mm_s2(v.norm_sigma)
     pairs = enumerate(zip(error, sigma, strict=True), start=1)
@@ -199,7 +217,13 @@ def verification_chart(verification: Verification) -> Chart:
         panels.append(
             _panel(("move", v.moves.astype(np.float64) + 1.0), scale, (v.angle_deg, 0.0 * limit, limit), tips)
         )
-    return Chart(tuple(panels), columns=2)
+    if len(v.static_rate) > 1:
+        size, limit = (np.linalg.norm(x, axis=1) for x in (v.static_rate_change, v.static_rate_sigma))
+        size, limit = np.degrees(size), LIMIT_OF_THREE * np.degrees(limit)
+        tips = [said(f"pose {k}", a, "°/s") for k, a in enumerate(size, start=1)]
+        scale = Scale("gyro rate change  [°/s]", "°/s", includes=(0.0,))
+        panels.append(_panel(("pose", pose), scale, (size, 0.0 * limit, limit), tips))
+    return Chart(tuple(panels), columns=len(panels))
 
 
 def _panel(at: tuple[str, FloatArray], y: Scale, values: tuple[FloatArray, ...], tips: list[str]) -> Panel:

@@ -195,6 +195,16 @@ _MOVES = {
         "the logger lost samples while the sensor moved.",
         "Record again, or log at a rate that the link sustains.",
     ),
+    (Code.STATIC_RATE_ABOVE_NOISE, "", WARNING): Words(
+        "The gyro rate in static poses changes from pose to pose by {rate_rms_rad_s:.2g °/s} rms, {times:.2g} times "
+        "what noise and the bias drift of the calibration allow; largest in pose {worst_pose} "
+        "({axis:axis} {worst_rad_s:.2g °/s}), χ²/dof {chi2_per_dof:.2g}{is_by_gravity:?. It goes with gravity, by up to "
+        "{per_g_rad_s:.2g °/s} per g|}.",
+        "{is_by_gravity:?G-sensitivity of the gyro, which S and b cannot correct|The bias drifts in this log more than "
+        "in the one that was calibrated (warm-up, temperature)}.",
+        "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted with --extended"
+        "|Let the sensor warm up, or estimate the bias in use}.",
+    ),
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
         "; largest in move {worst_move} ({worst_deg:.3g}°){is_beside:?, beside the unsteady pose {unsteady:first 2}|}"
