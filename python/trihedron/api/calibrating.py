@@ -20,6 +20,7 @@ from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate
 from trihedron.estimate.gravity_circle import opposite_headings
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.lost_samples import missing_samples, unless_seen
+from trihedron.estimate.gyroscope.measurements import GAP_STEPS
 from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
 from trihedron.estimate.gyroscope.turn_angles import (
     SCALE_TOLERANCE,
@@ -165,12 +166,7 @@ def calibrate(
         calibration = on_stated_turns(calibration, recording, segments, turns_deg)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
-    findings = (
-        *said,
-        *recording.findings,
-        *_as_they_weigh(segments),
-        *_of_fit(calibration, recording, segments),
-    )
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     calibration = with_static_rate(calibration, segments)
     return _result(calibration, _with_doubtful_columns(findings), segments, recording)
 
@@ -200,13 +196,27 @@ def of_board(calibration: Calibration, recording: Recording) -> Calibration:
 
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
     """Findings about the fit, its poses, a gyro scale that contradicts its unit, and lost samples."""
-    gyro, fitted = calibration.gyroscope, with_shapes(calibration, segments)
+    gyro = calibration.gyroscope
+    fitted = tuple(_of_gap(one, recording, segments) for one in with_shapes(calibration, segments))
     if gyro is None:
         return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
     missing = tuple(missing_samples(recording, segments, median(relative)))
     of_gyro = (*scale_findings(gyro.S, recording.gyroscope_unit), *sense_findings(calibration, recording, segments))
     return (*unless_seen(fitted, missing), *of_gyro, *missing)
+
+
+def _of_gap(found: Finding, recording: Recording, segments: Segments) -> Finding:
+    """An outlier move whose samples were lost says so."""
+    if found.code is not FindingCode.OUTLIER_MOVE:
+        return found
+    k, size = int(found.numbers["move"]) - 1, found.numbers["residual_deg"]
+    move = segments.moves[k]
+    steps = np.diff(recording.time_s[move.start : move.stop + 1])
+    if not (len(steps) and float(steps.max()) > GAP_STEPS / recording.rate_hz):
+        return found
+    before, after = move.pose_before + 1, move.pose_after + 1
+    return Finding.of(FindingCode.OUTLIER_MOVE, "gap", move=k + 1, before=before, after=after, residual_deg=size)
 
 
 def _as_they_weigh(segments: Segments) -> Found:

@@ -8,7 +8,6 @@ import errno
 import os
 import shutil
 import sys
-import textwrap
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -160,10 +159,13 @@ def style() -> Style:
     """
     from trihedron.report.text import WIDTH, Style
 
-    is_terminal = sys.stdout.isatty()
-    is_said = os.environ.get("COLUMNS", "").isdigit()
-    width = shutil.get_terminal_size((WIDTH, 24)).columns if is_terminal or is_said else WIDTH
-    return Style(width, has_colour(), not speaks_unicode(sys.stdout))
+    return Style(_columns(sys.stdout) or WIDTH, has_colour(), not speaks_unicode(sys.stdout))
+
+
+def _columns(stream: TextIO) -> int | None:
+    """Columns of a terminal, or those of ``COLUMNS``; None for a file or a pipe."""
+    is_known = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    return shutil.get_terminal_size((80, 24)).columns if is_known else None
 
 
 def has_colour() -> bool:
@@ -198,9 +200,11 @@ def silence(stream: TextIO) -> None:
 
 def say(sentence: str) -> None:
     """Print on stderr what was done; results go to stdout."""
-    text = escaped(sentence)
-    if sys.stderr.isatty():
-        text = textwrap.fill(text, shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False)
+    text, columns = escaped(sentence), _columns(sys.stderr)
+    if columns is not None and len(text) > columns:
+        from trihedron.report.text import wrapped
+
+        text = "\n".join(wrapped(text, columns))
     with _closed_is_silent(sys.stderr):
         typer.echo(text, err=True)
 

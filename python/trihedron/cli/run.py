@@ -31,6 +31,8 @@ _NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
 _READ_WITH = re.compile(r"Read it with (--columns \S+)[.;] ")
 """A next step that begins with another reading: its other commands have that option too, and the last one counts."""
 UNSTORED = "calibration.json"
+LONG = 100
+"""Characters of a command from which another option is named without it."""
 UNKNOWN_PLACE = "--latitude DEG"
 """Option of the next command where gravity was not given."""
 UNKNOWN_RATE = " --rate HZ"
@@ -64,7 +66,13 @@ _run: ContextVar[_Run] = ContextVar("run")
 
 def begin(words: Sequence[str]) -> None:
     """Start a run with these arguments."""
-    _run.set(_Run(tuple(words)))
+    _run.set(_Run(tuple(map(_near, words))))
+
+
+def _near(word: str) -> str:
+    """A path below the working directory relative to it; any other word as it is."""
+    path, here = Path(word), Path.cwd()
+    return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else word
 
 
 def _now() -> _Run:
@@ -126,7 +134,7 @@ def _words(source: Any) -> list[str]:
 
 
 def _word(value: Any) -> str:
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
+    return f"{value:.12g}" if isinstance(value, float) else _near(str(value))
 
 
 def with_arguments(document: Document, stored_by: str = "...") -> Document:
@@ -143,7 +151,9 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
-            said = f"Store it (`{stored_by} -o {UNSTORED}`). {said}"
+            is_long = stored_by == "..." and len(again(_now().typed)) > LONG and not _READ_WITH.match(what_next)
+            how = f": add `-o {UNSTORED}` to this command" if is_long else f" (`{stored_by} -o {UNSTORED}`)"
+            said = f"Store it{how}. {said}"
             what_next = replace(document, next_step=said).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
     advised = _READ_WITH.match(what_next)

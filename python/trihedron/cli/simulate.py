@@ -141,17 +141,17 @@ def simulate(
     if truth is not None:
         write_truth(known, truth, overwrite=force)
         say(f"truth: {truth}")
-    if report is not None:
-        name_log(LogSource(log=output))
-        from trihedron.files.log import truth_document
-        from trihedron.report.simulation import simulation_report
+    name_log(LogSource(log=output))
+    from trihedron.files.log import truth_document
+    from trihedron.report.simulation import simulation_report
 
-        document = simulation_report(recording, known, beside, findings)
-        write_report(document, lambda: truth_document(known), report, force=force)
+    document = simulation_report(recording, known, beside, findings)
+    write_report(document, lambda: truth_document(known), report, force=force)
     if serve is not None:
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     _show(output, recording, known)
+    say(f"→ {with_commands(document.next_step)}")
     leave(findings)
 
 

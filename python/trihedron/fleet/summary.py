@@ -224,10 +224,13 @@ def _not_one_unit(by_device: dict[str, list[Session]], changes: Sequence[Change]
     """Groups of logs that are not of one device, with the most significant difference."""
     mixed = []
     for serial, sessions in by_device.items():
-        for change in of_another_unit(sessions, [change for change in changes if change.group == serial])[:1]:
+        found = of_another_unit(sessions, [change for change in changes if change.group == serial])
+        apart = {change.where if change.kind == "apart" else "" for change in found}
+        for change in found[:1]:
             k = int(np.argmax(np.abs(change.size)))
             parameter = next(one for one in PARAMETERS if (one.id, one.name) == (change.id, change.names[k]))
-            mixed.append(MixedLogs(serial, len(sessions), parameter, abs(change.size[k])))
+            odd = apart.pop() if len(apart) == 1 and len(sessions) > 2 else ""
+            mixed.append(MixedLogs(serial, len(sessions), parameter, abs(change.size[k]), odd))
     return tuple(mixed)
 
 

@@ -17,7 +17,7 @@ from trihedron.report.calibration_pictures import (
     lead_picture,
     uncalibrated_error,
 )
-from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Paragraph, Section, Table
+from trihedron.report.document import USE_IT, WITHIN, Block, Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import (
@@ -40,7 +40,7 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_rad
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
-NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`. Use it: {USES}."
+NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`.{USE_IT}{USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
 DRIFTS = FindingCode.BIAS_DRIFT, FindingCode.GYRO_BIAS_DRIFT
@@ -108,7 +108,7 @@ def scale_headlines(calibration: Calibration) -> list[Headline]:
 
 
 def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
-    """Gravity and tilt error and static rate, how many times the noise alone they are, and whether they are cross-validated."""
+    """Gravity and tilt error and static rate, in times the noise alone, and whether they are cross-validated."""
     out = []
     quality = calibration.accelerometer.quality
     if quality is not None:

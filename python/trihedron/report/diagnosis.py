@@ -45,7 +45,7 @@ from trihedron.report.effect_charts import alike, effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
-from trihedron.report.reference import beside_reference, hidden_by
+from trihedron.report.reference import beside_model, beside_reference, hidden_by
 from trihedron.report.segments import pose_lines
 
 _CAPTIONS = {
@@ -90,16 +90,20 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     if diagnosis.verdict in ("not-testable", "unexplained"):
         # No result to be used, of which the size of gravity would decide.
         findings = [one for one in findings if one.code is not FindingCode.GRAVITY_DEFAULTED]
+    found = getattr(diagnosis, "reference", None)
+    is_model = found is not None and found.source == model
+    if is_model:
+        # The motion of a simulated log is that of this one.
+        findings = [one for one in findings if one.code is not FindingCode.REFERENCE_APART]
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
-    found = getattr(diagnosis, "reference", None)
     strengths = strengths_picture(diagnosis)
     grave = tuple(filter(None, (own_serious(diagnosis),)))
     # By a reference alone a model without a gyro, or a simulation, is not compared.
     is_compared = model != "" and (diagnosis.parameters != () or not by_reference_alone(diagnosis))
-    if found is not None and strengths is not None:
+    if found is not None and strengths is not None and not is_model:
         # The chart of the reference's own error is the lead then.
         sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
     document = Document(
@@ -113,7 +117,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),
     )
-    return beside_reference(document, found)
+    return beside_model(document, found) if found is not None and is_model else beside_reference(document, found)
 
 
 def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:

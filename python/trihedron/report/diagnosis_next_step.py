@@ -58,7 +58,12 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     is_file, is_carried = model.endswith(".json"), len(of_session) < len(diagnosis.effects)
     steps = []
     if diagnosis.parameters and improved:
-        steps.append(f"Compare again: `trihedron diagnose LOG --against {quote(improved)}`.")
+        has_scale = any(p.significant and p.id.endswith("-scale") for p in diagnosis.parameters)
+        turned = " (a larger scale, readings per unit, is a smaller S)" if has_scale else ""
+        steps.append(
+            f"{improved} is your scenario with the parameters of the log{turned}: compare again, `trihedron "
+            f"diagnose LOG --against {quote(improved)}`."
+        )
     elif diagnosis.parameters and (differs or not is_file):
         missing = bool(named_effects(diagnosis, "recording")) and (is_carried or not is_file)
         news = [*(["the parameters that differ"] if differs else []), *(["the missing effects"] if missing else [])]

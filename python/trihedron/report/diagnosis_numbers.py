@@ -25,6 +25,8 @@ NAMED_SIGMAS = 3.0
 """Components of a differing group are listed from this many σ; the largest always is."""
 MOST_NUMBERS, MOST_NOISE = 3, 2
 """Most clauses about parameters and about noise in a headline; a table lists all."""
+LOGS = (".csv", ".npz", ".parquet")
+"""Endings of a simulated log."""
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
@@ -102,12 +104,13 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
 
 
 def of_another_device(diagnosis: Diagnosis, model: str) -> str:
-    """Advice where a calibration file, the ``model``, differs in what one unit keeps; else empty."""
-    off = [p for p in diagnosis.parameters if p.significant] if model.endswith(".json") else []
+    """Advice where a calibration file, the ``model``, or a log made with one differs in what one unit keeps."""
+    off = [p for p in diagnosis.parameters if p.significant] if model.endswith((".json", *LOGS)) else []
     why = "its axes have other directions" if any(p.id in GEOMETRY for p in off) else ""
     if not why and any(p.id.endswith("-scale") and abs(p.difference) > ONE_UNIT for p in off):
         why = f"scales of one unit repeat within {100.0 * ONE_UNIT:g} %"
-    return f"Check that the calibration is of this sensor: {why}. " if why else ""
+    which = "Check that the" if model.endswith(".json") else "If it is a digital twin, check that its"
+    return f"{which} calibration is of this sensor: {why}. " if why else ""
 
 
 def _groups_in_short(diagnosis: Diagnosis) -> list[str]:

@@ -24,7 +24,7 @@ from trihedron.report.chart import (
     around_zero,
 )
 from trihedron.report.diagnosis_numbers import in_print
-from trihedron.report.diagnosis_words import NOT_JUDGED, is_explained, judged_in_words
+from trihedron.report.diagnosis_words import LACKS, NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope
 from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
@@ -38,7 +38,7 @@ FEWEST_DOMAINS = 2
 """Fewest domains for which the chart is drawn; for one the table is enough."""
 MARGIN = 1.6
 """Margin of the χ² axis beyond its data, as a factor."""
-JUDGED: dict[str, Colour] = {"disagrees": "accent", "agrees": "soft", NOT_JUDGED: "shade"}
+JUDGED: dict[str, Colour] = {"disagrees": "accent", LACKS: "c2", "agrees": "soft", NOT_JUDGED: "shade"}
 EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""

@@ -43,6 +43,7 @@ IN_FULL = ("axis-handedness",)
 STATED = (*IN_FULL, "disturbed-pose")
 """Effects that a verdict states by their statement: it says where in the log."""
 NOT_JUDGED = "not judged"
+LACKS = "lacks effect"
 OF_SAMPLES = ("within-static", "timing", "rate")
 """Domains that need no poses."""
 
@@ -201,7 +202,9 @@ def judged_in_words(diagnosis: Diagnosis, test: DomainTest) -> str:
     is_open = diagnosis.verdict == "not-testable" and test.domain not in OF_SAMPLES
     # A domain of samples agrees by an effect, which the model may have too, where its own test does not.
     is_by_effect = test.domain in OF_SAMPLES and test.p_value < diagnosis.alpha / len(DOMAINS)
-    agrees = "explained" if is_by_effect else "agrees"
+    # χ² of a whole domain may agree though an effect improves its prediction, as where few poses are disturbed.
+    named = {one.held_out[0].domain for one in diagnosis.effects if one.held_out and one.side != "model"}
+    agrees = "explained" if is_by_effect else LACKS if test.domain in named else "agrees"
     return "disagrees" if test.disagrees else NOT_JUDGED if is_open else agrees
 
 

@@ -51,6 +51,7 @@ CONSEQUENCE = (
     FindingCode.TURN_NOT_A_MULTIPLE,
     FindingCode.TABLE_TILT,
     FindingCode.EFFECTS_MODELLED,
+    FindingCode.POSE_AT_RANGE_LIMIT,
     FindingCode.OUTLIER_POSE,
     FindingCode.OUTLIER_MOVE,
     FindingCode.RESIDUAL_ABOVE_NOISE,
@@ -68,10 +69,14 @@ CONSEQUENCE = (
 """Findings about the whole result: what was read wrongly, the gravest, what an option mends; the others follow."""
 WITHIN = "Usable where these errors are acceptable: "
 """Verdict with warnings, before the errors."""
+USE_IT = " Use it: "
+"""Beginning of the last step, which the test before it repeats: left out behind the action of a warning."""
 _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 """A command on the same log; where an action and the first step have the same one, they are one step."""
 IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
 """Findings about motion that the log lacks: a result of this log remains without it."""
+CONFIRMED = (FindingCode.TIME_UNIT_DETECTED,)
+"""Serious findings about what may be read rightly: the next step holds where it is."""
 INSTEAD = (*IN_A_NEW_LOG, FindingCode.SEVERAL_DEVICES)
 """Findings whose action takes the place of the use of the result."""
 THEN_RUN = {
@@ -233,6 +238,8 @@ class Document:
         action = action_in_words(first)
         if action.startswith("If ") and then and "; else " not in action:
             return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
+        if first.code in CONFIRMED and then:
+            return f"{action} If it is right: {then[:1].lower()}{then[1:]}"
         if first.severity is Severity.SERIOUS or first.code in INSTEAD:
             # An option that was missing is no remedy of what else is serious.
             others = (one for one in self.findings if one.severity is Severity.SERIOUS and one.code is not first.code)
@@ -243,6 +250,7 @@ class Document:
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
         if own is not None and first_step is not None and own[1] == first_step[1]:
             return action
+        then = then.partition(USE_IT)[0]
         return f"{action} Then: {then[:1].lower()}{then[1:]}" if then else action
 
     @property

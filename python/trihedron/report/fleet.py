@@ -77,7 +77,8 @@ def fleet_report(summary: FleetSummary) -> Document:
     if none and n_done:
         verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
-        verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
+        verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices"
+        verdict += f": {one.odd} differs from the others." if one.odd else "."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]

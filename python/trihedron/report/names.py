@@ -25,7 +25,7 @@ MEANING = {
 """Parameters and domains of residuals in words."""
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
-    "calibration-doubted": "warnings of single calibrations",
+    "calibration-doubted": "warnings by themselves",
     "calibration-imprecise": "errors larger than by the log's own calibration",
     "calibration-shift": "parameters differ",
     "effect-not-applied": "effect not compensated",
@@ -60,7 +60,10 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
-IN_FULL = ("few-poses", "left-handed", "poses-vibrate", "scale-not-nominal", "turntable")
+IN_FULL = (
+    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "poses-vibrate"),
+    *("scale-not-nominal", "turntable"),
+)
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
 """A sentence about one pose or move begins with its number."""

@@ -157,6 +157,12 @@ def beside_reference(document: Document, found: AgainstReference | None, place: 
     )
 
 
+def beside_model(document: Document, found: AgainstReference) -> Document:
+    """The report against a simulated log, whose motion is that of the recording, the motions compared at its end."""
+    section = Section("Its motion", (*reference_blocks(found), *filter(None, (error_picture(found),))))
+    return replace(document, sections=(*document.sections, section))
+
+
 def _slow(error: ReferenceError) -> str:
     return f"{plain_number(degrees_from_radians(error.slow_rad[0]), 2)}° in {plain_number(error.slow_s, 2)} s"
 

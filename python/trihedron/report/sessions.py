@@ -21,7 +21,7 @@ from trihedron.records.sessions import (
 )
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import USE_IT, Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
@@ -31,9 +31,10 @@ from trihedron.report.verification import USES
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
 """Groups of parameters in the first picture and the headlines; the others follow below."""
 REPEATS = "session to session (1 σ)"
+SEVERAL = "Several devices"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
-NEXT = f"Use the common parameters: {USES}."
+NEXT = f"Test them on another recording: `trihedron verify FILE OTHER_LOG`.{USE_IT}{USES}."
 NEXT_DEVICE = (
     "Use the common parameters for a device that is not calibrated itself: `trihedron apply FILE OTHER_LOG -o "
 )
@@ -71,12 +72,12 @@ def sessions_report(model: SessionsModel) -> Document:
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
         is_one = all(finding.code is not FindingCode.SEVERAL_DEVICES for finding in model.findings)
-        word = "Usable with the spread below" if is_one else "Several devices"
+        word = "Usable with the spread below" if is_one else SEVERAL
         odd = {change.where if change.kind == "apart" else "" for change in changed}
         usable = f"{word}: {parameters} changed between {used}"
         if len(odd) == 1 and any(odd):
             usable = f"{word}: {odd.pop()} differs from the others of {used} in {parameters}"
-    usable += _worst(model)
+    usable += "" if usable.startswith(SEVERAL) else _worst(model)
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",

@@ -59,14 +59,14 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     """
     style = Style(width) if style is None else style
     style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
-    title = [style.paint(line, _BOLD) for line in _wrap(style.plain(one_line(document.title)), style.width)]
-    verdict = _wrap(style.plain(document.verdict), style.width)
-    lines = [*title, *_wrap(style.plain(one_line(document.subtitle)), style.width), ""]
+    title = [style.paint(line, _BOLD) for line in wrapped(style.plain(one_line(document.title)), style.width)]
+    verdict = wrapped(style.plain(document.verdict), style.width)
+    lines = [*title, *wrapped(style.plain(one_line(document.subtitle)), style.width), ""]
     lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
     if document.what_next:
         steps = _SENTENCE_END.split(style.plain(document.what_next))
         for arrow, step in zip((style.plain("→ "), *["  "] * len(steps)), steps, strict=False):
-            lines += _wrap(step, style.width, arrow, "  ")
+            lines += wrapped(step, style.width, arrow, "  ")
     for section in document.sections[:sections]:
         shown = [_block(block, document, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
@@ -80,7 +80,7 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
 
 def _block(block: Block, document: Document, style: Style) -> list[str]:
     if isinstance(block, Paragraph):
-        return _wrap(style.plain(block.text), style.width)
+        return wrapped(style.plain(block.text), style.width)
     if isinstance(block, Code):
         return style.plain(block.text).splitlines()
     if isinstance(block, Facts):
@@ -96,17 +96,18 @@ def _block(block: Block, document: Document, style: Style) -> list[str]:
 def _finding_lines(finding: Finding, style: Style) -> list[str]:
     """Observation, cause and next action, indented below the severity."""
     name, width = finding.severity.value, style.width
-    first, *rest = _wrap(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
+    first, *rest = wrapped(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
     lines = [style.paint(name, _COLOURS[name]) + first[len(name) :], *rest]
     if finding.cause:
         cause = style.plain(likely(finding.cause))
-        lines += [style.paint(line, _DIM) for line in _wrap(cause, width, " " * 8, " " * 8)]
+        lines += [style.paint(line, _DIM) for line in wrapped(cause, width, " " * 8, " " * 8)]
     if finding.action:
-        lines += _wrap(style.plain(f"→ {finding.action}"), width, " " * 8, " " * 10)
+        lines += wrapped(style.plain(f"→ {finding.action}"), width, " " * 8, " " * 10)
     return lines
 
 
-def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Lines of text, in which numbers with their units and, where they fit, commands are whole."""
     # No break inside a name such as accel-scale, or inside a number with its uncertainty or per cent.
     text = _TOGETHER.sub(lambda found: found[0].replace(" ", _HELD), text)
     # A command stays in one line, or is continued as a shell reads it, so that it can be pasted.
@@ -145,11 +146,11 @@ def _facts(facts: Facts, style: Style) -> list[str]:
     longest = max((_width(word) for _, text in rows for word in text.split()), default=0)
     if width > columns // 2 or width + longest > columns:
         # Long labels or paths on a narrow terminal: the text goes below the labels.
-        hanging = [(_wrap(label, columns), _wrap(text, columns, "    ", "    ")) for label, text in rows]
+        hanging = [(wrapped(label, columns), wrapped(text, columns, "    ", "    ")) for label, text in rows]
         return [line for label, text in hanging for line in (*label, *text)]
     lines: list[str] = []
     for label, text in rows:
-        first, *rest = _wrap(text, columns, _pad(label, width, right=False), " " * width)
+        first, *rest = wrapped(text, columns, _pad(label, width, right=False), " " * width)
         lines += [style.paint(label, _DIM) + first[len(label) :], *rest]
     return lines
 
@@ -161,11 +162,11 @@ def _table(table: Table, style: Style) -> list[str]:
     found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
     in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1], keys)))
     widths = _widths(in_lines)
-    out = _wrap(style.plain(table.caption), style.width) if table.caption else []
+    out = wrapped(style.plain(table.caption), style.width) if table.caption else []
     for n, part in enumerate(_parts(widths, style.width, gap, keys)):
         if n:
             names = ", ".join(rows[0][k].strip() or f"column {k + 1}" for k in part[keys:])
-            out += ["", *_wrap(f"(continued: {names})", style.width)]
+            out += ["", *wrapped(f"(continued: {names})", style.width)]
         head, *body = (_line(row, part, widths, (style.width, gap)) for row in in_lines)
         out += [style.paint(line.rstrip(), _BOLD) for line in head]
         out += [line for row in body for line in row]
@@ -204,7 +205,7 @@ def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[I
     in_lines, gap = _stacked(rows)
     most = columns - sum(width + gap for width in _widths(in_lines)[1:])
     for row, cells in zip(in_lines, rows, strict=True):
-        row[0] = _wrap(cells[0], max(most, _FEWEST))
+        row[0] = wrapped(cells[0], max(most, _FEWEST))
     return in_lines, gap
 
 
@@ -236,7 +237,7 @@ def _line(row: list[list[str]], chosen: Sequence[int], widths: Sequence[int], sp
         lines.append((" " * gap).join(cells))
     if max(map(_width, lines)) <= columns or len(chosen) < 2:
         return lines
-    return [" ".join(row[chosen[0]]).rstrip(), *_wrap(" ".join(row[chosen[-1]]), columns, "    ", "    ")]
+    return [" ".join(row[chosen[0]]).rstrip(), *wrapped(" ".join(row[chosen[-1]]), columns, "    ", "    ")]
 
 
 def _parts(widths: list[int], columns: int, gap: int, keys: int = 1) -> list[list[int]]:

@@ -40,9 +40,9 @@ def verification_report(
 ) -> Document:
     v = verification
     made_from = f"calibration of {v.calibration_source}" if v.calibration_source else "calibration of another program"
-    caption = "Gravity error and change of the gyro rate in every pose and tilt error after every rotation, beside what "
-    caption += "noise and uncertainty allow: one in 370 is beyond it by chance. χ²/dof, each weighted by its uncertainty, judges them "
-    caption += "together; an rms can exceed the expected one by a single uncertain pose."
+    caption = "Gravity error and change of the gyro rate in every pose, tilt error after every rotation, beside what "
+    caption += "noise and uncertainty allow: one in 370 is beyond it by chance. χ²/dof, each weighted by its "
+    caption += "uncertainty, judges them together; an rms can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
@@ -117,7 +117,7 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
         out.append(("tilt error after a rotation", plain_number(v.angle_rms_deg), "°", of, allowed, worst))
     change, sigma = np.degrees(v.static_rate_change), np.degrees(v.static_rate_sigma)
     if len(change) > 1:
-        k, axis = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)
+        k, axis = divmod(int(np.argmax(np.abs(change))), 3)
         of = f"{how_many(len(change), 'pose')}, about its mean"
         chi2 = float(np.sum((change / sigma) ** 2)) / (change.size - 3)
         worst = f"{plain_number(float(change[k, axis]))} °/s ({XYZ[axis]}) in pose {k + 1}"

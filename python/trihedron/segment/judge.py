@@ -116,6 +116,7 @@ def without_cut(
         FindingCode.POSE_AT_RANGE_LIMIT,
         poses=len(clipped),
         first_s=float(recording.time_s[first[0].first * channels.length]),
+        axis=int(np.sum(~channels.is_gyroscope[: first[1].channel + 1])),
         reading=first[1].reading,
         is_stuck=_exceeds_gravity(channels, clipped, kept),
     )

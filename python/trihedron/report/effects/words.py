@@ -20,7 +20,9 @@ class EffectWords:
     lines: Mapping[str, str] = field(default_factory=dict)
 
 
-LOG_TEMPERATURE = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
+LOG_TEMPERATURE = (
+    "log the temperature, or let the sensor warm up before the log; poses repeated at its end show the drift"
+)
 UP_AND_DOWN = "repeat one pose while the temperature both rises and falls: drift in time does not reverse"
 TWO_TEMPERATURES = "repeat the same faces and turns at two temperatures"
 COME_BACK = (

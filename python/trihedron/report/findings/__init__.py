@@ -7,8 +7,8 @@ from dataclasses import replace
 from trihedron.records import Finding, Severity
 from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with, concerns_whole
 from trihedron.report.findings.wording import opening
-from trihedron.report.names import warnings_in_print
-from trihedron.report.numbers import MINUS, capital, how_many, listed
+from trihedron.report.names import IN_FULL, warnings_in_print
+from trihedron.report.numbers import MINUS, capital, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 # A number that is a value; a number in a name (pose 3) is recognised by the word before it.
@@ -52,12 +52,13 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     if not warned:
         return good
     named = []
-    for code, same in warned.items():
+    # Sentences stand behind names.
+    for code, same in sorted(warned.items(), key=lambda one: one[0] in IN_FULL):
         # Findings of one code with several causes are about one thing: a time gap, and the move that it is in.
         n = 1 if len({one.cause for one in same}) > 1 else len(same)
         named.append(warnings_in_print(code, [opening(one.seen) for one in same], [one.seen for one in same], n))
-    total = sum(map(len, warned.values()))
-    return f"{usable}, with {how_many(total, 'warning')}: {listed(named)}."
+    warnings = "a warning" if len(named) == 1 and len(next(iter(warned.values()))) == 1 else "warnings"
+    return f"{usable}, with {warnings}: {listed(named)}."
 
 
 def likely(cause: str) -> str:

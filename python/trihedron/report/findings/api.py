@@ -294,12 +294,12 @@ _MANY_RECORDINGS = {
         "Run `trihedron check {path}`.",
     ),
     (Code.CALIBRATION_DOUBTED, "of-recording", WARNING): Words(
-        "By itself, {name} has a warning: {seen:clause}.",
+        "in {name} by itself {seen:clause}.",
         "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
         "Run `trihedron diagnose {path}`, which looks for the cause.",
     ),
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
-        "By themselves, {n} of {n_all} recordings have one warning; {name}: {seen:clause}.",
+        "in {n} of {n_all} recordings by themselves {seen:clause}; these are the figures of {name}.",
         "What S and b of each recording leave, the common ones leave as well; their uncertainty is widened by it.",
         "Run `trihedron diagnose ...`, which looks for what they share.",
     ),

@@ -113,6 +113,12 @@ _MOVES = {
         "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
         "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
     ),
+    (Code.OUTLIER_MOVE, "gap", WARNING): Words(
+        "move {move} (pose {before} to pose {after}) has lost samples and is excluded: its tilt error is "
+        "{residual_deg:.2g}°.",
+        "the logger lost samples while the sensor moved.",
+        "Repeat the moves with lost samples, at a rate that the link sustains.",
+    ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
         "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
@@ -198,8 +204,8 @@ _MOVES = {
     (Code.STATIC_RATE_ABOVE_NOISE, "", WARNING): Words(
         "The gyro rate in static poses changes from pose to pose by {rate_rms_rad_s:.2g °/s} rms, {times:.2g} times "
         "what noise and the bias drift of the calibration allow; largest in pose {worst_pose} "
-        "({axis:axis} {worst_rad_s:.2g °/s}), χ²/dof {chi2_per_dof:.2g}{is_by_gravity:?. It goes with gravity, by up to "
-        "{per_g_rad_s:.2g °/s} per g|}.",
+        "({axis:axis} {worst_rad_s:.2g °/s}), χ²/dof {chi2_per_dof:.2g}{is_by_gravity:?. It goes with gravity, by up "
+        "to {per_g_rad_s:.2g °/s} per g|}.",
         "{is_by_gravity:?G-sensitivity of the gyro, which S and b cannot correct|The bias drifts in this log more than "
         "in the one that was calibrated (warm-up, temperature)}.",
         "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted with --extended"

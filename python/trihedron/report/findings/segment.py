@@ -31,8 +31,8 @@ ENTRIES = {
         "Put the case on a firm support for a better result; the means of these poses count less.",
     ),
     (Code.POSE_AT_RANGE_LIMIT, "", WARNING): Words(
-        "{poses:# pose} {poses:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
-        "reading of {reading:.6g}) and {poses:?is|are} excluded: clipped readings only bound gravity.",
+        "{poses:# pose} {poses:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, "
+        "{axis:axis} at {reading:.6g}) and {poses:?is|are} excluded; clipped readings only bound gravity.",
         "{is_stuck:?The channel is stuck: with that reading the three axes exceed gravity|The range limit is below "
         "1 g plus the bias of that axis}.",
         "{is_stuck:?Check the sensor and its wiring, and record again|Set a wider range; the remaining poses are "
