@@ -11,8 +11,8 @@ import trihedron
 from trihedron.api.calibrating import calibrate
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.errors import InputError
-from trihedron.records import FindingCode
-from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.records import Finding, FindingCode
+from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect
 from trihedron.units import STANDARD_GRAVITY_M_S2 as G
 
 SHORT = hand_session(n_poses=18, pose_s=3.0, move_s=1.5, first_pose_s=5.0)
@@ -110,6 +110,33 @@ def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_bey
     np.testing.assert_array_equal(verified.verification.moves, np.delete(judged.moves, 4))
     assert verified.verification.angle_rms_deg < 1.5 * judged.angle_rms_deg
     assert "without move 5" in str(verified)
+
+
+def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_drift_explains_it(result):
+    """0.06 °/s per g, ten times the noise of a pose mean: one bias for the session leaves it."""
+    matrix = ((1e-4, 2e-5, 0.0), (0.0, -1e-4, 5e-5), (5e-5, 0.0, 1e-4))
+    (first, _), (other, _) = (simulate(with_effect(SCENARIO, "gyro-g-sensitivity", matrix=matrix), k) for k in (11, 12))
+    alone = trihedron.calibrate(first, gravity_m_s2=G)
+    of_gyro = alone.gyroscope.quality
+    assert of_gyro.static_rate_rms > 8.0 * of_gyro.static_rate_floor
+    assert "gyro rate in static poses" in str(alone).partition("cross-validated")[0]
+    healthy = result.gyroscope.quality
+    assert healthy.static_rate_rms < 1.5 * healthy.static_rate_floor
+
+    def judged(known):
+        checked = trihedron.verify(known, other)
+        return checked, [one for one in checked.findings if one.code is FindingCode.STATIC_RATE_ABOVE_NOISE]
+
+    checked, (finding,) = judged(alone)
+    assert checked.is_passed
+    assert finding.numbers["per_g_rad_s"] == pytest.approx(1.1e-3, rel=0.3)
+    assert "Doubtful: gyro rate in static poses" in str(checked)
+    drift = Finding.of(FindingCode.GYRO_BIAS_DRIFT, "poses", change_rad_s=1e-2, axis=1, times=50.0)
+    stated = replace(alone.calibration, findings=(*alone.findings, drift))
+    for known in (trihedron.extend(alone), stated):
+        assert judged(known)[1] == []
+    other, _ = simulate(SCENARIO, 12)
+    assert judged(result)[1] == []
 
 
 def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(result):

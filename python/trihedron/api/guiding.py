@@ -79,7 +79,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
         shortfall=shortfall,
         next_up=best,
         next_words=pose_in_words(best),
-        why=_why(uncertain),
+        why=_why(uncertain, LEAST_POSES - len(up) if shortfall <= 1.0 else 0),
         poses_needed=needed,
         pose_s=_pose_s(known, accuracy, segments),
         warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
@@ -262,7 +262,9 @@ def _uncertain(now: FloatArray, after: FloatArray, wanted: FloatArray, *, has_gy
     )
 
 
-def _why(uncertain: tuple[Uncertain, ...]) -> str:
+def _why(uncertain: tuple[Uncertain, ...], n_testing: int) -> str:
+    if n_testing > 0:
+        return f"All uncertainties are within the goal; {n_testing} more poses have to test the fit."
     worst = max(uncertain, key=lambda one: (np.inf if one.now is None else one.now) / one.wanted)
     if worst.now is None:
         open_ones = [one for one in uncertain if one.now is None]

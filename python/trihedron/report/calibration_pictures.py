@@ -74,7 +74,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
         marks.append(Points(pose, size, tips, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
     rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
     # In sample, a few poses are fitted exactly: no title of their own.
-    title = f"{rms[0]} → {rms[1]} mm/s² rms, {HELD_OUT}" if held else f"{rms[0]} mm/s² rms before calibration"
+    title = f"{rms[0]} → {rms[1]} mm/s² rms" if held else f"{rms[0]} mm/s² rms before calibration"
     x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
     y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
     sizes = Panel(x, y, tuple(marks), title=title)

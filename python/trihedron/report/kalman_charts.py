@@ -92,7 +92,9 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
     low, high = (np.full(2, chdtri(window, above) / window) for above in (0.995, 0.005))
     name = f"99 % of running means (of {window}) when the noise model is right"
     band = Band(np.array([0.3, n + 0.7]), low, high, name)
-    y = Scale("innovation² / predicted variance", "", includes=(0.0,))
+    # Below 0, so that no point is cut by the edge.
+    below = -0.04 * max([float(np.max(m.y)) for m in marks if isinstance(m, Points)], default=0.0)
+    y = Scale("innovation² / predicted variance", "", includes=(below,))
     return Chart((Panel(Scale("pose", limits=(0.3, n + 0.7), whole=True), y, (band, Level(y=1.0), *marks)),))
 
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ
+from trihedron.arrays import AXES, TINY, XYZ
 from trihedron.records import Calibration
 from trihedron.records.published import HELD_OUT
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
@@ -282,7 +282,7 @@ def error_picture(found: AgainstReference, name: str = "reference-error") -> Pic
     walk = plain_number(degrees_from_radians(found.apart.walk), 2)
     caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
     caption += f"reference's world: the reference's error, and the gyro's random walk of {walk}°/√s. Band: ± 2 σ of "
-    caption += "the slow error."
+    caption += "both, about their mean."
     if found.error.apart_s:
         caption += " Orange: where it differs from the other windows; the mean is new after it."
     caption += " Grey: gaps." if found.error.gaps_s else ""
@@ -293,8 +293,14 @@ def error_chart(found: AgainstReference) -> Chart:
     """Three angles over the log's time, with the size of the slow error, gaps, and outlying intervals."""
     apart, error = found.apart, found.error
     ends = np.array([apart.time_s[0], apart.time_s[-1]])
-    reach = np.full(2, TWO_SIGMA * DEGREES * error.slow_rad[0])
-    marks: list[Mark] = [Band(ends, -reach, reach, "2 σ of its slow error"), Level(y=0.0)]
+    marks: list[Mark] = [Level(y=0.0)]
+    edges = [ends[0], *(edge for interval in error.apart_s for edge in interval), ends[1]]
+    for k, (first, last) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        # Variance of a random walk of length T about its mean, at the time t.
+        t, T = np.linspace(0.0, max(last - first, 0.0), 50), max(last - first, TINY)
+        variance = error.slow_rad[0] ** 2 + apart.walk**2 * (T / 3.0 - t + t**2 / T)
+        reach = TWO_SIGMA * DEGREES * np.sqrt(variance)
+        marks.append(Band(first + t, -reach, reach, "" if k else "2 σ of its slow error and the gyro's walk"))
     marks += [Span(first, last, "gap", "grey") for first, last in error.gaps_s]
     marks += [Span(first, last, "differs from the others", "warn") for first, last in error.apart_s]
     for k, colour in enumerate(AXIS_COLOURS):
