@@ -13,7 +13,7 @@ from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorN
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.report.ranking import said_of
 
-DRIFT = FindingCode.GYRO_BIAS_DRIFT
+RATE = FindingCode.STATIC_RATE_ABOVE_NOISE
 SWAPPED = np.eye(3)[[1, 0, 2]]
 
 
@@ -166,7 +166,7 @@ def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification
     log, known = session
     counts = np.radians(0.5) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
     found = [
-        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is DRIFT]
+        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is RATE]
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
     ]
     assert found == [[], [Severity.WARNING]]

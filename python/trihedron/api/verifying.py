@@ -93,10 +93,7 @@ def verify(
         replace(found, severity=Severity.WARNING) if accepted.get(found.code, False) else found
         for found in judged.findings
     )
-    # No one b holds in a log whose bias drifts, and "changed by" is wide there: the log's own finding says why.
-    of_log = () if own is None else own.findings
-    drifts = (f for f in of_log if f.code is FindingCode.GYRO_BIAS_DRIFT and f.severity is Severity.WARNING)
-    findings = (*recording.findings, *segments.findings, *missed, *drifts, *more, *_limits(judged, limit_mg, limit_deg))
+    findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
     findings = (*doubted(known), *same_recording(known, recording), *changed, *findings)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 

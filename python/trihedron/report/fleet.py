@@ -86,14 +86,12 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" Diagnosis: {listed(found)}{f' ({named})' if named else ''}."
     outliers = list(dict.fromkeys(one.serial for one in summary.outliers))
     moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
-    if summary.repeated and len(devices) > 1 and not outliers:
+    if summary.repeated and len(devices) > 1 and not outliers and not mixed:
         verdict += f" {_within(summary)}"
     if outliers:
         first = summary.outliers[0]
         what, away = _by(first.parameter, first.deviation)
         verdict += f" {_named(outliers)} outside the others (most: {first.serial}, {what} by {away})."
-    if summary.passed_over:
-        verdict += f" Not compared: {summary.passed_over}."
     if moved:
         verdict += f" {_named(moved)} changed between sessions, or the logs are of several units."
     return Document(
