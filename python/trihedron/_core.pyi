@@ -618,7 +618,7 @@ class SessionFit:
         candidates: Sequence[_Asked],
         scales: Sequence[float],
         strengths: Sequence[_Strengths],
-        parts: Sequence[Sequence[int]] | None = None,
+        parts: Sequence[Sequence[Sequence[int]]] | None = None,
     ) -> list[tuple[FloatArray, FloatArray, FloatArray]]: ...
     def leverage(self) -> FloatArray: ...
     def held_out(

@@ -132,7 +132,9 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list
     for first in range(0, len(offered), AT_ONCE):
         terms = [term for effect in offered[first : first + AT_ONCE] for term in terms_of(model, effect, price)]
         looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
-        kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in looks)])
+        # Low noise shows most: with the strengths refitted none gains more than at the best of these.
+        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > -NEAR]
+        kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in may)])
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
     return [replace(term, sizes=term.sizes * scale) for (term, *_), scale in zip(kept, scales, strict=True)]
 
@@ -140,10 +142,10 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list
 def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, FloatArray]]:
     """Those of some terms that lead at any strengths, by their gains (prior scales, strengths)."""
     kept: dict[int, tuple[Term, bool, FloatArray]] = {}
-    for best in np.array([gain.max(axis=0) for *_, gain in seen]).T:
+    for best in zip(*(gain.max(axis=0) for *_, gain in seen), strict=True):
         count: Counter[tuple[str, bool]] = Counter()
         led: set[str] = set()
-        for k in np.argsort(-best, kind="stable").tolist():
+        for k in sorted(range(len(seen)), key=lambda k: -best[k]):
             shape = seen[k][0].effect.id, seen[k][1]
             if count[shape] < SHAPES_KEPT and (shape[0] in led or len(led) < N_LEADERS):
                 count[shape] += 1

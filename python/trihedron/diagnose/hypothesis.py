@@ -122,8 +122,19 @@ class Hypothesis:
 
     def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AtStrengths]:
         """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times ``scales``."""
-        found = self.fitted.core.candidate_gains(_columns(terms), list(scales), [self.strengths, *ELSEWHERE])
-        return [AtStrengths(*one) for one in found]
+        wholes: dict[int, tuple[Distortion, FloatArray, list[list[int]], list[int]]] = {}
+        for k, term in enumerate(terms):
+            whole, part = term.variant.part_of or (term.distortion, range(term.distortion.n_parameters))
+            _, sizes, parts, own = wholes.setdefault(id(whole), (whole, np.ones(whole.n_parameters), [], []))
+            sizes[list(part)] = term.sizes
+            parts.append(list(part))
+            own.append(k)
+        asked = [_column(whole, sizes) for whole, sizes, *_ in wholes.values()]
+        parts_of_each = [parts for *_, parts, _ in wholes.values()]
+        strengths = [self.strengths, *ELSEWHERE]
+        found = self.fitted.core.candidate_gains(asked, list(scales), strengths, parts_of_each)
+        order = [k for *_, own in wholes.values() for k in own]
+        return [AtStrengths(*one) for _, one in sorted(zip(order, found, strict=True), key=lambda pair: pair[0])]
 
     def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
         """As :meth:`with_added` at the noise strengths found, prior sizes times the best of ``scales``."""
@@ -156,8 +167,15 @@ class Hypothesis:
         return any(after[d] < before[d] for own in changed for d in own if d in after and d in before)
 
 
-def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
-    return [(contiguous(t.distortion.force), contiguous(t.distortion.rate), t.sizes.tolist()) for t in terms]
+Column = tuple[FloatArray | None, FloatArray | None, list[float]]
+
+
+def _columns(terms: Sequence[Term]) -> list[Column]:
+    return [_column(t.distortion, t.sizes) for t in terms]
+
+
+def _column(distortion: Distortion, sizes: FloatArray) -> Column:
+    return contiguous(distortion.force), contiguous(distortion.rate), sizes.tolist()
 
 
 def hypothesis(

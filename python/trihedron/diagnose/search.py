@@ -196,7 +196,7 @@ class _Search:
     def _beside_relations(
         self, model: Hypothesis, without: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
-        """Relations without a mechanism; an effect stays where it scores beside those that are found without it."""
+        """Relations without a mechanism; an effect goes where those that are found without it score more."""
         best = related(model, self.limit)
         sensors = {one.effect.sensor for one in best.relations}
         for term, fewer in zip(model.terms, without, strict=True):
@@ -204,6 +204,6 @@ class _Search:
             # What a relation could stand for has left something on its sensor.
             if not any(sides[one] is not None for one in sensors):
                 continue
-            if best.score - related(fewer, self.limit, best.relations).score <= self.limit:
+            if related(fewer, self.limit, best.relations).score > best.score:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best

@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.arrays import AXES, TINY, FloatArray, IntArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.accepted import effect_record, tried_candidate
-from trihedron.diagnose.bias_strengths import bias_strengths
+from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths
 from trihedron.diagnose.candidates import wald_p
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
@@ -25,11 +25,11 @@ from trihedron.diagnose.hypothesis import Hypothesis, held_out_records, hypothes
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves, residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
-from trihedron.diagnose.search import search
+from trihedron.diagnose.search import Found, search
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.records import Pose, Recording, Segments
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, LinearModel
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
@@ -128,40 +128,52 @@ def _judged(
     unit = _unit(obs.recording, model, sensor)
     explained = float(np.clip(1.0 - (shown.after**2).sum() / (shown.before**2).sum(), 0.0, 1.0))
     gains = [*found.gains, *(one.gain for one in walks)]
-    made, candidates = [], [tried_candidate(one, found.against.get(key), "") for key, one in found.tried.items()]
+    candidates = [tried_candidate(one, found.against.get(key), "") for key, one in found.tried.items()]
     candidates += [Candidate(key, None, False, reason) for key, reason in found.missing.items()]
-    for k, term in enumerate(terms):
-        value, covariance = known.value(k)
-        parameters = term.effect.parameters(term.variant, value, covariance)
-        curves = effect_curves(known.context, (None, term.distortion.rate), value, covariance, [shown])
-        # One orientation does not separate bias, scale and a tilt of the fixture.
-        rivals = ("accel-thermal-scale",) if term.effect.id == "accel-thermal-bias" else ()
-        p_value, held = wald_p(value, covariance), held_out_records(found.without[k], known)
-        effect, statement = by_id()[term.effect.id], term.effect.statement(parameters)
-        series: dict[str, Any] = {}
-        if isinstance(effect, BiasDrift):
-            along = np.asarray(term.distortion.rate)[: obs.n_poses]
-            sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
-            span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
-            parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
-            series = _series(obs, along @ value, sigma, unit)
-        said = parameters, statement, p_value, found.scores[k]
-        made.append(effect_record(effect, *said, held, rivals, curves, **series))
-        candidates.append(Candidate(effect.id, p_value, True, "", found.scores[k], parameters))
-    for one in walks:
-        drift = kinds[1]
-        assert isinstance(drift, BiasDrift)
-        parameters, statement = drift.of_strength(one.size, one.std)
-        curves = bias_curves(known.context, GYRO, known.fitted.bias(GYRO), one.std, [shown])
-        said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
-        series = _series(obs, known.fitted.bias(GYRO), one.std, unit)
-        made.append(effect_record(drift, *said, held, (), curves, **series))
+    made = [_of_term(found, k, obs, shown, unit) for k in range(len(terms))]
+    candidates += [Candidate(one.id, p, True, "", one.delta_bic, size) for one, p, size in made]
+    drift = kinds[1]
+    assert isinstance(drift, BiasDrift)
+    records = [*(one for one, *_ in made), *(_of_walk(known, one, drift, shown, unit) for one in walks)]
     named = [
         _of_sensor(one, sensor, unit, explained * gain / max(sum(gains), TINY))
-        for one, gain in zip(made, gains, strict=True)
+        for one, gain in zip(records, gains, strict=True)
     ]
     tests = [_domain(sensor, x, shown, unit, is_named=bool(named)) for x in (shown.before, shown.after)]
     return _Side(plain, tuple(named), tuple(candidates), *tests)
+
+
+def _of_term(
+    found: Found, k: int, obs: Observations, shown: DomainResiduals, unit: str
+) -> tuple[AcceptedEffect, float, tuple[EffectParameter, ...]]:
+    """Effect ``k`` of the search as a record, its p-value and its parameters in the gyro's unit."""
+    known, term = found.model, found.model.terms[k]
+    value, covariance = known.value(k)
+    parameters = term.effect.parameters(term.variant, value, covariance)
+    curves = effect_curves(known.context, (None, term.distortion.rate), value, covariance, [shown])
+    # One orientation does not separate bias, scale and a tilt of the fixture.
+    rivals = ("accel-thermal-scale",) if term.effect.id == "accel-thermal-bias" else ()
+    p_value, held = wald_p(value, covariance), held_out_records(found.without[k], known)
+    effect, statement = by_id()[term.effect.id], term.effect.statement(parameters)
+    series: dict[str, Any] = {}
+    if isinstance(effect, BiasDrift):
+        along = np.asarray(term.distortion.rate)[: obs.n_poses]
+        sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
+        span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
+        parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
+        series = _series(obs, along @ value, sigma, unit)
+    said = parameters, statement, p_value, found.scores[k]
+    return effect_record(effect, *said, held, rivals, curves, **series), p_value, parameters
+
+
+def _of_walk(
+    known: Hypothesis, one: BiasStrength, drift: BiasDrift, shown: DomainResiduals, unit: str
+) -> AcceptedEffect:
+    path = known.fitted.bias(GYRO)
+    parameters, statement = drift.of_strength(one.size, one.std)
+    said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
+    curves = bias_curves(known.context, GYRO, path, one.std, [shown])
+    return effect_record(drift, *said, held, (), curves, **_series(known.obs, path, one.std, unit))
 
 
 def _series(obs: Observations, path: FloatArray, sigma: FloatArray, unit: str) -> dict[str, Any]:

@@ -56,38 +56,36 @@ pub(super) fn tuned<'py>(
     lent.collect()
 }
 
-/// Gain of every candidate, or of each of its `parts`, at each of the given strengths (11.19).
+/// Gain of every candidate, or of each of the `parts` of each, at each of the given strengths (11.19).
 pub(super) fn seen<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
     candidates: &[Candidate<'py>],
     scales: Vec<f64>,
     strengths: Vec<AllStrengths>,
-    parts: Option<Vec<Vec<usize>>>,
+    parts: Option<Vec<Vec<Vec<usize>>>>,
 ) -> PyResult<Vec<Glance<'py>>> {
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
     let asked = columns_of(of.0, candidates)?;
-    if let Some(parts) = &parts {
-        let k = asked.iter().map(|(_, sizes)| sizes.len()).min();
-        if parts.iter().flatten().any(|&i| k.is_none_or(|k| i >= k)) {
-            return Err(PyValueError::new_err(
-                "a part names a column that is not there",
-            ));
-        }
+    let parts = parts.unwrap_or_else(|| {
+        let whole = asked.iter().map(|(_, sizes)| vec![(0..sizes.len()).collect()]);
+        whole.collect()
+    });
+    let is_there = |((_, sizes), parts): (&(_, Vec<f64>), &Vec<Vec<usize>>)| {
+        parts.iter().flatten().all(|&i| i < sizes.len())
+    };
+    if parts.len() != asked.len() || !asked.iter().zip(&parts).all(is_there) {
+        return Err(PyValueError::new_err(
+            "a part names a column that is not there",
+        ));
     }
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     let found = run_long(py, || {
         let gains = CandidateGains::of(&fit, &at)?;
-        let each = asked.par_iter().map(|(effects, sizes)| {
+        let each = asked.par_iter().zip(&parts).map(|((effects, sizes), parts)| {
             let columns =
                 session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
-            let whole = || vec![(0..sizes.len()).collect()];
-            gains.of_candidates(
-                &columns,
-                sizes,
-                &scales,
-                &parts.clone().unwrap_or_else(whole),
-            )
+            gains.of_candidates(&columns, sizes, &scales, parts)
         });
         each.collect::<Result<Vec<_>>>()
     })?;

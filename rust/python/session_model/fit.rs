@@ -209,7 +209,7 @@ impl SessionFit {
 
     /// Gain of every candidate in log-evidence at each of the `strengths`, its prior sizes times each of the `scales`:
     /// `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale. With
-    /// `parts` (indices of columns), the gain of each part instead, candidate after candidate.
+    /// `parts` of each candidate (indices of columns), the gain of each part instead, candidate after candidate.
     #[pyo3(signature = (candidates, scales, strengths, parts=None))]
     fn candidate_gains<'py>(
         &self,
@@ -217,7 +217,7 @@ impl SessionFit {
         candidates: Vec<Candidate<'py>>,
         scales: Vec<f64>,
         strengths: Vec<AllStrengths>,
-        parts: Option<Vec<Vec<usize>>>,
+        parts: Option<Vec<Vec<Vec<usize>>>>,
     ) -> PyResult<Vec<Glance<'py>>> {
         seen(
             (&self.session, &self.fit),

@@ -59,6 +59,8 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
+    part_of: tuple[Distortion, tuple[int, ...]] | None = None
+    """Columns of several variants, and which of them are its own: such variants are screened together."""
 
 
 class Effect:
@@ -107,7 +109,7 @@ class Effect:
         out = np.full(variant.distortion.n_parameters, np.inf)
         for side, typical in ((variant.distortion.force, TYPICAL_M_S2), (variant.distortion.rate, TYPICAL_RAD_S)):
             if side is not None:
-                rms = np.sqrt(np.mean(np.sum(side**2, axis=1), axis=0))
+                rms = np.sqrt(np.einsum("nik,nik->k", side, side) / len(side))
                 out = np.minimum(out, typical / np.maximum(rms, LEAST_RMS))
         return out
 

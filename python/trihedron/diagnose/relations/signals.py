@@ -51,13 +51,14 @@ class Dependence(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         values = self.values if self.is_motion else self.values - self.values[: context.obs.n_poses].mean(axis=0)
+        k, own = len(self.names), context.gyro_axes if self.sensor else context.accel_axes
+        whole = acting_on(self.sensor, np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1))
         out = []
         for axes in self.axes:
-            own = (context.gyro_axes if self.sensor else context.accel_axes)[:, list(axes)]
-            columns = np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1)
+            part = tuple(a * k + j for a in axes for j in range(k))
             names = tuple(f"{AXES[a]}: {name}" for a in axes for name in self.names)
             units, label = self.units * len(axes), "".join(AXES[a] for a in axes)
-            out.append(Variant(acting_on(self.sensor, columns), names, units, label=label))
+            out.append(Variant(whole.of(part), names, units, label=label, part_of=(whole, part)))
         return out
 
 

@@ -3,6 +3,9 @@
 A thin interface to :class:`trihedron._core.SessionModel`, which computes rows and normal equations.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -43,6 +46,11 @@ class Distortion:
     def n_parameters(self) -> int:
         given = self.force if self.force is not None else self.rate
         return 0 if given is None else int(given.shape[2])
+
+    def of(self, part: Sequence[int]) -> Distortion:
+        """Some of its columns."""
+        force, rate = (None if side is None else side[:, :, list(part)] for side in (self.force, self.rate))
+        return Distortion(force, rate)
 
 
 NO_DISTORTION = Distortion(None, None)
