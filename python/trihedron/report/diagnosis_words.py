@@ -40,7 +40,7 @@ MOSTLY = 0.5
 MOST_NAMED = 4
 IN_FULL = ("axis-handedness",)
 """Effects whose statement names what is wrong in the log: a verdict states it."""
-STATED = (*IN_FULL, "disturbed-pose")
+STATED = (*IN_FULL, "disturbed-pose", "dropped-samples")
 """Effects that a verdict states by their statement: it says where in the log."""
 NOT_JUDGED = "not judged"
 LACKS = "lacks effect"

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MINUS = "−"
+BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|°/|m?m/s|rad/s|mrad)")
+"""The space between a number and its unit, at which no line breaks."""
 
 
 def plain_number(value: float, digits: int = 3) -> str:

@@ -18,7 +18,7 @@ from trihedron.report.document import Block, Code, Document, Facts, FindingList,
 from trihedron.report.drawn import drawn
 from trihedron.report.findings import beyond_headline
 from trihedron.report.findings.wording import opening
-from trihedron.report.numbers import how_many
+from trihedron.report.numbers import BEFORE_UNIT, how_many
 from trihedron.sanitise import escaped, one_line
 
 KINDS: dict[type, str] = {
@@ -83,8 +83,8 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
 
 
 def unbroken(text: str) -> Markup:
-    """HTML in which options (``--extended``), directions (``-X/+Y``) and ``5 %`` do not break; code is marked."""
-    text = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
+    """HTML in which options (``--extended``), directions (``-X/+Y``) and ``5 mm/s²`` do not break; code is marked."""
+    text = re.sub(r"`([^`]+)`", r"<code>\1</code>", BEFORE_UNIT.sub("\u00a0", str(escape(text))))
     return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', text))
 
 

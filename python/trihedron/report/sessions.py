@@ -8,7 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Severity
 from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import (
     PARAMETERS,
@@ -78,10 +78,12 @@ def sessions_report(model: SessionsModel) -> Document:
         if len(odd) == 1 and any(odd):
             usable = f"{word}: {odd.pop()} differs from the others of {used} in {parameters}"
     usable += "" if usable.startswith(SEVERAL) else _worst(model)
+    stated = (FindingCode.SEVERAL_DEVICES, FindingCode.PARAMETERS_CHANGED) if changed else ()
+    others = [one for one in model.findings if one.code not in stated or one.severity is Severity.SERIOUS]
     return Document(
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
-        verdict=verdict_of(model.findings, f"OK: {agree}.", usable, "NOT TO BE TRUSTED"),
+        verdict=verdict_of(others, f"{usable}." if changed else f"OK: {agree}.", usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
         headlines=_headlines(model),

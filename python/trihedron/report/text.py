@@ -10,6 +10,7 @@ from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.findings import beyond_headline, likely
+from trihedron.report.numbers import BEFORE_UNIT
 from trihedron.sanitise import escaped, one_line
 
 WIDTH = 100
@@ -25,7 +26,7 @@ _OPTION = re.compile(rf"({_HELD}--?\w[\w-]*){_HELD}(?!-)")
 _SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])(?=(?:[^`]*`[^`]*`)*[^`]*$)")
 """A space between sentences, not inside a command."""
 _COMMON_POWER = re.compile(r"^\((.+) ± (.+)\)(e\S+)$")
-_TOGETHER = re.compile(r"(?<=\S) ± (?=[\d.])|(?<=\d) %")
+_TOGETHER = re.compile(rf"(?<=\S) ± (?=[\d.])|{BEFORE_UNIT.pattern}")
 _FEWEST, _FEWEST_OF_HEADS = 16, 9
 """Fewest columns for names of rows, and for heads."""
 # The sixteen ANSI colours, which follow the terminal's theme.
