@@ -32,7 +32,7 @@ MOST_OF_INTERVALS = 0.02
 
 @dataclass(frozen=True)
 class Loss:
-    """Samples missing behind ``sample`` of ``move``: their number, the chi-square that it gains, and whether the motion
+    """Samples missing behind ``sample`` of ``move``: their number, the chi-square that they gain, and whether the motion
     alone decides."""
 
     sample: int
@@ -145,8 +145,12 @@ class _Move:
         own = self._refined(sorted(losses, key=lambda one: -one.gain))
         for one in sorted(losses, key=lambda one: one.gain):
             fewer = self._refined([other for other in own if other.sample != one.sample])
-            own = own if self._is_better(own, fewer) else fewer
-        return own
+            own = own if self._fall(own, fewer) >= MIN_FALL else fewer
+        # Gravity and velocity after the move are evidence as the joint of its two sides is.
+        without = [[other for other in own if other is not one] for one in own]
+        return [
+            replace(one, gain=one.gain + self._fall(own, fewer)) for one, fewer in zip(own, without, strict=True)
+        ]
 
     def _refined(self, own: list[Loss]) -> list[Loss]:
         """The losses with their best counts, the last one first."""
@@ -155,9 +159,10 @@ class _Move:
             out[k] = self._best(out, k)
         return out
 
-    def _is_better(self, more: Sequence[Loss], fewer: Sequence[Loss]) -> bool:
+    def _fall(self, more: Sequence[Loss], fewer: Sequence[Loss]) -> float:
+        """By how much the misfit is less with ``more``, in units of what remains of it and of that of the others."""
         best = self.misfit(more)
-        return self.misfit(fewer) - best >= MIN_FALL * max(best / 5.0, self.usual)
+        return (self.misfit(fewer) - best) / max(best / 5.0, self.usual)
 
     def _best(self, own: list[Loss], k: int) -> Loss:
         best, least = own[k], self.misfit(own)
