@@ -32,8 +32,8 @@ MOST_OF_INTERVALS = 0.02
 
 @dataclass(frozen=True)
 class Loss:
-    """Samples missing behind ``sample`` of ``move``: their number, the chi-square that they gain, and whether the motion
-    alone decides."""
+    """Samples missing behind ``sample`` of ``move``: their number, the chi-square that they gain, and whether the
+    motion alone decides."""
 
     sample: int
     move: int
@@ -148,9 +148,7 @@ class _Move:
             own = own if self._fall(own, fewer) >= MIN_FALL else fewer
         # Gravity and velocity after the move are evidence as the joint of its two sides is.
         without = [[other for other in own if other is not one] for one in own]
-        return [
-            replace(one, gain=one.gain + self._fall(own, fewer)) for one, fewer in zip(own, without, strict=True)
-        ]
+        return [replace(one, gain=one.gain + self._fall(own, fewer)) for one, fewer in zip(own, without, strict=True)]
 
     def _refined(self, own: list[Loss]) -> list[Loss]:
         """The losses with their best counts, the last one first."""
