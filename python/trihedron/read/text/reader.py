@@ -14,7 +14,6 @@ from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import (
-    Bytes,
     Cursor,
     TextFile,
     as_utf8,
@@ -68,12 +67,12 @@ class TextReader:
         with closing(blocks(self.file, self.cursor)) as parts:
             return self._table(self._read(parts))
 
-    def _read(self, parts: Iterable[Bytes]) -> Layout:
+    def _read(self, parts: Iterable[bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
             # Nearly all blocks after the first contain only rows of numbers and need no further checks.
             if layout is None or self.semicolons or not self._plain(part, layout):
-                layout = self._odd_part(part.tobytes(), layout)
+                layout = self._odd_part(part, layout)
             self.n_bytes += len(part)
             if self.file.progress is not None:
                 done = min(self.n_bytes / self.file.size, 1.0) if self.file.compression is None else 0.5
@@ -97,7 +96,7 @@ class TextReader:
             start = offset_of_line(data, layout.first_line)
             self.cursor.lines = layout.first_line - 1
             self._first_block(data, layout)
-        if not self._plain(np.frombuffer(data, dtype=np.uint8)[start:], layout):
+        if not self._plain(data[start:], layout):
             self._block(data[start:], layout)
         return layout
 
@@ -182,7 +181,7 @@ class TextReader:
         if len(lines):
             self._parse(text, lines, layout)
 
-    def _plain(self, text: Bytes, layout: Layout) -> bool:
+    def _plain(self, text: bytes, layout: Layout) -> bool:
         """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
         if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
@@ -190,12 +189,13 @@ class TextReader:
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
         places, room = self.store.lend(0, 0)
-        rows, is_read = _core.plain_table_into(text, separator, places, room)
+        codes = np.frombuffer(text, dtype=np.uint8)
+        rows, is_read = _core.plain_table_into(codes, separator, places, room)
         if not rows:
             return False
         expected = self._expected(rows, len(text), layout)
         if rows > len(room[0]):  # there was no room: the lines were counted but not read
-            rows, is_read = _core.plain_table_into(text, separator, *self.store.lend(rows, expected))
+            rows, is_read = _core.plain_table_into(codes, separator, *self.store.lend(rows, expected))
         if is_read:
             self.store.keep(rows)
             self.lines.append(range(self.cursor.lines + 1, self.cursor.lines + 1 + rows))
