@@ -25,10 +25,10 @@ from trihedron.read.text.cells import (
     MAX_WORDS,
     TextColumn,
     find_text_columns,
+    not_numbers,
     numbers,
     parse,
     past_midnight,
-    reject_words,
     sparse_words,
 )
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
@@ -243,30 +243,33 @@ class TextReader:
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
 
     def _parse(self, data: bytes, lines: IntArray, layout: Layout) -> None:
-        import polars as pl
-
-        schema: dict[str, type[pl.DataType]] = {
-            str(i): pl.String if i in self.text_columns else pl.Float64 for i in range(layout.n_fields)
-        }
         if self.true_lines is not None:
             lines = self.true_lines[lines - 1]
-        frame = parse(self.path, data, schema, layout, int(lines[0]))
-        if frame.height != len(lines):
+        columns: list[FloatArray] = []
+        wrong: list[tuple[int, int, str]] = []
+        for i, cells in enumerate(parse(self.path, data, layout, int(lines[0]))):
+            if len(cells) != len(lines):
+                raise ReadError(
+                    f"{self.path}: {len(lines)} lines from line {lines[0]} on give {len(cells)} rows; "
+                    "look for quotes that are opened and never closed."
+                )
+            name = layout.names[i] if layout.names else ""
+            if i not in self.text_columns:
+                values, bad = numbers(cells, layout.decimal_comma)
+                words = cells.filter(bad)
+                remarks = sparse_words(words, name, self.n_rows) if len(words) and np.isnan(values).all() else None
+                if remarks is not None and (self.n_rows == 0 or self.store.set_aside(i)):
+                    self.text_columns[i] = remarks
+                elif len(words):
+                    wrong.append((int(bad.arg_max() or 0), i, words[0].strip()))
+            columns.append(not_numbers(cells, self.text_columns[i]) if i in self.text_columns else values)
+        if wrong:
+            row, i, cell = min(wrong)
+            name = f"'{layout.names[i]}'" if layout.names and layout.names[i] else f"{i + 1}"
             raise ReadError(
-                f"{self.path}: {len(lines)} lines from line {lines[0]} on give {frame.height} rows; "
-                "look for quotes that are opened and never closed."
+                f"{self.path}: line {lines[row]}, column {name}: {cell[:40]!r} is not a number; mend or delete "
+                "that line."
             )
-        suspects = [name for name in frame.columns if schema[name] == pl.Float64 and frame[name].null_count()]
-        if suspects:
-            as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
-            for i in [int(name) for name in suspects if frame[name].null_count() == frame.height]:
-                column = sparse_words(as_text[str(i)], layout.names[i] if layout.names else "", self.n_rows)
-                if column is not None and (self.n_rows == 0 or self.store.set_aside(i)):
-                    self.text_columns[i] = column
-                    suspects.remove(str(i))
-                    frame = frame.with_columns(as_text[str(i)])
-            reject_words(self.path, frame, as_text.select(suspects), lines, layout)
-        columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
         self._take(columns, lines, len(data), layout)
 
     def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
