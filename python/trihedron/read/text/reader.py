@@ -32,7 +32,7 @@ from trihedron.read.text.cells import (
     sparse_words,
 )
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
-from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
+from trihedron.read.text.lines import Lines, data_lines, lines_of_rows, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -51,7 +51,7 @@ class TextReader:
         self.file, self.path, self.true_lines = file, file.path, lines
         self.cursor = Cursor()
         self.store = Store(0)
-        self.lines = RowLines()
+        self.lines: list[IntArray | range] = []
         self.text_columns: dict[int, TextColumn] = {}
         self.findings: list[Finding] = []
         self.n_rows, self.n_rows_checked = 0, -_ROWS_CHECKED
@@ -70,34 +70,28 @@ class TextReader:
     def _read(self, parts: Iterable[bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
-            # Nearly all blocks after the first contain only rows of numbers and need no further checks.
-            if layout is None or self.semicolons or not self._plain(part, layout):
-                layout = self._odd_part(part, layout)
+            data = as_utf8(self.path, part, self.cursor.lines + 1)
+            if b"\r" in data:
+                # Before the layout is detected: a single carriage return also ends a row.
+                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if layout is None:
+                self.semicolons = has_semicolon_remarks(data)
+            if self.semicolons:
+                data = with_hash_remarks(data)
+            if layout is None:
+                layout = self._layout(data)
+                data = data[offset_of_line(data, layout.first_line) :]
+                self.cursor.lines = layout.first_line - 1
+                self._first_block(data, layout)
+            # Nearly all blocks contain only rows of numbers and need no further checks.
+            if not self._plain(data, layout):
+                self._block(data, layout)
             self.n_bytes += len(part)
             if self.file.progress is not None:
                 done = min(self.n_bytes / self.file.size, 1.0) if self.file.compression is None else 0.5
                 self.file.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
         if layout is None:
             raise ReadError(f"{self.path}: the file contains no text after unpacking; record or copy it again.")
-        return layout
-
-    def _odd_part(self, raw: bytes, layout: Layout | None) -> Layout:
-        data = as_utf8(self.path, raw, self.cursor.lines + 1)
-        if b"\r" in data:
-            # Before the layout is detected: a single carriage return also ends a row.
-            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        if layout is None:
-            self.semicolons = has_semicolon_remarks(data)
-        if self.semicolons:
-            data = with_hash_remarks(data)
-        start = 0
-        if layout is None:
-            layout = self._layout(data)
-            start = offset_of_line(data, layout.first_line)
-            self.cursor.lines = layout.first_line - 1
-            self._first_block(data, layout)
-        if not self._plain(data[start:], layout):
-            self._block(data[start:], layout)
         return layout
 
     def line(self, number: int) -> int:
@@ -147,9 +141,8 @@ class TextReader:
             )
 
     def _first_block(self, data: bytes, layout: Layout) -> None:
-        """Find the columns of words (labels, dates) from the first lines."""
-        start = offset_of_line(data, layout.first_line)
-        head = data[start : start + (1 << 16)].decode("utf-8", errors="replace")
+        """Find the columns of words (labels, dates) from the first rows."""
+        head = data[: 1 << 16].decode("utf-8", errors="replace")
         lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
         rows = (r[: layout.n_fields] for r in lines if len(r) >= layout.n_fields and not is_comment(r[0]))
         self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
@@ -218,7 +211,9 @@ class TextReader:
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, columns))
         self.store.append(columns, self._expected(len(lines), n_bytes, layout))
-        self.lines.append(lines)
+        # A range takes no memory for the lines of a long log.
+        is_run = bool(np.all(np.diff(lines) == 1))
+        self.lines.append(range(int(lines[0]), int(lines[-1]) + 1) if is_run else lines)
         self.n_rows += len(lines)
 
     def _incomplete(self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout) -> tuple[IntArray, bytes]:
@@ -312,14 +307,15 @@ class TextReader:
                 values = past_midnight(values) if text.form == "time-of-day" else values
             columns.append(values)
             names.append(name)
+        first_line, line_of_row = lines_of_rows(self.lines)
         return Table(
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
             sha256=self.file.sha256 or self.cursor.sha256 or file_sha256(self.path),
             metadata=layout.metadata,
-            first_line=self.lines.first,
-            line_of_row=self.lines.all(),
+            first_line=first_line,
+            line_of_row=line_of_row,
             findings=tuple(self.findings),
             words=words,
             labels=labels,
