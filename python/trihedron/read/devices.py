@@ -10,7 +10,7 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import unwrap
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
-from trihedron.read.names import parse_name
+from trihedron.read.names import parse_name, sensor_said
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
@@ -82,11 +82,6 @@ _DEVICE_NAMES = frozenset(
     | {"unitid", "node", "nodeid", "mac", "macaddress", "address", "source", "topic", "topicname", "frameid"}
     | {"headerframeid"}
 )
-_ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
-_GYROSCOPE = re.compile(
-    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|rot(ation)?|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?",
-    re.I,
-)
 _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
 """Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
 
@@ -99,17 +94,9 @@ class Choice:
     instance: str | None = None
 
 
-def _kind_of(word: str) -> str:
-    """The sensor of records of this name: ``accelerometer``, ``gyroscope`` or "" for neither."""
-    text = word.strip().replace("_", " ").strip("$:")
-    if _ACCELEROMETER.fullmatch(text):
-        return "accelerometer"
-    return "gyroscope" if _GYROSCOPE.fullmatch(text) else ""
-
-
 def pick_kind(words: list[str], kind: str) -> str | None:
     """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
-    fitting = [word for word in words if _kind_of(word) == kind]
+    fitting = [word for word in words if sensor_said(word) == kind]
     letters = [word.strip("$:").lower() for word in words]
     if not fitting and set(letters) <= _LETTERS.keys():
         fitting = [word for word, letter in zip(words, letters, strict=True) if _LETTERS[letter] == kind]
