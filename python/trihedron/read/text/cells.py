@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # polars is imported where it is used: the import takes longer than reading a short log, and most logs do not need it.
 
-_PLAIN = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?").fullmatch
-"""A number in every convention."""
+JUDGED = 200
+"""Cells from which it is determined whether a column contains dates or words."""
 MAX_WORDS = 64
 """Largest number of distinct words of a column that may identify sensors or devices; with more it is text."""
 
@@ -49,24 +49,6 @@ class TextColumn:
             return
         mapped = text.replace_strict(list(self.words), list(self.words.values()), return_dtype=pl.Int64)
         self.codes.append(np.asarray(mapped.to_numpy(), dtype=np.int64))
-
-
-def find_text_columns(rows: list[list[str]], layout: Layout) -> dict[int, TextColumn]:
-    """Columns that contain words or dates instead of numbers, determined from the first rows."""
-    columns = {i: [r[i] for r in rows] for i in range(layout.n_fields)}
-    columns = {i: cells for i, cells in columns.items() if layout.decimal_comma or not all(map(_PLAIN, cells))}
-    found: dict[int, TextColumn] = {}
-    if not rows or not columns:
-        return found
-    import polars as pl
-
-    for i, column in columns.items():
-        series = pl.Series(column, dtype=pl.String)
-        _, are_words = numbers(series, layout.decimal_comma)
-        if are_words.sum() > 0.5 * len(rows):
-            cells = series.filter(are_words)
-            found[i] = TextColumn(cells[0], form_of(cells) or "")
-    return found
 
 
 def parse(path: Path, data: bytes, layout: Layout, first_line: int) -> list[pl.Series]:
@@ -103,12 +85,19 @@ def numbers(cells: pl.Series, decimal_comma: bool) -> tuple[FloatArray, pl.Serie
     return np.asarray(values.to_numpy(), dtype=np.float64), bad
 
 
-def sparse_words(words: pl.Series, name: str, n_before: int) -> TextColumn | None:
-    """A column of occasional ``words`` (k,), remarks, after ``n_before`` empty cells. None where numbers are expected
-    by its name."""
-    if not name or parse_name(name).role:
+def text_column(cells: pl.Series, values: FloatArray, words: pl.Series, name: str, n_before: int) -> TextColumn | None:
+    """The column of dates or words that cells are, ``words`` being the mask of those that are no numbers.
+
+    In the first block most of the first cells are words. After ``n_before`` empty cells, and where none is a number,
+    words are occasional remarks, unless numbers are expected by the name. None for a column of numbers.
+    """
+    is_first = words.head(JUDGED)
+    if n_before == 0 and is_first.sum() > 0.5 * len(is_first):
+        first = cells.head(JUDGED).filter(is_first)
+        return TextColumn(first[0], form_of(first) or "")
+    if not name or parse_name(name).role or not np.isnan(values).all():
         return None
-    return TextColumn(words[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
+    return TextColumn(cells.filter(words)[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
 
 
 def not_numbers(cells: pl.Series, column: TextColumn) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from contextlib import closing
-from itertools import islice
 
 import numpy as np
 
@@ -24,14 +23,13 @@ from trihedron.read.text.blocks import (
 from trihedron.read.text.cells import (
     MAX_WORDS,
     TextColumn,
-    find_text_columns,
     not_numbers,
     numbers,
     parse,
     past_midnight,
-    sparse_words,
+    text_column,
 )
-from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
+from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect
 from trihedron.read.text.lines import Lines, data_lines, lines_of_rows, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
@@ -82,7 +80,6 @@ class TextReader:
                 layout = self._layout(data)
                 data = data[offset_of_line(data, layout.first_line) :]
                 self.cursor.lines = layout.first_line - 1
-                self._first_block(data, layout)
             # Nearly all blocks contain only rows of numbers and need no further checks.
             if not self._plain(data, layout):
                 self._block(data, layout)
@@ -139,13 +136,6 @@ class TextReader:
                     line=self.line(layout.stray[0]),
                 )
             )
-
-    def _first_block(self, data: bytes, layout: Layout) -> None:
-        """Find the columns of words (labels, dates) from the first rows."""
-        head = data[: 1 << 16].decode("utf-8", errors="replace")
-        lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
-        rows = (r[: layout.n_fields] for r in lines if len(r) >= layout.n_fields and not is_comment(r[0]))
-        self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
 
     def _block(self, data: bytes, layout: Layout) -> None:
         # One irregular block may be the incomplete last one; after two, further blocks are not tested as plain.
@@ -250,13 +240,12 @@ class TextReader:
                 )
             name = layout.names[i] if layout.names else ""
             if i not in self.text_columns:
-                values, bad = numbers(cells, layout.decimal_comma)
-                words = cells.filter(bad)
-                remarks = sparse_words(words, name, self.n_rows) if len(words) and np.isnan(values).all() else None
-                if remarks is not None and (self.n_rows == 0 or self.store.set_aside(i)):
-                    self.text_columns[i] = remarks
-                elif len(words):
-                    wrong.append((int(bad.arg_max() or 0), i, words[0].strip()))
+                values, words = numbers(cells, layout.decimal_comma)
+                column = text_column(cells, values, words, name, self.n_rows) if words.any() else None
+                if column is not None and (self.n_rows == 0 or self.store.set_aside(i)):
+                    self.text_columns[i] = column
+                elif words.any():
+                    wrong.append((int(words.arg_max() or 0), i, cells.filter(words)[0].strip()))
             columns.append(not_numbers(cells, self.text_columns[i]) if i in self.text_columns else values)
         if wrong:
             row, i, cell = min(wrong)
