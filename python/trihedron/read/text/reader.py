@@ -52,12 +52,16 @@ class TextReader:
         self.lines: list[IntArray | range] = []
         self.text_columns: dict[int, TextColumn] = {}
         self.findings: list[Finding] = []
-        self.n_rows, self.n_rows_checked = 0, -_ROWS_CHECKED
+        self.n_rows_checked = -_ROWS_CHECKED
         self.n_bytes = 0
         self.comments: list[IntArray] = []
-        self.n_left_out = 0
-        self.may_be_plain, self.n_odd_blocks = True, 0
+        self.n_odd_blocks = 0
         self.semicolons = False
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows read so far."""
+        return self.store.n_rows
 
     def read(self) -> Table:
         """The whole file as a table."""
@@ -80,6 +84,7 @@ class TextReader:
                 layout = self._layout(data)
                 data = data[offset_of_line(data, layout.first_line) :]
                 self.cursor.lines = layout.first_line - 1
+                self.store = Store(layout.n_fields, self._triads(layout))
             # Nearly all blocks contain only rows of numbers and need no further checks.
             if not self._plain(data, layout):
                 self._block(data, layout)
@@ -126,7 +131,6 @@ class TextReader:
                 "the separator or the columns change inside the file; cut it there and read the parts one by one."
             )
         if layout.stray:
-            self.n_left_out += len(layout.stray)
             self.findings.append(
                 Finding.of(
                     FindingCode.ROWS_LEFT_OUT,
@@ -138,8 +142,6 @@ class TextReader:
             )
 
     def _block(self, data: bytes, layout: Layout) -> None:
-        # One irregular block may be the incomplete last one; after two, further blocks are not tested as plain.
-        self.may_be_plain = self.n_odd_blocks == 0
         self.n_odd_blocks += 1
         ends_with_line_end = data.endswith(b"\n")
         data = regular(data, layout)
@@ -166,11 +168,10 @@ class TextReader:
 
     def _plain(self, text: bytes, layout: Layout) -> bool:
         """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
-        if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
+        # One irregular block may be the incomplete last one; after two, further blocks are not tested.
+        if self.n_odd_blocks > 1 or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
         separator = ord(layout.separator)
-        if self.n_rows == 0:
-            self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
         places, room = self.store.lend(0, 0)
         codes = np.frombuffer(text, dtype=np.uint8)
         rows, is_read = _core.plain_table_into(codes, separator, places, room)
@@ -183,7 +184,6 @@ class TextReader:
             self.store.keep(rows)
             self.lines.append(range(self.cursor.lines + 1, self.cursor.lines + 1 + rows))
             self.cursor.lines += rows
-            self.n_rows += rows
         return is_read
 
     def _expected(self, n_new: int, n_bytes: int, layout: Layout) -> int:
@@ -198,13 +198,10 @@ class TextReader:
 
     def _take(self, columns: list[FloatArray], lines: IntArray, n_bytes: int, layout: Layout) -> None:
         """Store the rows of a block, unless the expected number of rows does not fit into memory."""
-        if self.n_rows == 0:
-            self.store = Store(layout.n_fields, self._triads(layout, columns))
         self.store.append(columns, self._expected(len(lines), n_bytes, layout))
         # A range takes no memory for the lines of a long log.
         is_run = bool(np.all(np.diff(lines) == 1))
         self.lines.append(range(int(lines[0]), int(lines[-1]) + 1) if is_run else lines)
-        self.n_rows += len(lines)
 
     def _incomplete(self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout) -> tuple[IntArray, bytes]:
         """The block without an incomplete last line of the file; any other irregular line is rejected."""
@@ -216,7 +213,6 @@ class TextReader:
                 f"{self.path}: line {line} has {fields} fields where the others have "
                 f"{layout.n_fields}; complete or delete that line."
             )
-        self.n_left_out += 1
         self.findings.append(
             Finding.of(
                 FindingCode.LINE_INCOMPLETE,
@@ -256,9 +252,9 @@ class TextReader:
             )
         self._take(columns, lines, len(data), layout)
 
-    def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
+    def _triads(self, layout: Layout) -> tuple[tuple[int, int, int], ...]:
         """Columns of each sensor, to be stored as one array (n, 3); a wrong guess only costs memory."""
-        head = Table(self.path, layout.names, tuple(column[:1000] for column in columns), first_line=1)
+        head = Table(self.path, layout.names, (np.zeros(1),) * layout.n_fields, first_line=1)
         chosen = columns_or_none(head)
         if chosen is None or len(set(chosen.readings)) < len(chosen.readings):
             return ()
@@ -269,7 +265,6 @@ class TextReader:
             raise ReadError(f"{self.path}: the file has a header but no row of numbers; record or copy it again.")
         remarks = np.concatenate(self.comments) if self.comments else np.zeros(0, dtype=np.int64)
         if len(remarks):
-            self.n_left_out += len(remarks)
             self.findings.append(
                 Finding.of(
                     FindingCode.ROWS_LEFT_OUT, "remarks", rows_left_out=len(remarks), line=self.line(int(remarks[0]))
@@ -308,6 +303,6 @@ class TextReader:
             findings=tuple(self.findings),
             words=words,
             labels=labels,
-            rows_in_file=self.n_rows + self.n_left_out,
+            rows_in_file=self.n_rows + round(sum(f.numbers.get("rows_left_out", 0.0) for f in self.findings)),
             is_private=True,
         )
