@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import unwrap
-from trihedron.read.columns import Columns
+from trihedron.read.columns import SENSORS, Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name, sensor_said
 from trihedron.read.table import Table
@@ -16,7 +16,6 @@ from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
 
-_SENSORS = ("accelerometer", "gyroscope")
 _BEFORE = re.compile(r"\s*(?P<device>[^\W_]+)[_.:/ -]+(?P<rest>[^\W\d_].*)")
 _BEHIND = re.compile(r"(?P<rest>.*?[^\W\d_])(?:[_.: -]+(?P<device>[^\W_]+)|(?P<number>\d))(?P<unit>\s*[\[(].*)?\s*")
 
@@ -43,7 +42,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
             findings=(*table.findings, chosen(phrase("names"), instance, listed, 0)),
             is_chosen=True,
         )
-    if instance is None and devices and not any(parse_name(name).role in _SENSORS for name in table.names or ()):
+    if instance is None and devices and not any(parse_name(name).role in SENSORS for name in table.names or ()):
         raise ReadError(
             f"{table.path}: the names of the columns identify {len(devices)} devices: {', '.join(devices)}; read one "
             f"of them with --instance {next(iter(devices))}."
@@ -69,7 +68,7 @@ def _devices(names: tuple[str, ...]) -> Devices:
 
 def _of_sensors(columns: dict[int, str]) -> set[str]:
     parsed = {name: parse_name(name) for name in columns.values()}
-    return {name for name, meaning in parsed.items() if meaning.role in _SENSORS and meaning.axis}
+    return {name for name, meaning in parsed.items() if meaning.role in SENSORS and meaning.axis}
 
 
 MAX_DEVICES = 16
@@ -221,7 +220,7 @@ def _device_column(
 def by_sensor(table: Table) -> tuple[Table, ...]:
     """Accelerometer and gyro of a table in which a column of words names each row's sensor; else the table itself."""
     for i, (words, codes) in table.labels.items():
-        names = {kind: pick_kind(list(words), kind) for kind in ("accelerometer", "gyroscope")}
+        names = {kind: pick_kind(list(words), kind) for kind in SENSORS}
         acc, gyr = names["accelerometer"], names["gyroscope"]
         if acc is None or gyr is None:
             continue

@@ -285,12 +285,6 @@ def _sensor(words: list[str]) -> str:
         return ""
     if len(hits) == 1:
         return hits.pop()
-    if len(hits) == 2:
-        # "accelerometer rate x": the first of the words names the sensor.
-        for word in words:
-            for sensor, pattern in _SENSOR_WORDS.items():
-                if pattern.fullmatch(word) and word != "rate":
-                    return sensor
     if words and words[0] == "alpha":
         return "translation"  # Kalibr's name for acceleration if omega is there too; else an angular acceleration
     while len(words) > 1 and _DEVICE_WORD.match(words[0]):
