@@ -131,7 +131,7 @@ def beginning(file: TextFile, n: int) -> bytes:
 
 _MINUS = "\u2212".encode()
 """The minus sign that typesetting programs and some spreadsheets write for ``-``."""
-_SEMICOLON = re.compile(rb"(?m)^;")
+SEMICOLON_REMARK = re.compile(rb"(?m)^;")
 
 
 def has_semicolon_remarks(data: bytes) -> bool:
@@ -140,11 +140,6 @@ def has_semicolon_remarks(data: bytes) -> bool:
         return False
     rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip() and not line.startswith(b";")]
     return bool(rows) and not any(b";" in line for line in rows)
-
-
-def with_hash_remarks(data: bytes) -> bytes:
-    """The text with remarks that begin with ``#`` instead of ``;``."""
-    return _SEMICOLON.sub(b"#", data)
 
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:

@@ -13,12 +13,12 @@ from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import (
+    SEMICOLON_REMARK,
     Cursor,
     TextFile,
     as_utf8,
     blocks,
     has_semicolon_remarks,
-    with_hash_remarks,
 )
 from trihedron.read.text.cells import (
     MAX_WORDS,
@@ -79,7 +79,7 @@ class TextReader:
             if layout is None:
                 self.semicolons = has_semicolon_remarks(data)
             if self.semicolons:
-                data = with_hash_remarks(data)
+                data = SEMICOLON_REMARK.sub(b"#", data)
             if layout is None:
                 layout = self._layout(data)
                 data = data[offset_of_line(data, layout.first_line) :]
