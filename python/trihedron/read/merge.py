@@ -53,11 +53,12 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     merged, note = _on_clock_of(base, other, where)
     seen = {(f.code, f.seen) for f in accelerometer.findings}
     extra = [f for f in gyroscope.findings if (f.code, f.seen) not in seen]
-    others_columns: dict[str, Any] = {"accelerometer": None} if is_gyro_base else {"gyroscope": None}
+    both = (accelerometer, gyroscope)
+    of_columns: dict[str, Any] = {f"{name}_unit": _unit_before(one, name) for one in both for name in one.triads}
+    of_columns["accelerometer" if is_gyro_base else "gyroscope"] = None
     return replace(
         merged,
-        columns=replace(base.columns, **others_columns, accelerometer_unit=_unit_before(accelerometer)),
-        gyroscope_unit=_unit_before(gyroscope),
+        columns=replace(base.columns, **of_columns),
         findings=(*accelerometer.findings, *extra, note),
         rows_in_file=accelerometer.rows_in_file + gyroscope.rows_in_file,
         rows_read=accelerometer.rows_read + gyroscope.rows_read - round(note.numbers.get("rows_left_out", 0.0)),
@@ -68,11 +69,10 @@ def _instants(sensors: Sensors) -> FloatArray:
     return sensors.time_s + sensors.start_s
 
 
-def _unit_before(sensors: Sensors) -> str:
+def _unit_before(sensors: Sensors, name: str) -> str:
     """The unit of readings before interpolation, after which it is not visible that they were whole numbers."""
-    ((name, readings),) = sensors.triads.items()
-    named = sensors.gyroscope_unit if name == "gyroscope" else sensors.columns.accelerometer_unit
-    return WHOLE if named in {"", "raw"} and is_integer(readings) else named
+    named: str = getattr(sensors.columns, f"{name}_unit")
+    return WHOLE if named in {"", "raw"} and is_integer(sensors.triads[name]) else named
 
 
 def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Finding]:

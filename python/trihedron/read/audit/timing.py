@@ -28,7 +28,7 @@ _SURE, _SCALES_DIFFER = 4.0, 0.01
 def audit_pace(sensors: Sensors) -> list[Finding]:
     """A finding where the rate of the timestamps changes at a row, unless the rotation of gravity confirms the
     change."""
-    time_s = sensors.time_s if sensors.timestamps_s is None else sensors.timestamps_s
+    time_s = sensors.logged_s
     accelerometer, gyroscope = sensors.accelerometer, sensors.gyroscope
     if gyroscope is None:
         return []
@@ -100,8 +100,7 @@ def audit_timing(sensors: Sensors, rate_hz: float) -> list[Finding]:
 
     Long steps are gaps; the clock counts the samples lost in them, if it can.
     """
-    time_s, place = sensors.time_s, sensors.place
-    logged_s = time_s if sensors.timestamps_s is None else sensors.timestamps_s
+    time_s, logged_s, place = sensors.time_s, sensors.logged_s, sensors.place
     if len(time_s) < 3 or not usual_step(time_s) > 0:
         return []
     findings: list[Finding] = []
