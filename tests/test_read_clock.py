@@ -243,3 +243,13 @@ def test_a_tick_without_a_length_is_no_time_unit(word):
 )
 def test_a_unit_of_time_lasts_what_it_says(word, seconds):
     assert seconds_of(parse_time_unit(word)) == pytest.approx(seconds, rel=1e-15)
+
+
+@pytest.mark.parametrize("grid_s", [0.004, 0.008])
+def test_the_period_of_late_timestamps_is_right_on_a_grid_nearly_as_coarse(grid_s):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        late = 0.01 * np.arange(3000) + rng.exponential(1e-3, 3000)
+        clock = find_even_clock(np.maximum.accumulate(np.floor(late / grid_s) * grid_s))
+        # An alias of the period is off by a tenth or more.
+        assert clock.period_s == pytest.approx(0.01, rel=1e-3)

@@ -1,6 +1,7 @@
 """Two clocks become one: nothing is made up in gaps; and logs whose rows are documents."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,20 @@ from formats.table import LAYOUTS, read_layout, verdict
 from hand_made_sessions import motion
 from makers.structured import documents, drive
 from trihedron.read import ReadError, read_recording
-from trihedron.read.merge import merge, resample
-from trihedron.records import FindingCode, Severity
+from trihedron.read.columns import Columns
+from trihedron.read.merge import merge_sensors, resample
+from trihedron.read.sensors import Sensors
+from trihedron.read.table import Table
+from trihedron.records import FindingCode, Sampling, Severity, TimestampKind
+
+
+def merged_of(acc, acc_t, acc_start, gyr, gyr_t, gyr_start):
+    """The merged sensors of readings on two clocks, and what was noted."""
+    tables = Table(Path("a"), None, ()), Table(Path("b"), None, ())
+    settled = {"sampling": Sampling(TimestampKind.EXACT)}
+    one = Sensors(acc_t, acc_start, acc, None, tables[0], Columns(), None, 0, True, **settled)
+    other = Sensors(gyr_t, gyr_start, None, gyr, tables[1], Columns(), None, 0, True, **settled)
+    return merge_sensors(one, other)
 
 
 def test_the_accelerometer_keeps_its_samples_and_a_ramp_is_interpolated_exactly():
@@ -20,8 +33,8 @@ def test_the_accelerometer_keeps_its_samples_and_a_ramp_is_interpolated_exactly(
     gyr_t = acc_t + 0.004
     acc = np.random.default_rng(1).standard_normal((1000, 3))
     gyr = np.column_stack([gyr_t, 2 * gyr_t, -gyr_t])
-    merged = merge(acc, acc_t, 5.0, gyr, gyr_t - gyr_t[0], 5.004, "a and b")
-    assert merged.base == "accelerometer"
+    merged = merged_of(acc, acc_t, 5.0, gyr, gyr_t - gyr_t[0], 5.004)
+    assert merged.table.path == Path("a")
     # The first accelerometer sample is older than any gyro sample.
     np.testing.assert_array_equal(merged.accelerometer, acc[1:])
     # Linear interpolation is exact on a straight line up to rounding of 10.
@@ -35,7 +48,7 @@ def test_the_stated_noise_factor_is_what_interpolation_does_to_white_noise():
     gyr_t = np.arange(n) / 100.0
     acc_t = gyr_t[:-1] + rng.uniform(0.05, 0.95, n - 1) / 100.0
     gyr = rng.standard_normal((n, 3))
-    merged = merge(np.zeros((n - 1, 3)), acc_t - acc_t[0], acc_t[0], gyr, gyr_t, 0.0, "a and b")
+    merged = merged_of(np.zeros((n - 1, 3)), acc_t - acc_t[0], acc_t[0], gyr, gyr_t, 0.0)
     (finding,) = merged.findings
     # 3 n normal deviates: the relative sampling error of a variance is sqrt(2 / 3n) = 0.002 (correlation adds little).
     assert np.var(merged.gyroscope) == pytest.approx(finding.numbers["variance_factor"], rel=0.008)
@@ -46,7 +59,7 @@ def test_same_ticks_are_taken_as_they_are():
     t = np.arange(500) / 100.0
     rng = np.random.default_rng(3)
     acc, gyr = rng.standard_normal((500, 3)), rng.standard_normal((500, 3))
-    merged = merge(acc[3:], t[3:] - t[3], t[3], gyr[:-4], t[:-4] + 1e-5, 0.0, "a and b")
+    merged = merged_of(acc[3:], t[3:] - t[3], t[3], gyr[:-4], t[:-4] + 1e-5, 0.0)
     np.testing.assert_array_equal(merged.accelerometer, acc[3:-4])
     np.testing.assert_array_equal(merged.gyroscope, gyr[3:-4])
     assert merged.findings[0].numbers["variance_factor"] == 1.0
@@ -56,7 +69,7 @@ def test_nothing_is_made_up_in_a_gap():
     acc_t = np.arange(1000) / 100.0
     keep = (acc_t < 3.0) | (acc_t > 3.5)
     gyr_t = acc_t[keep] + 0.003
-    merged = merge(np.ones((1000, 3)), acc_t, 0.0, np.ones((len(gyr_t), 3)), gyr_t - gyr_t[0], gyr_t[0], "a and b")
+    merged = merged_of(np.ones((1000, 3)), acc_t, 0.0, np.ones((len(gyr_t), 3)), gyr_t - gyr_t[0], gyr_t[0])
     lost = np.isnan(merged.gyroscope).any(axis=1)
     times = merged.time_s + merged.start_s
     assert lost.sum() == pytest.approx(51, abs=2)
@@ -69,8 +82,8 @@ def test_nothing_is_made_up_in_a_gap():
 def test_a_faster_gyro_keeps_its_samples_and_that_is_a_warning():
     acc_t, gyr_t = np.arange(200) / 50.0, np.arange(1600) / 400.0
     gyr = np.random.default_rng(4).standard_normal((1600, 3))
-    merged = merge(np.column_stack([acc_t] * 3), acc_t, 0.0, gyr, gyr_t, 0.0, "a and b")
-    assert merged.base == "gyroscope"
+    merged = merged_of(np.column_stack([acc_t] * 3), acc_t, 0.0, gyr, gyr_t, 0.0)
+    assert merged.table.path == Path("b")
     np.testing.assert_array_equal(merged.gyroscope, gyr[: len(merged.time_s)])
     np.testing.assert_allclose(merged.accelerometer[:, 0], merged.time_s, atol=1e-12)
     assert merged.findings[0].severity is Severity.WARNING

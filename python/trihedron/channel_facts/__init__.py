@@ -11,11 +11,9 @@ from trihedron.records.channel_facts import ChannelFacts, RecordingFacts
 __all__ = ["facts_in", "facts_of"]
 
 
-def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None, rate_hz: float) -> RecordingFacts:
-    """Noise, LSB and limits in raw readings (n, 3) of the sensors present, sampled at a rate."""
-    named = {"accelerometer": accelerometer, "gyroscope": gyroscope}
-    present = {name: readings for name, readings in named.items() if readings is not None}
-    return facts_in(present, look(present, rate_hz))
+def facts_of(sensors: dict[str, FloatArray], rate_hz: float) -> RecordingFacts:
+    """Noise, LSB and limits in raw readings (n, 3) of the sensors present, by name, sampled at a rate."""
+    return facts_in(sensors, look(sensors, rate_hz))
 
 
 # Absurd readings (1e300) overflow squares; their noise is infinite then.

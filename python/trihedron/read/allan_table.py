@@ -97,8 +97,7 @@ def _title(key: str, place: int) -> str:
 def _deviation(table: Table, column: int, key: str) -> FloatArray:
     values = table.columns[column]
     values = np.where(values > 0.0, values, math.nan)
-    is_variance = any(key == word or key.endswith("_" + word) for word in _VARIANCE)
-    return np.sqrt(values) if is_variance else values
+    return np.sqrt(values) if _ending(key) in _VARIANCE else values
 
 
 def _unit(name: str) -> str:

@@ -2,6 +2,7 @@
 
 import math
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.lib import format as npy_format
 
 from trihedron.errors import InputError
 from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
-from trihedron.read.memory import check_memory, check_unpacked
+from trihedron.read.memory import check_memory, check_unpacked, columns_table
 from trihedron.read.table import Table
 
 
@@ -33,7 +34,6 @@ def _devices(archive: zipfile.ZipFile, name: str) -> int:
     return int(shape[1]) if len(shape) == 3 and dtype.kind in "iuf" else 1
 
 
-_BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one raises errors of a parser, too.
 _DAMAGED = "this .{} file is damaged or contains Python objects ({{}})"
 
@@ -99,42 +99,22 @@ def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], chosen: 
 
 
 def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], instance: str | None) -> Table:
-    names: list[str] = []
-    columns: list[npt.NDArray[Any]] = []
-    metadata: dict[str, str] = {}
     flat: dict[str, npt.NDArray[Any]] = {}
     for name, array in arrays.items():
         flat |= {key: array[key] for key in array.dtype.names} if array.dtype.names else {name: array}
     lengths = [a.shape[0] for a in flat.values() if a.ndim >= 1]
     n_rows = max([n for n in lengths if n > 12] or lengths, default=0)
-    is_chosen = False
-    for name, given in flat.items():
-        array = given
-        if array.dtype.kind not in "iufb":
-            if array.size == 1 and array.dtype.kind in "US":
-                metadata[name] = str(array.reshape(-1)[0])
-            continue
-        if array.ndim == 0 or array.shape[0] != n_rows:
-            metadata[name] = " ".join(f"{value:.12g}" for value in np.ravel(array)[:64].astype(float))
-            continue
-        if array.ndim == 3:
-            array = _pick_device(path, name, array, instance)
-            is_chosen = True
-        if array.ndim > 2:
-            raise ReadError(f"{path}: array '{name}' has {array.ndim} dimensions; save rows x columns.")
-        if array.ndim == 1:
-            names.append(name)
-            columns.append(array)
-            continue
-        check_memory(path, n_rows, array.shape[1])
-        block = name in _BLOCK_NAMES or array.shape[1] > 3
-        # Columns of a block have no names: their order is recognised as in a text log without a header.
-        names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
-        columns += list(array.T)
-    if not columns:
-        raise ReadError(
-            f"{path}: there is no numeric array of rows in this file (it contains {', '.join(arrays) or 'nothing'})."
-        )
-    numbers = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in columns)
-    named = tuple(names) if any(names) else None
-    return Table(path, named, numbers, file_sha256(path), metadata, is_chosen=is_chosen)
+    items: list[tuple[str, Any]] = []
+    for name, array in flat.items():
+        if array.ndim == 3 and len(array) == n_rows:
+            check_memory(path, n_rows, array.shape[2])
+            items.append((name, _pick_device(path, name, array, instance)))
+        elif array.ndim and len(array) == n_rows:
+            check_memory(path, n_rows, math.prod(array.shape[1:]))
+            items.append((name, array))
+        elif array.dtype.kind in "iufb":
+            items.append((name, " ".join(f"{value:.12g}" for value in np.ravel(array)[:64].astype(float))))
+        elif array.size == 1:
+            items.append((name, str(array.reshape(-1)[0])))
+    table = columns_table(str(path), items, file_sha256(path))
+    return replace(table, path=path, is_chosen=any(array.ndim == 3 for array in flat.values()))

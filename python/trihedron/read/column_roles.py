@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from trihedron.read.columns import SENSORS, Columns, Triad
 from trihedron.read.names import parse_name
@@ -41,15 +42,14 @@ def rivals_of(table: Table, columns: Columns) -> Iterator[Finding]:
     for sensor, rivals in columns.rivals.items():
         taken = " ".join(table.label(c) for c in getattr(columns, sensor))
         others = [" ".join(table.label(c) for c in triad) for triad in rivals[:MOST_RIVALS]]
-        is_first = sensor == "accelerometer"
-        other = replace(columns, accelerometer=rivals[0]) if is_first else replace(columns, gyroscope=rivals[0])
+        other: dict[str, Any] = {sensor: rivals[0]}
         yield Finding.of(
             FindingCode.COLUMNS_ASSUMED,
             "one-of-several",
             sensor=sensor,
             taken=taken,
             others=others,
-            mapping=mapping_of(other),
+            mapping=mapping_of(replace(columns, **other)),
         )
 
 

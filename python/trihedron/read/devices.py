@@ -8,15 +8,14 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import unwrap
-from trihedron.read.columns import Columns
+from trihedron.read.columns import SENSORS, Columns
 from trihedron.read.errors import ReadError
-from trihedron.read.names import parse_name
+from trihedron.read.names import parse_name, sensor_said
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
 
-_SENSORS = ("accelerometer", "gyroscope")
 _BEFORE = re.compile(r"\s*(?P<device>[^\W_]+)[_.:/ -]+(?P<rest>[^\W\d_].*)")
 _BEHIND = re.compile(r"(?P<rest>.*?[^\W\d_])(?:[_.: -]+(?P<device>[^\W_]+)|(?P<number>\d))(?P<unit>\s*[\[(].*)?\s*")
 
@@ -43,7 +42,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
             findings=(*table.findings, chosen(phrase("names"), instance, listed, 0)),
             is_chosen=True,
         )
-    if instance is None and devices and not any(parse_name(name).role in _SENSORS for name in table.names or ()):
+    if instance is None and devices and not any(parse_name(name).role in SENSORS for name in table.names or ()):
         raise ReadError(
             f"{table.path}: the names of the columns identify {len(devices)} devices: {', '.join(devices)}; read one "
             f"of them with --instance {next(iter(devices))}."
@@ -69,7 +68,7 @@ def _devices(names: tuple[str, ...]) -> Devices:
 
 def _of_sensors(columns: dict[int, str]) -> set[str]:
     parsed = {name: parse_name(name) for name in columns.values()}
-    return {name for name, meaning in parsed.items() if meaning.role in _SENSORS and meaning.axis}
+    return {name for name, meaning in parsed.items() if meaning.role in SENSORS and meaning.axis}
 
 
 MAX_DEVICES = 16
@@ -81,11 +80,6 @@ _DEVICE_NAMES = frozenset(
     | {"imunumber", "id", "device", "deviceid", "devicename", "devicenr", "sensor", "sensorid", "sensorname", "unit"}
     | {"unitid", "node", "nodeid", "mac", "macaddress", "address", "source", "topic", "topicname", "frameid"}
     | {"headerframeid"}
-)
-_ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
-_GYROSCOPE = re.compile(
-    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|rot(ation)?|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?",
-    re.I,
 )
 _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
 """Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
@@ -99,17 +93,9 @@ class Choice:
     instance: str | None = None
 
 
-def _kind_of(word: str) -> str:
-    """The sensor of records of this name: ``accelerometer``, ``gyroscope`` or "" for neither."""
-    text = word.strip().replace("_", " ").strip("$:")
-    if _ACCELEROMETER.fullmatch(text):
-        return "accelerometer"
-    return "gyroscope" if _GYROSCOPE.fullmatch(text) else ""
-
-
 def pick_kind(words: list[str], kind: str) -> str | None:
     """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
-    fitting = [word for word in words if _kind_of(word) == kind]
+    fitting = [word for word in words if sensor_said(word) == kind]
     letters = [word.strip("$:").lower() for word in words]
     if not fitting and set(letters) <= _LETTERS.keys():
         fitting = [word for word, letter in zip(words, letters, strict=True) if _LETTERS[letter] == kind]
@@ -234,7 +220,7 @@ def _device_column(
 def by_sensor(table: Table) -> tuple[Table, ...]:
     """Accelerometer and gyro of a table in which a column of words names each row's sensor; else the table itself."""
     for i, (words, codes) in table.labels.items():
-        names = {kind: pick_kind(list(words), kind) for kind in ("accelerometer", "gyroscope")}
+        names = {kind: pick_kind(list(words), kind) for kind in SENSORS}
         acc, gyr = names["accelerometer"], names["gyroscope"]
         if acc is None or gyr is None:
             continue

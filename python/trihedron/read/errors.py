@@ -13,11 +13,11 @@ from trihedron.subprocesses import check_tables
 
 
 @contextmanager
-def panics_unprinted() -> Iterator[None]:
-    """Redirect file descriptor 2 to a file; afterwards print its content unless it is a panic.
+def stderr_without(noise: bytes) -> Iterator[None]:
+    """Redirect file descriptor 2 to a file; afterwards print its content unless it contains ``noise``.
 
-    A panic of polars becomes an exception, but its hook prints a backtrace first. Nothing is redirected where standard
-    error is closed or is not a file.
+    Libraries write to it directly: a panic of polars becomes an exception, but its hook prints a backtrace first.
+    Nothing is redirected where standard error is closed or is not a file.
     """
     try:
         sys.stderr.flush()
@@ -34,7 +34,7 @@ def panics_unprinted() -> Iterator[None]:
             os.close(before)
             kept.seek(0)
             said = kept.read()
-            if said and b"panicked at" not in said:
+            if noise not in said:
                 os.write(2, said)
 
 
@@ -71,7 +71,7 @@ def errors_of_polars(path: Path, damage: str, remedy: str = "") -> Iterator[None
     import polars
 
     try:
-        with errors_of_system(path), panics_unprinted():
+        with errors_of_system(path), stderr_without(b"panicked at"):
             yield
     except polars.exceptions.PanicException:
         raise ReadError(f"{path}: {damage}{remedy}.") from None

@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.read.columns import SENSORS
 from trihedron.read.errors import ReadError
+from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 
 BYTES_PER_CELL_AT_PEAK = 16
@@ -211,8 +213,9 @@ def _series(series: Any) -> Any:
     return values
 
 
-def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
-    """Named arrays (n,) or (n, k) as a table; single values are metadata.
+def columns_table(kind: str, items: list[tuple[Any, Any]], sha256: str = "") -> Table:
+    """Named arrays (n,) or (n, k) as a table; single values are metadata. Where no name means a sensor, the columns of
+    an array (n, k) have no names: their order is recognised as in a text log without a header.
 
     Raises ``ReadError`` when lengths disagree, or there is no column of numbers.
     """
@@ -220,6 +223,7 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
     columns: list[FloatArray] = []
     words: dict[int, str] = {}
     metadata: dict[str, str] = {}
+    of_blocks: set[int] = set()
     for key, value in items:
         name = str(key)
         array = np.ma.asanyarray(value) if isinstance(value, np.ma.MaskedArray) else np.asanyarray(value)
@@ -234,7 +238,7 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
             names.append(f"{name} [s]" if is_time else name)
             columns.append(_floats(kind, name, array))
         elif array.ndim == 2:
-            if array.shape[1] > 16:
+            if array.shape[1] > max(16, len(array)):
                 raise ReadError(
                     f"{kind}: '{name}' has shape {array.shape}; rows are samples, so give its transpose if it is 3 x n."
                 )
@@ -242,6 +246,7 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
             has_clock = len(parts) == 4 and len(parts[0]) > 2 and bool(np.all(np.diff(parts[0]) > 0.0))
             # A clock and three readings in one array, as in RoNIN's raw readings.
             names += [f"{name} time"] * has_clock + [f"{name}[{k}]" for k in range(len(parts) - has_clock)]
+            of_blocks.update(range(len(columns), len(names)))
             columns += parts
         else:
             raise ReadError(f"{kind}: '{name}' has {array.ndim} dimensions; give (n,) or (n, 3).")
@@ -251,7 +256,9 @@ def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
         raise ReadError(f"{kind}: its columns differ in length ({listed[:300]}); give one value of each per sample.")
     if not lengths:
         raise ReadError(f"{kind}: there is no column of numbers in it.")
-    return _table(kind, tuple(names), tuple(columns), words, metadata)
+    if not any(parse_name(name).role in SENSORS for name in names):
+        names = ["" if i in of_blocks else name for i, name in enumerate(names)]
+    return _table(kind, tuple(names) if any(names) else None, tuple(columns), words, metadata, sha256)
 
 
 def _is_numeric_object(array: npt.NDArray[Any]) -> bool:
@@ -295,8 +302,9 @@ def _table(
     columns: tuple[FloatArray, ...],
     words: dict[int, str] | None = None,
     metadata: dict[str, str] | None = None,
+    sha256: str = "",
 ) -> Table:
     digest = hashlib.sha256()
-    for column in columns:
+    for column in () if sha256 else columns:
         digest.update(column.tobytes())
-    return Table(Path(f"<{kind}>"), names, columns, digest.hexdigest(), metadata or {}, words=words or {})
+    return Table(Path(f"<{kind}>"), names, columns, sha256 or digest.hexdigest(), metadata or {}, words=words or {})

@@ -8,6 +8,7 @@ from trihedron.read.clock.unit import seconds_of
 from trihedron.read.languages import english, plain
 
 _WORD = re.compile(r"(?:[^\W_²³¹]|°)+")
+_CAMEL = re.compile(r"([a-z])([A-Z])")
 _NOT_A_SENSOR = frozenset(
     {"cov", "covariance", "std", "stddev", "sigma", "var", "bias", "offset", "integral", "dt", "euler", "orientation"}
     | {"quaternion", "quat", "mag", "magnetometer", "magnetic", "gravity", "clipping", "clip", "samples", "sat", "flag"}
@@ -35,7 +36,11 @@ _TICK_BEHIND = re.compile(r"(?:\s+in\s+|[\s_/]+)((?:1/)?\d[\d.]*\s*(?:k?hz|[mnu�
 """The size of a tick after a name: ticks_25 us, ticks_1/32768 s."""
 _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
 """Words after which a unit is not one per second: rad/min begins as rad does."""
-_OF_READINGS = frozenset({"unit", "units", "raw", "data", "reading", "readings", "value", "values"})
+_OF_READINGS = frozenset(
+    {"unit", "units", "raw", "data", "reading", "readings", "value", "values", "uncal", "uncalibrated", "total"}
+    | {"type", "imu", "sensor", "android", "rate", "velocity"}
+)
+"""Words beside the name of a sensor that change nothing in what it measures."""
 _COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
 """Words for counts; mg/LSB is the LSB, not a unit of the readings."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
@@ -135,11 +140,11 @@ def _of_unit(text: str) -> list[str]:
 
 
 def sensor_said(text: str) -> str:
-    """The sensor that a remark names, with no other property of it; "" where it does not."""
-    words = [w for w in english(_WORD.findall(plain(text).lower())) if w not in _OF_READINGS]
-    sensor = _sensor(words)
-    is_alone = all(_SENSOR_WORDS[sensor].fullmatch(w) or w == "rate" for w in words) if sensor in _UNIT_OF else False
-    return sensor if is_alone else ""
+    """The sensor that a remark, a record or a file is named after, with no other property of it; "" for others."""
+    words = english(_WORD.findall(_CAMEL.sub(r"\1 \2", plain(text)).lower()))
+    sensor = "" if len(words) > 1 and is_rate(text) else _sensor(words)
+    known = _SENSOR_WORDS.get(sensor)
+    return sensor if known is not None and all(known.fullmatch(w) or w in _OF_READINGS for w in words) else ""
 
 
 def unit_said(sensor: str, text: str) -> str:
@@ -201,7 +206,7 @@ def parse_name(name: str) -> ColumnName:
     if inner:
         index, text = inner.group(1).lower(), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
-    words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
+    words = english(_WORD.findall(_CAMEL.sub(r"\1 \2", text).lower()))
     # The LSB or a range is not a unit of the readings.
     stated = "" if re.match(r"[±+x*×-]*\s*\d[\d.]*(\s*/\s*[\d.]+)?\s*[a-zµ°]", bracket) else bracket
     unit_words = _of_unit(stated)
@@ -280,12 +285,6 @@ def _sensor(words: list[str]) -> str:
         return ""
     if len(hits) == 1:
         return hits.pop()
-    if len(hits) == 2:
-        # "accelerometer rate x": the first of the words names the sensor.
-        for word in words:
-            for sensor, pattern in _SENSOR_WORDS.items():
-                if pattern.fullmatch(word) and word != "rate":
-                    return sensor
     if words and words[0] == "alpha":
         return "translation"  # Kalibr's name for acceleration if omega is there too; else an angular acceleration
     while len(words) > 1 and _DEVICE_WORD.match(words[0]):

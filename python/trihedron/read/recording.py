@@ -208,10 +208,10 @@ def _judged_gyro(
     if turning is not None:
         turning = replace(turning, clock_is_weighed=any(was_weighed(one) for one in sensors.findings))
     clear = turning if turning is not None and turning.is_clear else None
-    judged = judge_gyroscope(sensors.gyroscope, clear, windows, sensors.gyroscope_unit, given, extremes)
+    judged = judge_gyroscope(sensors.gyroscope, clear, windows, sensors.columns.gyroscope_unit, given, extremes)
     if turning is None:
         return Judged(judged.unit, (*judged.findings, *_exchanged(sensors, rate_hz)))
-    is_stated = given is not None or sensors.gyroscope_unit not in {"", "raw", WHOLE}
+    is_stated = given is not None or sensors.columns.gyroscope_unit not in {"", "raw", WHOLE}
     fits = (
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )

@@ -60,7 +60,6 @@ class Sensors:
     rows: npt.NDArray[np.signedinteger] | None
     offset: int
     has_clock: bool
-    gyroscope_unit: str = ""
     sampling: Sampling = UNJUDGED
     lost_behind: IntArray | None = None
     timestamps_s: FloatArray | None = None
@@ -73,6 +72,11 @@ class Sensors:
         """Readings (n, 3) of the sensors present."""
         both = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
         return {name: triad for name, triad in both.items() if triad is not None}
+
+    @property
+    def logged_s(self) -> FloatArray:
+        """(n,) timestamps as they were logged."""
+        return self.time_s if self.timestamps_s is None else self.timestamps_s
 
     def row(self, sample: int) -> int:
         """Row of the base table that contains a sample."""
@@ -146,12 +150,9 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
         findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}", mapping=mapping_of(chosen)))
     findings.insert(len(table.findings), statement(table, chosen, path.name if sensor else ""))
-    for name, triad, where in (
-        ("accelerometer", accelerometer, chosen.accelerometer),
-        ("gyroscope", gyroscope, chosen.gyroscope),
-    ):
-        if triad is not None and where is not None:
-            _reject_constant(table, name, triad, where)
+    for name, triad in (("accelerometer", accelerometer), ("gyroscope", gyroscope)):
+        if triad is not None:
+            _reject_constant(table, name, triad, getattr(chosen, name))
     return Sensors(
         clock.time_s,
         clock.start_s,
@@ -162,7 +163,6 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         clock.rows,
         0,
         chosen.time is not None,
-        chosen.gyroscope_unit,
         findings=tuple(findings),
         rows_in_file=table.n_in_file,
         rows_read=len(clock.time_s),

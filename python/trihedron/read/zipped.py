@@ -1,26 +1,22 @@
 """Zip archives from phone apps: one text file per sensor, on a common clock."""
 
-import re
 import zipfile
 import zlib
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
+from trihedron.read.columns import SENSORS, sensor_of_file_name
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
 from trihedron.read.memory import check_unpacked
+from trihedron.read.names import sensor_said
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
 _OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError)
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
-_KINDS = {
-    "accelerometer": re.compile(r"acc(el(erometer|eration)?)?(uncalibrated)?|totalacceleration|imu"),
-    "gyroscope": re.compile(r"gyr(o(scope)?)?(uncalibrated)?|angularvelocity|rotationrate"),
-}
-_WITHOUT_GRAVITY = re.compile(r"linear|withoutg|user|gravity|meta")
 
 
 def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
@@ -77,27 +73,18 @@ def _by_name(members: list[str]) -> list[str]:
     """The only text, or the members of both sensors; readings with gravity and uncorrected ones are preferred."""
     if len(members) == 1:
         return members
-    picked: list[str] = []
-    for pattern in _KINDS.values():
-        ranked = []
-        for name in members:
-            plain = re.sub(r"[^a-z]", "", PurePosixPath(name).stem.lower())
-            if pattern.fullmatch(plain) and not _WITHOUT_GRAVITY.search(plain):
-                # Sensor Logger's Accelerometer excludes gravity where there is also a TotalAcceleration.
-                ranked.append((plain.endswith("uncalibrated") + 2 * plain.startswith("total"), name))
-        if ranked:
-            picked.append(max(ranked, key=lambda r: r[0])[1])
-    if not picked:
-        raw = [n for n in members if re.sub(r"[^a-z]", "", PurePosixPath(n).stem.lower()) == "rawdata"]
-        return raw[:1]
-    return picked
+    stems = {name: PurePosixPath(name).stem for name in members}
+    # Sensor Logger's Accelerometer excludes gravity where there is also a TotalAcceleration.
+    ranked = sorted(members, key=lambda name: [word in stems[name].lower() for word in ("total", "uncalibrated")])
+    found = {sensor_said(stems[name]) or ("accelerometer" if stems[name] == "imu" else ""): name for name in ranked}
+    picked = [found[sensor] for sensor in SENSORS if sensor in found]
+    return picked or [name for name in members if stems[name].lower().replace(" ", "") == "rawdata"][:1]
 
 
 def _member(
     path: Path, archive: zipfile.ZipFile, name: str, sha256: str, progress: Progress | None, is_of_several: bool
 ) -> tuple[Table, ...]:
     # Parsing needs a large library, which a NumPy archive does not.
-    from trihedron.read.columns import sensor_of_file_name
     from trihedron.read.text.blocks import TextFile
     from trihedron.read.text.open import read_text
 

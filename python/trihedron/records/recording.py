@@ -227,7 +227,7 @@ class Recording(Presented):
     def facts(self) -> RecordingFacts:
         """Properties of the ADCs, measured from the readings on first use."""
         # ``read`` measures them; a record only stores them.
-        found: RecordingFacts = ask("facts_of", self.accelerometer, self.gyroscope, self.rate_hz)
+        found: RecordingFacts = ask("facts_of", self._readings(), self.rate_hz)
         return found
 
     @cached_property

@@ -12,11 +12,11 @@ from trihedron.files.formats.autopilot import (
     Composed,
     about,
     board_of,
-    common_range,
     composed,
     held_by,
     moved_to,
     orientation,
+    range_lines,
     said_of_misfit,
     triple,
 )
@@ -36,8 +36,8 @@ def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
     equation = "corrected = (reading - P(T) + P(CALTEMP) - OFFS) * SCAL per axis, SI; a gyro has no SCAL."
     lines = about(own, board, equation, f"AHRS_ORIENTATION {board.parameters.get('AHRS_ORIENTATION', 0.0):g}")
     for name, one in sensors.items():
-        imu = board.accel if name == "accelerometer" else board.gyro
-        letters, suffix = ("ACC" if name == "accelerometer" else "GYR"), _suffix(imu)
+        imu, letters = _names(board, name)
+        suffix = _suffix(imu)
         known = board.parameters.get(f"INS_{letters}{suffix}_ID")
         if known is not None:
             lines.append(f"INS_{letters}{suffix}_ID,{known:.0f}")
@@ -62,14 +62,19 @@ def correction_of(board: Onboard, name: str) -> AxisCorrection:
     """The board's correction of one sensor; none where its readings were logged raw."""
     if board.stage == "raw":
         return AxisCorrection(np.zeros(3), np.ones(3), np.eye(3))
-    is_accel = name == "accelerometer"
-    imu, letters = (board.accel, "ACC") if is_accel else (board.gyro, "GYR")
+    imu, letters = _names(board, name)
     root, suffix = f"INS_{letters}", _suffix(imu)
-    scale = triple(board.parameters, f"{root}{suffix}SCAL_{{}}", 1.0) if is_accel else np.ones(3)
+    # A gyro has no such parameters.
+    scale = triple(board.parameters, f"{root}{suffix}SCAL_{{}}", 1.0)
     # A scale of 0 means that the sensor was never calibrated.
     scale = np.where(scale == 0.0, 1.0, scale)
     turn = np.eye(3) if board.stage == "corrected" else orientation(board.parameters.get("AHRS_ORIENTATION", 0.0))
     return AxisCorrection(triple(board.parameters, f"{root}{suffix}OFFS_{{}}"), scale, turn, _held_thermal(board, name))
+
+
+def _names(board: Onboard, name: str) -> tuple[int, str]:
+    """The sensor's number on the board (from 0), and the letters in the names of its parameters."""
+    return (board.accel, "ACC") if name == "accelerometer" else (board.gyro, "GYR")
 
 
 def _suffix(imu: int) -> str:
@@ -77,7 +82,7 @@ def _suffix(imu: int) -> str:
 
 
 def _held_thermal(board: Onboard, name: str) -> Thermal | None:
-    imu, letters = (board.accel, "ACC") if name == "accelerometer" else (board.gyro, "GYR")
+    imu, letters = _names(board, name)
     root, p = f"INS_TCAL{imu + 1}_", board.parameters
     if p.get(f"{root}ENABLE", 0.0) != 1.0:
         return None
@@ -91,21 +96,16 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray
     held, new = _held_thermal(board, name), one.thermal
     if new is None:
         return np.zeros(3), []
-    imu, letters = (board.accel, "ACC") if name == "accelerometer" else (board.gyro, "GYR")
+    imu, letters = _names(board, name)
     root = f"INS_TCAL{imu + 1}_"
     total, _ = moved_to(new, REFERENCE_DEGC)
-    constant, limits = np.zeros(3), [new.range_degc]
+    constant = np.zeros(3)
     if held is not None:
         before = board.parameters.get(f"INS_{letters}{imu + 1}_CALTEMP", REFERENCE_DEGC)
         constant = _at(held, new.reference_degc) - _at(held, before)
         total = total + held.coefficients
-        limits.append(held.range_degc)
     lines = [f"{root}ENABLE,1"]
-    valid = common_range(limits)
-    if valid is not None:
-        lines += [f"{root}TMIN,{number(valid[0])}", f"{root}TMAX,{number(valid[1])}"]
-    else:
-        lines.append(f"# Set {root}TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
+    lines += range_lines(new, held, root, lambda key, value: f"{key},{number(value)}")
     lines.append(f"INS_{letters}{imu + 1}_CALTEMP,{number(new.reference_degc)}")
     for order in range(3):
         lines += [

@@ -5,7 +5,7 @@ log are corrected by that already; the exported offsets and scales replace those
 ``R (s' o (r - p'(T) - o'))`` equals the calibration applied to the log.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -226,10 +226,12 @@ def about(own: Calibration, board: Onboard, equation: str, turns: str) -> list[s
     return [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own), *said)]
 
 
-def common_range(limits: Sequence[tuple[float, float] | None]) -> tuple[float, float] | None:
-    """Temperatures [°C] inside all ranges; ``None`` where none is known."""
-    known = [one for one in limits if one is not None]
-    return (max(low for low, _ in known), min(high for _, high in known)) if known else None
+def range_lines(new: Thermal, held: Thermal | None, root: str, line: Callable[[str, float], str]) -> list[str]:
+    """Lines of the temperatures [°C] at which the new polynomial and that of the board are both valid."""
+    known = [one.range_degc for one in (new, held) if one is not None and one.range_degc is not None]
+    if not known:
+        return [f"# Set {root}TMIN and TMAX to the temperatures that were recorded: it is valid between them."]
+    return [line(f"{root}TMIN", max(low for low, _ in known)), line(f"{root}TMAX", min(high for _, high in known))]
 
 
 def said_of_misfit(thermal: Thermal, name: str) -> list[str]:

@@ -12,12 +12,12 @@ from trihedron.files.formats.autopilot import (
     Composed,
     about,
     board_of,
-    common_range,
     composed,
     euler,
     held_by,
     moved_to,
     orientation,
+    range_lines,
     said_of_misfit,
     triple,
 )
@@ -110,23 +110,18 @@ def _thermal_lines(board: Onboard, name: str, one: Composed) -> list[str]:
         return []
     root, letters = _names(board, name)
     group = _group(board, name)
-    total, constant, limits = new.coefficients, np.zeros(3), [new.range_degc]
+    total, constant = new.coefficients, np.zeros(3)
     if held is not None:
         moved, at_reference = moved_to(held, new.reference_degc)
         already = np.array([board.parameters.get(f"{group}_X0_{k}", 0.0) for k in range(3)])
         total, constant = total + moved, already + at_reference
-        limits.append(held.range_degc)
     lines = [_line(f"{letters}_ENABLE", 1, _INTEGER)]
     device = board.parameters.get(f"{root}_ID")
     if device is None:
         lines.append(f"# {group}_ID must be that of the board.")
     else:
         lines.append(_line(f"{group}_ID", device, _INTEGER))
-    valid = common_range(limits)
-    if valid is not None:
-        lines += [_line(f"{group}_TMIN", valid[0]), _line(f"{group}_TMAX", valid[1])]
-    else:
-        lines.append(f"# Set {group}_TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
+    lines += range_lines(new, held, f"{group}_", _line)
     lines.append(_line(f"{group}_TREF", new.reference_degc))
     lines += [_line(f"{group}_X0_{k}", v) for k, v in enumerate(constant)]
     for order in range(3):

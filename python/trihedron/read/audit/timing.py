@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.clock.rate import steps_of, steps_of_counter, usual_step
+from trihedron.read.clock.rate import mean_rate_hz, steps_of, steps_of_counter, usual_step
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode, Severity, TimestampKind
@@ -28,7 +28,7 @@ _SURE, _SCALES_DIFFER = 4.0, 0.01
 def audit_pace(sensors: Sensors) -> list[Finding]:
     """A finding where the rate of the timestamps changes at a row, unless the rotation of gravity confirms the
     change."""
-    time_s = sensors.time_s if sensors.timestamps_s is None else sensors.timestamps_s
+    time_s = sensors.logged_s
     accelerometer, gyroscope = sensors.accelerometer, sensors.gyroscope
     if gyroscope is None:
         return []
@@ -38,11 +38,10 @@ def audit_pace(sensors: Sensors) -> list[Finding]:
     at, ratio = found
     decided = False
     if accelerometer is not None:
-        sides = []
-        for part in (slice(0, at), slice(at, len(time_s))):
-            rate = 1.0 / usual_mean(time_s[part])
-            sides.append(turning_of(accelerometer[part], gyroscope[part], rate))
-        before, after = sides
+        before, after = (
+            turning_of(accelerometer[part], gyroscope[part], mean_rate_hz(time_s[part]))
+            for part in (slice(0, at), slice(at, None))
+        )
         if before is not None and after is not None and before.is_clear and after.is_clear:
             # Wrong timestamps change the gyro's scale from gravity by the ratio of the rates; true ones do not.
             change = math.log(after.scale / before.scale)
@@ -56,12 +55,6 @@ def audit_pace(sensors: Sensors) -> list[Finding]:
             FindingCode.CLOCK_JUMPED, percent=100.0 * (ratio - 1.0), where=sensors.place(at), sample=at, decided=decided
         )
     ]
-
-
-def usual_mean(time_s: FloatArray) -> float:
-    """Mean step [s] of timestamps (n,), without gaps."""
-    step = np.diff(time_s)
-    return float(step[step < GAP_STEPS * usual_step(time_s)].mean())
 
 
 def _jump(time_s: FloatArray) -> tuple[int, float] | None:
@@ -107,8 +100,7 @@ def audit_timing(sensors: Sensors, rate_hz: float) -> list[Finding]:
 
     Long steps are gaps; the clock counts the samples lost in them, if it can.
     """
-    time_s, place = sensors.time_s, sensors.place
-    logged_s = time_s if sensors.timestamps_s is None else sensors.timestamps_s
+    time_s, logged_s, place = sensors.time_s, sensors.logged_s, sensors.place
     if len(time_s) < 3 or not usual_step(time_s) > 0:
         return []
     findings: list[Finding] = []

@@ -2,9 +2,7 @@
 
 import contextlib
 import io
-import os
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ import numpy as np
 
 from trihedron.errors import InputError
 from trihedron.read.devices import Choice
-from trihedron.read.errors import errors_of_library, file_sha256
+from trihedron.read.errors import errors_of_library, file_sha256, stderr_without
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import StatedClock, Table
@@ -51,7 +49,9 @@ def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table,
     log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
     damage = errors_of_library(path, "pymavlink cannot read this log ({}); copy it again")
     try:
-        with damage, contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
+        # Its C code prints a line for each damaged byte.
+        silent = stderr_without(b"")
+        with damage, contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), silent:
             log.__init__(str(path))
             while (message := log.recv_match(type=_TYPES)) is not None:
                 if message.get_type() == "PARM":
@@ -78,20 +78,6 @@ def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table,
         return (first,)
     second = _filled(common, messages["GYR", taken.instance])
     return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Redirect file descriptor 2: pymavlink's C code prints to it directly, one line for each damaged byte."""
-    kept = os.dup(2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(nowhere)
-        os.close(kept)
 
 
 def _skipped(said: str) -> tuple[Finding, ...]:

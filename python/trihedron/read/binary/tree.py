@@ -112,24 +112,19 @@ def _tables(path: Path, groups: Groups) -> dict[str, Table]:
 
 def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dict[str, Table]:
     """Tables of named columns in which a sensor is recognised, by name."""
-    found: dict[str, Table] = {}
+    tables: dict[str, Table] = {}
     for name, columns in named.items():
         with suppress(ReadError):  # lengths differ, or no numbers
-            table = replace(columns_table(str(path), columns), path=path, is_chosen=True)
-            if columns_or_none(table) is not None:
-                found[name] = table
-    return found
+            tables[name] = replace(columns_table(str(path), columns), path=path, is_chosen=True)
+    found = {name: table for name, table in tables.items() if columns_or_none(table) is not None}
+    by_name = {name: table for name, table in found.items() if table.names and "" not in table.names}
+    # One matrix: the roles of its columns follow from their number, or from --columns.
+    by_place = found or {name: table for name, table in tables.items() if table.names is None}
+    return by_name or (by_place if len(by_place) == 1 else {})
 
 
 def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
     tables = _tables(path, groups)
-    single = [
-        a for arrays in groups.values() for a in map(_upright, arrays.values()) if a.ndim == 2 and min(a.shape) >= 3
-    ]
-    if not tables and len(single) == 1 and len(single[0]) >= MIN_ROWS:
-        # One matrix: the roles of its columns follow from their number, or from --columns.
-        columns = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in single[0].T)
-        return Table(path, None, columns, file_sha256(path), is_chosen=True)
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(

@@ -90,16 +90,13 @@ def build_clock(
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = seconds_of(unit)
-    span = (raw[-1] - raw[0]) * scale
-    if len(raw) > 1 and span < _SHORTEST_STEP_S * (len(raw) - 1):
+    span, n_steps = (raw[-1] - raw[0]) * scale, max(len(raw) - 1, 1)
+    if not _SHORTEST_STEP_S * n_steps <= span < _LONGEST_S:
+        is_short = span < _SHORTEST_STEP_S * n_steps
+        how = f"steps by {span / n_steps:.3g} s" if is_short else f"spans {span:.3g} s"
         raise ReadError(
-            f"{table.path}: column {table.label(column)} read as time in {unit} steps by "
-            f"{span / (len(raw) - 1):.3g} s, which no log does; give --time-unit, or name another time column."
-        )
-    if not (raw[-1] - raw[0]) * scale < _LONGEST_S:
-        raise ReadError(
-            f"{table.path}: column {table.label(column)} read as time in {unit} spans "
-            f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
+            f"{table.path}: column {table.label(column)} read as time in {unit} {how}, which no log does; give "
+            "--time-unit, or name another time column."
         )
     first = float(raw[0])
     # In place where the array is a copy, to save memory for a long log.

@@ -96,10 +96,9 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     if drifts:
         even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
         error = _error(time_s, even)
-    on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     # Rounding to a grid moves a difference of two timestamps by its step / √6 rms, at any lag.
     rounding = found.grid_s / np.sqrt(6.0) if is_seen and found.grid_s < period else 0.0
-    growth = 0.0 if on_grid else _growth(error, pauses, max(UNSEEN * period, rounding))
+    growth = _growth(error, pauses, max(UNSEEN * period, rounding))
     if moved_back > TAKEN_BACK or growth > GROWTH or (not is_seen and growth > 0.5 * GROWTH):
         return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)

@@ -26,9 +26,6 @@ CHANCE = 1e-7
 an even clock, make a broad maximum as high as a line; a line is therefore compared with the power beside it."""
 SLOWER = 0.985
 """Frequencies below this have fewer ticks than the log has rows, so they are no period; with a margin for error."""
-ALIASED, COARSE_COHERENCE = 0.75, 0.15
-"""With a beat below the first frequency, aliases of beat and period are among the frequencies searched, and as high as
-the period itself if its coherence is below the second number."""
 MANY, PLAIN = 0.15, 0.25
 """A period with which more than the first share of samples is lost needs a power above the second number."""
 FEWEST_TIMESTAMPS = 100
@@ -71,9 +68,7 @@ def find_period(time_s: FloatArray) -> Period:
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
-    # Only one step in 500 is shorter.
-    shortest = quantile(np.concatenate([np.diff(w) for w in windows]), 0.002)
-    best = _choose(spectrum, line, shortest / mean_step)
+    best = _choose(spectrum, line)
     if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
@@ -175,15 +170,9 @@ def _poll(spectrum: _Spectrum) -> float:
     return _summit(spectrum.power, k) * spectrum.width
 
 
-def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
+def _choose(spectrum: _Spectrum, line: float) -> float | None:
     """The period's frequency per mean distance of rows, or ``None`` where none is significant."""
     peaks = spectrum.peaks()
-    if line > 0.0:
-        # Multiples of a grid have the same power at f and at line - f. Rounding alone never makes a step shorter than
-        # the whole grid steps in a period, which excludes aliases; a late timestamp does, but below line / 2 is none.
-        in_period = np.floor(line / spectrum.per_step[peaks] + 0.02)
-        fits = (shortest * line > in_period - 0.5) | (in_period < 1)
-        peaks = peaks[fits | (spectrum.per_step[peaks] < 0.5 * line)]
     power, per_step = spectrum.power[peaks], spectrum.per_step[peaks]
     near = 2 * spectrum.lobe * spectrum.width
     multiple = np.rint(per_step / line) if line else np.zeros(len(peaks))
@@ -207,10 +196,8 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     of_line = line * max(round(1.0 / line), 1)
     if line < SLOWER:
         # Packets with a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
-        if not poll and _cost(np.array([of_line]))[0] < WHOLE:
-            return of_line
-        clear = chosen is not None and (line > ALIASED or strength[free == chosen].max() > COARSE_COHERENCE**2)
-        return chosen if clear else None
+        is_packet = not poll and _cost(np.array([of_line]))[0] < WHOLE
+        return of_line if is_packet else chosen
     # An exact log has only its own line; on a grid close to the period, the period has fewer lost samples. A log with
     # every tenth sample lost looks like one with a grid of nine tenths of the period: a loss is more common.
     loses_fewer = chosen is not None and _cost(np.array([of_line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)

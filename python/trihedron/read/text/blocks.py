@@ -13,9 +13,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import check_ratio
 from trihedron.records.progress import Progress
@@ -24,14 +21,9 @@ BLOCK_BYTES = 1 << 23
 """Bytes parsed at a time: enough for polars to use every core, and little memory (parsing takes about twelve times the
 size of a block)."""
 
-Bytes = npt.NDArray[np.uint8]
-
-_ROOM = 1 << 16
-"""Bytes before a block for the incomplete last line of the previous one; a longer line is copied."""
-_TAIL = 1 << 12
-"""Bytes at the end of a block that nearly always contain a line end."""
 _PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
+Stream = io.BufferedReader | gzip.GzipFile | bz2.BZ2File | lzma.LZMAFile
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +54,10 @@ def compression_of(magic: bytes) -> str | None:
     return next((name for start, name in _COMPRESSED.items() if magic.startswith(start)), None)
 
 
-def open_binary(file: TextFile) -> io.BufferedIOBase:
+def open_binary(file: TextFile) -> Stream:
     """A stream of the decompressed bytes of a file."""
     if file.content is not None:
-        return io.BytesIO(file.content)
+        return io.BufferedReader(io.BytesIO(file.content))
     if file.compression == "gzip":
         return gzip.open(file.path, "rb")
     if file.compression == "bzip2":
@@ -75,50 +67,43 @@ def open_binary(file: TextFile) -> io.BufferedIOBase:
     return file.path.open("rb")
 
 
-def blocks(file: TextFile, cursor: Cursor) -> Generator[Bytes, None, None]:
-    """Blocks (k,) that end with a complete line, each read while the previous one is parsed, and valid until the next
-    one is requested.
+def blocks(file: TextFile, cursor: Cursor) -> Generator[bytes, None, None]:
+    """Blocks that end with a complete line, each read while the previous one is parsed.
 
     Raises ``ReadError`` when the file cannot be read, is damaged, or has no line ends.
     """
     path, compression, is_plain = file.path, file.compression, file.compression is None and file.content is None
-    most, digest, lines, unpacked = BLOCK_BYTES, hashlib.sha256(), 0, 0
+    digest, lines, unpacked = hashlib.sha256(), 0, 0
     try:
         with open_binary(file) as stream, ThreadPoolExecutor(1) as reader:
 
-            def fill(buffer: Bytes) -> int:
+            def fill() -> tuple[bytes, bool]:
                 nonlocal lines, unpacked
-                view, size = buffer.data[_ROOM:], 0
+                parts, size = [], 0
                 # In pieces, so that the line at which a damaged archive breaks off is known.
-                while size < most and (count := stream.readinto1(view[size : min(size + _PIECE_BYTES, most)])):
-                    lines += bytes(view[size : size + count]).count(b"\n") if compression else 0
-                    size += count
-                unpacked += size
+                while size < BLOCK_BYTES and (part := stream.read1(min(_PIECE_BYTES, BLOCK_BYTES - size))):
+                    lines += part.count(b"\n") if compression else 0
+                    size += len(part)
+                    parts.append(part)
+                block = b"".join([*parts, stream.readline(BLOCK_BYTES)])
+                unpacked += len(block)
                 if compression is not None:
                     check_ratio(path, path.stat().st_size, unpacked)
                 elif is_plain:
-                    digest.update(view[:size])
-                return size
+                    digest.update(block)
+                return block, not stream.peek(1)
 
-            buffers = [np.empty(_ROOM + most, dtype=np.uint8) for _ in range(2)]
-            filling = reader.submit(fill, buffers[0])
-            rest = np.empty(0, dtype=np.uint8)
-            while True:
-                size, buffer = filling.result(), buffers[0]
-                block = _joined(rest, buffer, size)
-                cursor.is_last = size < most
+            filling = reader.submit(fill)
+            while not cursor.is_last:
+                block, cursor.is_last = filling.result()
                 if cursor.is_last:
                     cursor.sha256 = digest.hexdigest() if is_plain else ""
-                    if len(block):
-                        yield block
-                    return
-                cut = _behind_last_line(block)
-                if cut == 0:
+                elif block.endswith(b"\n"):
+                    filling = reader.submit(fill)
+                else:
                     raise ReadError(f"{path}: no line end in {len(block) / 1e6:.0f} MB: this is not a text log.")
-                rest = block[cut:].copy()
-                buffers.reverse()
-                filling = reader.submit(fill, buffers[0])
-                yield block[:cut]
+                if block:
+                    yield block
     except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
         raise ReadError(
             f"{path}: the {compression} data is damaged or ends too early, after about {lines} lines "
@@ -128,21 +113,6 @@ def blocks(file: TextFile, cursor: Cursor) -> Generator[Bytes, None, None]:
         if compression is not None and error.errno is None:
             raise ReadError(f"{path}: the {compression} data is damaged ({error}); copy the file again.") from None
         raise from_os_error(path, error) from None
-
-
-def _joined(rest: Bytes, buffer: Bytes, size: int) -> Bytes:
-    if len(rest) > _ROOM:
-        return np.concatenate([rest, buffer[_ROOM : _ROOM + size]])
-    start = _ROOM - len(rest)
-    buffer[start:_ROOM] = rest
-    return buffer[start : _ROOM + size]
-
-
-def _behind_last_line(block: Bytes) -> int:
-    """Index after the last line end; 0 where there is none."""
-    near = max(len(block) - _TAIL, 0)
-    found = block[near:].tobytes().rfind(b"\n")
-    return near + found + 1 if found >= 0 else block.tobytes().rfind(b"\n") + 1
 
 
 def beginning(file: TextFile, n: int) -> bytes:
@@ -156,12 +126,12 @@ def beginning(file: TextFile, n: int) -> bytes:
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
         # Raises the error with the line after which the damage is.
         with closing(blocks(file, Cursor())) as parts:
-            return next(parts, np.empty(0, dtype=np.uint8)).tobytes()[:n]
+            return next(parts, b"")[:n]
 
 
 _MINUS = "\u2212".encode()
 """The minus sign that typesetting programs and some spreadsheets write for ``-``."""
-_SEMICOLON = re.compile(rb"(?m)^;")
+SEMICOLON_REMARK = re.compile(rb"(?m)^;")
 
 
 def has_semicolon_remarks(data: bytes) -> bool:
@@ -170,11 +140,6 @@ def has_semicolon_remarks(data: bytes) -> bool:
         return False
     rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip() and not line.startswith(b";")]
     return bool(rows) and not any(b";" in line for line in rows)
-
-
-def with_hash_remarks(data: bytes) -> bytes:
-    """The text with remarks that begin with ``#`` instead of ``;``."""
-    return _SEMICOLON.sub(b"#", data)
 
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.errors import ReadError, errors_of_polars
+from trihedron.read.errors import errors_of_polars
 from trihedron.read.names import parse_name
 from trihedron.read.text.layout import MISSING, Layout
 
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
 
 # polars is imported where it is used: the import takes longer than reading a short log, and most logs do not need it.
 
-_PLAIN = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?").fullmatch
-"""A number in every convention."""
+JUDGED = 200
+"""Cells from which it is determined whether a column contains dates or words."""
 MAX_WORDS = 64
 """Largest number of distinct words of a column that may identify sensors or devices; with more it is text."""
 
@@ -52,28 +51,8 @@ class TextColumn:
         self.codes.append(np.asarray(mapped.to_numpy(), dtype=np.int64))
 
 
-def find_text_columns(rows: list[list[str]], layout: Layout) -> dict[int, TextColumn]:
-    """Columns that contain words or dates instead of numbers, determined from the first rows."""
-    columns = {i: [r[i] for r in rows] for i in range(layout.n_fields)}
-    columns = {i: cells for i, cells in columns.items() if layout.decimal_comma or not all(map(_PLAIN, cells))}
-    found: dict[int, TextColumn] = {}
-    if not rows or not columns:
-        return found
-    import polars as pl
-
-    for i, column in columns.items():
-        series = pl.Series(column, dtype=pl.String)
-        are_words = _words(series, layout.decimal_comma)
-        if are_words.sum() > 0.5 * len(rows):
-            cells = series.filter(are_words)
-            found[i] = TextColumn(cells[0], form_of(cells) or "")
-    return found
-
-
-def parse(
-    path: Path, data: bytes, schema: Mapping[str, type[pl.DataType]], layout: Layout, first_line: int
-) -> pl.DataFrame:
-    """A block as a frame; cells that do not fit their column's type are null.
+def parse(path: Path, data: bytes, layout: Layout, first_line: int) -> list[pl.Series]:
+    """The cells of a block as text, column by column.
 
     Raises ``ReadError`` when the block is not a table.
     """
@@ -84,70 +63,52 @@ def parse(
             io.BytesIO(data),
             has_header=False,
             separator=layout.separator,
-            schema=schema,
-            ignore_errors=True,
+            schema={str(i): pl.String for i in range(layout.n_fields)},
             truncate_ragged_lines=True,
             quote_char='"' if b'"' in data else None,
-            decimal_comma=layout.decimal_comma,
             encoding="utf8-lossy",
-        )
+        ).get_columns()
 
 
-def reject_words(path: Path, frame: pl.DataFrame, as_text: pl.DataFrame, lines: IntArray, layout: Layout) -> None:
-    """Reject cells that are neither numbers nor words for "missing", which are NaN.
+def numbers(cells: pl.Series, decimal_comma: bool) -> tuple[FloatArray, pl.Series]:
+    """(n,) numbers of cells, NaN where there is none; mask of the cells that are neither that nor a word for
+    "missing"."""
+    import polars as pl
 
-    Raises ``ReadError`` when there is such a cell; the message names line, column and content of the first.
+    text = cells.fill_null("").str.strip_chars()
+    if decimal_comma:
+        text = text.str.replace(",", ".", literal=True)
+    values = text.cast(pl.Float64, strict=False)
+    bad = values.is_null()
+    if values.null_count():
+        bad &= ~text.str.to_lowercase().is_in(list(MISSING))
+    return np.asarray(values.to_numpy(), dtype=np.float64), bad
+
+
+def text_column(cells: pl.Series, values: FloatArray, words: pl.Series, name: str, n_before: int) -> TextColumn | None:
+    """The column of dates or words that cells are, ``words`` being the mask of those that are no numbers.
+
+    In the first block most of the first cells are words. After ``n_before`` empty cells, and where none is a number,
+    words are occasional remarks, unless numbers are expected by the name. None for a column of numbers.
     """
-    first: tuple[int, int, str] | None = None
-    for name in as_text.columns:
-        text = as_text[name].fill_null("").str.strip_chars()
-        bad = frame[name].is_null() & ~text.str.to_lowercase().is_in(list(MISSING))
-        row = bad.arg_max()
-        if row is not None and bad[row] and (first is None or row < first[0]):
-            first = (row, int(name), text[row])
-    if first is not None:
-        row, column, cell = first
-        name = f"'{layout.names[column]}'" if layout.names and layout.names[column] else f"{column + 1}"
-        raise ReadError(
-            f"{path}: line {lines[row]}, column {name}: {cell[:40]!r} is not a number; mend or delete that line."
-        )
-
-
-def sparse_words(cells: pl.Series, name: str, n_before: int) -> TextColumn | None:
-    """A column of occasional remarks after ``n_before`` empty cells, if its name has no known meaning. None where the
-    cells (n,) are all empty, or numbers are expected in them."""
-    if not name or parse_name(name).role:
+    is_first = words.head(JUDGED)
+    if n_before == 0 and is_first.sum() > 0.5 * len(is_first):
+        first = cells.head(JUDGED).filter(is_first)
+        return TextColumn(first[0], form_of(first) or "")
+    if not name or parse_name(name).role or not np.isnan(values).all():
         return None
-    words = cells.filter(_words(cells, False))
-    if not len(words):
-        return None
-    return TextColumn(words[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
+    return TextColumn(cells.filter(words)[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
 
 
-def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:
-    """A column as (n,) float64: numbers, or dates in seconds; empty where it contains words."""
-    if column is None:
-        return np.asarray(series.to_numpy(), dtype=np.float64)
+def not_numbers(cells: pl.Series, column: TextColumn) -> FloatArray:
+    """A column of dates as (n,) float64 seconds; empty where it contains words."""
     if column.form and column.form != "date":
-        return seconds(series, column.form)
-    column.encode(series)
+        return seconds(cells, column.form)
+    column.encode(cells)
     return np.empty(0)
 
 
-def _words(series: pl.Series, decimal_comma: bool) -> pl.Series:
-    """Mask of the cells that are neither a number nor a word for "missing"."""
-    import polars as pl
-
-    text = series.fill_null("").str.strip_chars()
-    if decimal_comma:
-        text = text.str.replace(",", ".", literal=True)
-    return text.cast(pl.Float64, strict=False).is_null() & ~text.str.to_lowercase().is_in(list(MISSING))
-
-
 # Dates and times of day in usual formats as seconds.
-
-if TYPE_CHECKING:
-    import polars as pl
 
 _DAY_S = 86400.0
 _ZONE = r"(?:Z|[+-]\d\d:?\d\d)?"

@@ -10,16 +10,6 @@ from trihedron.read.names import clock_said, parse_name, sensor_said, unit_said
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
-_NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
-# Every digit matches in one place only, so that a cell that is not a number causes no exponential backtracking.
-_NUMBERS, _NUMBERS_COMMA = (
-    re.compile(
-        rf"(?:[+-]?(?:(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
-    )
-    for mark in (r"\.", ",")
-)
-"""Patterns of a line in which all fields, separated by line feeds, are numbers."""
 _UNIT_WORD = re.compile(
     r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|g0|gal|rpm|milli-g|c?m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?"
     r"|c?m[. ]?s\^?-2|m?dps|dph|(deg|°) ?/ ?hr?|m?rads|rad[. ]s-1|rad|deg"
@@ -55,11 +45,6 @@ class Layout:
     """Lines (from 1) of remarks between the names and the first row."""
 
 
-def is_comment(line: str) -> bool:
-    """Whether a line is a comment by convention."""
-    return line.startswith(COMMENT_STARTS)
-
-
 def split(line: str, separator: str) -> list[str]:
     """Fields of a line, without surrounding blanks and quotes."""
     if '"' in line:
@@ -70,17 +55,19 @@ def split(line: str, separator: str) -> list[str]:
 
 def is_number(text: str, decimal_comma: bool) -> bool:
     """Whether a text is one number; words for missing values are not."""
-    return bool((_NUMBER_COMMA if decimal_comma else _NUMBER).match(text))
+    # Python also reads 1_000 and digits of other scripts.
+    if not text.isascii() or "_" in text or ("." if decimal_comma else ",") in text:
+        return False
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
-    # Most lines contain only numbers, which one match of all fields together shows.
-    if (_NUMBERS_COMMA if decimal_comma else _NUMBERS).match("\n".join(fields)):
-        return 1.0
     filled = [f for f in fields if f.lower() not in MISSING or f.lower() == "nan"]
-    if not filled:
-        return 0.0
-    return sum(is_number(f, decimal_comma) for f in filled) / len(filled)
+    return sum(is_number(f, decimal_comma) for f in filled) / max(len(filled), 1)
 
 
 def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float, int]:
@@ -142,7 +129,7 @@ def detect(text: str) -> Layout | None:
         header.ignored,
         stray,
         sum(_looks_like_row(lines[i - 1], decimal_comma, 4) for i in stray),
-        tuple(i + 1 for i in range(above + 1, first) if is_comment(lines[i].strip())),
+        tuple(i + 1 for i in range(above + 1, first) if lines[i].strip().startswith(COMMENT_STARTS)),
     )
 
 
@@ -184,7 +171,7 @@ def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int,
     found = []
     for i, raw in enumerate(lines):
         line = raw.strip(" \r")
-        if not line or is_comment(line) or i in header.used:
+        if not line or line.startswith(COMMENT_STARTS) or i in header.used:
             continue
         is_below_names = header.names is not None and header.used and i > max(header.used)
         is_empty_row = not any(c.isalnum() for c in line) and any(c in line for c in ",;\t")
@@ -196,7 +183,7 @@ def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int,
 def _first_data_line(lines: list[str], separator: str, decimal_comma: bool, n_fields: int) -> int | None:
     for i, raw in enumerate(lines):
         line = raw.strip(" ")
-        if not line or is_comment(line):
+        if not line or line.startswith(COMMENT_STARTS):
             continue
         fields = split(line, separator)
         if len(fields) == n_fields and _numeric_fraction(fields, decimal_comma) >= 0.5:
@@ -221,7 +208,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         line = raw.strip()
         if not line or line.strip('"').lower().startswith("sep="):
             continue
-        plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
+        plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if line.startswith(COMMENT_STARTS) else line
         # GCDC's loggers write "Headers" before the names.
         plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
         fields = _header_fields(plain, separator, n_fields)
@@ -232,7 +219,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         pair = re.match(r"\s*([^:=,;\t]+?)\s*[:=,;\t]\s*([^,;\t]+?)[\s,;]*$", plain)
         if pair and not is_number(pair.group(1), False):
             metadata[pair.group(1)] = pair.group(2)
-        elif not is_comment(line):
+        elif not line.startswith(COMMENT_STARTS):
             ignored = line
     if not matching:
         return _Header(None, metadata | stated_units(lines), ignored, ())

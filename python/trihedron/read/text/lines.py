@@ -1,6 +1,7 @@
 """Lines of a block normalised, counted and separated into rows and remarks."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,31 +27,12 @@ class Lines:
     """First line with an unclosed quote; 0 where there is none."""
 
 
-class RowLines:
-    """The line of every row, stored as ranges while no line is excluded."""
-
-    def __init__(self) -> None:
-        self.first = 0
-        self._next = 0
-        self._parts: list[Counts | range] = []
-
-    def append(self, lines: Counts | range) -> None:
-        """Add the lines (k,) of the next rows."""
-        start, stop = int(lines[0]), int(lines[-1]) + 1
-        if not self._parts:
-            self.first = start
-        is_run = stop - start == len(lines)
-        if is_run and self._parts and start == self._next and isinstance(self._parts[-1], range):
-            self._parts[-1] = range(self._parts[-1].start, stop)
-        else:
-            self._parts.append(range(start, stop) if is_run else lines)
-        self._next = stop
-
-    def all(self) -> Counts | None:
-        """Lines (n,) of all rows; None where they are consecutive."""
-        if len(self._parts) == 1 and isinstance(self._parts[0], range):
-            return None
-        return np.concatenate([np.asarray(part, dtype=np.int64) for part in self._parts])
+def lines_of_rows(parts: Sequence[Counts | range]) -> tuple[int, Counts | None]:
+    """Line of the first row, and lines (n,) of all rows, given block by block; None where they are consecutive."""
+    first, n = int(parts[0][0]), sum(map(len, parts))
+    if all(isinstance(part, range) for part in parts) and int(parts[-1][-1]) - first + 1 == n:
+        return first, None
+    return first, np.concatenate([np.asarray(part, dtype=np.int64) for part in parts])
 
 
 def regular(data: bytes, layout: Layout) -> bytes:

@@ -42,7 +42,7 @@ def _whole(file: TextFile) -> str:
     # Lines as Python strings take about ten times their bytes; half the size as cells of 16 bytes is 8 times.
     check_memory(file.path, file.size // 2, 1)
     with closing(blocks(file, Cursor())) as parts:
-        return b"".join(as_utf8(file.path, part.tobytes(), 1) for part in parts).decode("utf-8", errors="replace")
+        return b"".join(as_utf8(file.path, part, 1) for part in parts).decode("utf-8", errors="replace")
 
 
 def _of_rewritten(file: TextFile, rewritten: Rewritten) -> Table:

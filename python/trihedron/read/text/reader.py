@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from contextlib import closing
-from itertools import islice
 
 import numpy as np
 
@@ -14,26 +13,24 @@ from trihedron.read.memory import check_memory
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import (
-    Bytes,
+    SEMICOLON_REMARK,
     Cursor,
     TextFile,
     as_utf8,
     blocks,
     has_semicolon_remarks,
-    with_hash_remarks,
 )
 from trihedron.read.text.cells import (
     MAX_WORDS,
     TextColumn,
-    find_text_columns,
+    not_numbers,
     numbers,
     parse,
     past_midnight,
-    reject_words,
-    sparse_words,
+    text_column,
 )
-from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
-from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
+from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect
+from trihedron.read.text.lines import Lines, data_lines, lines_of_rows, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -52,15 +49,19 @@ class TextReader:
         self.file, self.path, self.true_lines = file, file.path, lines
         self.cursor = Cursor()
         self.store = Store(0)
-        self.lines = RowLines()
+        self.lines: list[IntArray | range] = []
         self.text_columns: dict[int, TextColumn] = {}
         self.findings: list[Finding] = []
-        self.n_rows, self.n_rows_checked = 0, -_ROWS_CHECKED
+        self.n_rows_checked = -_ROWS_CHECKED
         self.n_bytes = 0
         self.comments: list[IntArray] = []
-        self.n_left_out = 0
-        self.may_be_plain, self.n_odd_blocks = True, 0
+        self.n_odd_blocks = 0
         self.semicolons = False
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows read so far."""
+        return self.store.n_rows
 
     def read(self) -> Table:
         """The whole file as a table."""
@@ -68,37 +69,31 @@ class TextReader:
         with closing(blocks(self.file, self.cursor)) as parts:
             return self._table(self._read(parts))
 
-    def _read(self, parts: Iterable[Bytes]) -> Layout:
+    def _read(self, parts: Iterable[bytes]) -> Layout:
         layout: Layout | None = None
         for part in parts:
-            # Nearly all blocks after the first contain only rows of numbers and need no further checks.
-            if layout is None or self.semicolons or not self._plain(part, layout):
-                layout = self._odd_part(part.tobytes(), layout)
+            data = as_utf8(self.path, part, self.cursor.lines + 1)
+            if b"\r" in data:
+                # Before the layout is detected: a single carriage return also ends a row.
+                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if layout is None:
+                self.semicolons = has_semicolon_remarks(data)
+            if self.semicolons:
+                data = SEMICOLON_REMARK.sub(b"#", data)
+            if layout is None:
+                layout = self._layout(data)
+                data = data[offset_of_line(data, layout.first_line) :]
+                self.cursor.lines = layout.first_line - 1
+                self.store = Store(layout.n_fields, self._triads(layout))
+            # Nearly all blocks contain only rows of numbers and need no further checks.
+            if not self._plain(data, layout):
+                self._block(data, layout)
             self.n_bytes += len(part)
             if self.file.progress is not None:
                 done = min(self.n_bytes / self.file.size, 1.0) if self.file.compression is None else 0.5
                 self.file.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
         if layout is None:
             raise ReadError(f"{self.path}: the file contains no text after unpacking; record or copy it again.")
-        return layout
-
-    def _odd_part(self, raw: bytes, layout: Layout | None) -> Layout:
-        data = as_utf8(self.path, raw, self.cursor.lines + 1)
-        if b"\r" in data:
-            # Before the layout is detected: a single carriage return also ends a row.
-            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        if layout is None:
-            self.semicolons = has_semicolon_remarks(data)
-        if self.semicolons:
-            data = with_hash_remarks(data)
-        start = 0
-        if layout is None:
-            layout = self._layout(data)
-            start = offset_of_line(data, layout.first_line)
-            self.cursor.lines = layout.first_line - 1
-            self._first_block(data, layout)
-        if not self._plain(np.frombuffer(data, dtype=np.uint8)[start:], layout):
-            self._block(data[start:], layout)
         return layout
 
     def line(self, number: int) -> int:
@@ -136,7 +131,6 @@ class TextReader:
                 "the separator or the columns change inside the file; cut it there and read the parts one by one."
             )
         if layout.stray:
-            self.n_left_out += len(layout.stray)
             self.findings.append(
                 Finding.of(
                     FindingCode.ROWS_LEFT_OUT,
@@ -147,17 +141,7 @@ class TextReader:
                 )
             )
 
-    def _first_block(self, data: bytes, layout: Layout) -> None:
-        """Find the columns of words (labels, dates) from the first lines."""
-        start = offset_of_line(data, layout.first_line)
-        head = data[start : start + (1 << 16)].decode("utf-8", errors="replace")
-        lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
-        rows = (r[: layout.n_fields] for r in lines if len(r) >= layout.n_fields and not is_comment(r[0]))
-        self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
-
     def _block(self, data: bytes, layout: Layout) -> None:
-        # One irregular block may be the incomplete last one; after two, further blocks are not tested as plain.
-        self.may_be_plain = self.n_odd_blocks == 0
         self.n_odd_blocks += 1
         ends_with_line_end = data.endswith(b"\n")
         data = regular(data, layout)
@@ -182,25 +166,24 @@ class TextReader:
         if len(lines):
             self._parse(text, lines, layout)
 
-    def _plain(self, text: Bytes, layout: Layout) -> bool:
+    def _plain(self, text: bytes, layout: Layout) -> bool:
         """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
-        if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
+        # One irregular block may be the incomplete last one; after two, further blocks are not tested.
+        if self.n_odd_blocks > 1 or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
         separator = ord(layout.separator)
-        if self.n_rows == 0:
-            self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
         places, room = self.store.lend(0, 0)
-        rows, is_read = _core.plain_table_into(text, separator, places, room)
+        codes = np.frombuffer(text, dtype=np.uint8)
+        rows, is_read = _core.plain_table_into(codes, separator, places, room)
         if not rows:
             return False
         expected = self._expected(rows, len(text), layout)
         if rows > len(room[0]):  # there was no room: the lines were counted but not read
-            rows, is_read = _core.plain_table_into(text, separator, *self.store.lend(rows, expected))
+            rows, is_read = _core.plain_table_into(codes, separator, *self.store.lend(rows, expected))
         if is_read:
             self.store.keep(rows)
             self.lines.append(range(self.cursor.lines + 1, self.cursor.lines + 1 + rows))
             self.cursor.lines += rows
-            self.n_rows += rows
         return is_read
 
     def _expected(self, n_new: int, n_bytes: int, layout: Layout) -> int:
@@ -215,11 +198,10 @@ class TextReader:
 
     def _take(self, columns: list[FloatArray], lines: IntArray, n_bytes: int, layout: Layout) -> None:
         """Store the rows of a block, unless the expected number of rows does not fit into memory."""
-        if self.n_rows == 0:
-            self.store = Store(layout.n_fields, self._triads(layout, columns))
         self.store.append(columns, self._expected(len(lines), n_bytes, layout))
-        self.lines.append(lines)
-        self.n_rows += len(lines)
+        # A range takes no memory for the lines of a long log.
+        is_run = bool(np.all(np.diff(lines) == 1))
+        self.lines.append(range(int(lines[0]), int(lines[-1]) + 1) if is_run else lines)
 
     def _incomplete(self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout) -> tuple[IntArray, bytes]:
         """The block without an incomplete last line of the file; any other irregular line is rejected."""
@@ -231,7 +213,6 @@ class TextReader:
                 f"{self.path}: line {line} has {fields} fields where the others have "
                 f"{layout.n_fields}; complete or delete that line."
             )
-        self.n_left_out += 1
         self.findings.append(
             Finding.of(
                 FindingCode.LINE_INCOMPLETE,
@@ -243,35 +224,37 @@ class TextReader:
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
 
     def _parse(self, data: bytes, lines: IntArray, layout: Layout) -> None:
-        import polars as pl
-
-        schema: dict[str, type[pl.DataType]] = {
-            str(i): pl.String if i in self.text_columns else pl.Float64 for i in range(layout.n_fields)
-        }
         if self.true_lines is not None:
             lines = self.true_lines[lines - 1]
-        frame = parse(self.path, data, schema, layout, int(lines[0]))
-        if frame.height != len(lines):
-            raise ReadError(
-                f"{self.path}: {len(lines)} lines from line {lines[0]} on give {frame.height} rows; "
-                "look for quotes that are opened and never closed."
-            )
-        suspects = [name for name in frame.columns if schema[name] == pl.Float64 and frame[name].null_count()]
-        if suspects:
-            as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
-            for i in [int(name) for name in suspects if frame[name].null_count() == frame.height]:
-                column = sparse_words(as_text[str(i)], layout.names[i] if layout.names else "", self.n_rows)
+        columns: list[FloatArray] = []
+        wrong: list[tuple[int, int, str]] = []
+        for i, cells in enumerate(parse(self.path, data, layout, int(lines[0]))):
+            if len(cells) != len(lines):
+                raise ReadError(
+                    f"{self.path}: {len(lines)} lines from line {lines[0]} on give {len(cells)} rows; "
+                    "look for quotes that are opened and never closed."
+                )
+            name = layout.names[i] if layout.names else ""
+            if i not in self.text_columns:
+                values, words = numbers(cells, layout.decimal_comma)
+                column = text_column(cells, values, words, name, self.n_rows) if words.any() else None
                 if column is not None and (self.n_rows == 0 or self.store.set_aside(i)):
                     self.text_columns[i] = column
-                    suspects.remove(str(i))
-                    frame = frame.with_columns(as_text[str(i)])
-            reject_words(self.path, frame, as_text.select(suspects), lines, layout)
-        columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
+                elif words.any():
+                    wrong.append((int(words.arg_max() or 0), i, cells.filter(words)[0].strip()))
+            columns.append(not_numbers(cells, self.text_columns[i]) if i in self.text_columns else values)
+        if wrong:
+            row, i, cell = min(wrong)
+            name = f"'{layout.names[i]}'" if layout.names and layout.names[i] else f"{i + 1}"
+            raise ReadError(
+                f"{self.path}: line {lines[row]}, column {name}: {cell[:40]!r} is not a number; mend or delete "
+                "that line."
+            )
         self._take(columns, lines, len(data), layout)
 
-    def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
+    def _triads(self, layout: Layout) -> tuple[tuple[int, int, int], ...]:
         """Columns of each sensor, to be stored as one array (n, 3); a wrong guess only costs memory."""
-        head = Table(self.path, layout.names, tuple(column[:1000] for column in columns), first_line=1)
+        head = Table(self.path, layout.names, (np.zeros(1),) * layout.n_fields, first_line=1)
         chosen = columns_or_none(head)
         if chosen is None or len(set(chosen.readings)) < len(chosen.readings):
             return ()
@@ -282,7 +265,6 @@ class TextReader:
             raise ReadError(f"{self.path}: the file has a header but no row of numbers; record or copy it again.")
         remarks = np.concatenate(self.comments) if self.comments else np.zeros(0, dtype=np.int64)
         if len(remarks):
-            self.n_left_out += len(remarks)
             self.findings.append(
                 Finding.of(
                     FindingCode.ROWS_LEFT_OUT, "remarks", rows_left_out=len(remarks), line=self.line(int(remarks[0]))
@@ -309,17 +291,18 @@ class TextReader:
                 values = past_midnight(values) if text.form == "time-of-day" else values
             columns.append(values)
             names.append(name)
+        first_line, line_of_row = lines_of_rows(self.lines)
         return Table(
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
             sha256=self.file.sha256 or self.cursor.sha256 or file_sha256(self.path),
             metadata=layout.metadata,
-            first_line=self.lines.first,
-            line_of_row=self.lines.all(),
+            first_line=first_line,
+            line_of_row=line_of_row,
             findings=tuple(self.findings),
             words=words,
             labels=labels,
-            rows_in_file=self.n_rows + self.n_left_out,
+            rows_in_file=self.n_rows + round(sum(f.numbers.get("rows_left_out", 0.0) for f in self.findings)),
             is_private=True,
         )

@@ -35,8 +35,9 @@ class Store:
                 continue
             array = self._with_room(b, need, expected)
             for k, i in enumerate(block):
-                array[self.n_rows : need, k] = columns[i]
-                self._is_numeric[i] = True
+                if len(columns[i]):
+                    array[self.n_rows : need, k] = columns[i]
+                    self._is_numeric[i] = True
         self.n_rows = need
 
     def lend(self, count: int, expected: int) -> tuple[list[tuple[int, int]], list[FloatArray]]:
