@@ -36,7 +36,7 @@ fn norm_fits(c: &mut Criterion) {
     let noise = [Matrix3::identity() * 12.5];
     let mut group = c.benchmark_group("norm_invariant::fit");
     group.sample_size(10);
-    for n in [18, 500, 1_000_000] {
+    for n in [18, 500] {
         let values = still_samples(n);
         group.bench_function(format!("{n} readings"), |b| {
             b.iter(|| {
@@ -44,7 +44,6 @@ fn norm_fits(c: &mut Criterion) {
                     Readings {
                         values: black_box(&values),
                         noise: &noise,
-                        pose: &[],
                     },
                     &settings,
                     None,

@@ -31,13 +31,7 @@ class NormFit:
     stopped_because: str
     n_iterations: int
 
-def fit_norm(
-    readings: FloatArray,
-    noise: FloatArray,
-    settings: NormSettings,
-    start: tuple[FloatArray, FloatArray] | None = None,
-    pose: npt.NDArray[np.int64] | None = None,
-) -> NormFit: ...
+def fit_norm(readings: FloatArray, noise: FloatArray, settings: NormSettings) -> NormFit: ...
 def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, settings: NormSettings, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...

@@ -3,14 +3,12 @@
 //! `|S a' + b| = |g|` is the quadric `a'ᵀ M a' + 2 mᵀ a' = |g|² - c` with `M = SᵀS`, `m = Sᵀb`, `c = bᵀb`. Readings
 //! are centred on their mean and divided by their spread before the linear step.
 
-mod moments;
 mod standard;
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use crate::error::{Error, Result};
 use crate::sensor_model::{Frame, Model};
-pub(crate) use moments::Moments;
 pub use standard::Standardisation;
 
 /// `uᵀ A u + 2 hᵀ u = 1` in standardised readings.

@@ -65,7 +65,6 @@ fn one_fold(
     let rest = Readings {
         values: &values,
         noise: &noise,
-        pose: &[],
     };
     let Ok(other) = fit(rest, settings, Some(full.model)) else {
         return Vec::new();

@@ -54,8 +54,8 @@ pub(super) fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
     }
 }
 
-pub(super) fn unpack(theta: &Parameters, frame: Frame, standard: &Standardisation) -> Model {
-    standard.undo(&unpack_standardised(theta.as_slice(), frame))
+pub(super) fn unpack(theta: &[f64], frame: Frame, standard: &Standardisation) -> Model {
+    standard.undo(&unpack_standardised(theta, frame))
 }
 
 /// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.

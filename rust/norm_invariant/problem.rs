@@ -1,10 +1,8 @@
-//! The norm residual and its analytic Jacobian, row by row.
+//! The norm residual and its analytic Jacobian, row by row, with the noise that is predicted for each.
 
-use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::noise;
 use super::parameters::unpack_standardised;
-use super::sums::{self, At, WithNoise};
 use super::{ANCHOR, Frame, Model, N_PARAMETERS, Parameters, Readings, Settings, UNKNOWN};
 use crate::ellipsoid::Standardisation;
 
@@ -22,34 +20,24 @@ pub(super) struct FixedNoise {
 }
 
 impl FixedNoise {
-    fn sigma_of(&self, i: usize) -> f64 {
-        self.sigma[i] * self.widening
-    }
-
-    /// The readings with their predicted noise.
-    pub(super) fn with_noise<'a>(&'a self, readings: Readings<'a>) -> WithNoise<'a> {
-        WithNoise {
-            values: readings.values,
-            sigma: &self.sigma,
-            excess: &self.excess,
+    pub(super) fn at(
+        readings: Readings<'_>,
+        settings: &Settings,
+        model: &Model,
+        widening: f64,
+    ) -> Self {
+        let (sigma, excess) = (0..readings.values.len())
+            .map(|i| predicted(readings, settings, model, i))
+            .unzip();
+        Self {
+            sigma,
+            widening,
+            excess,
         }
     }
 
-    pub(super) fn at(readings: Readings<'_>, settings: &Settings, model: &Model) -> Self {
-        let n = readings.values.len();
-        let mut new = Self {
-            sigma: vec![0.0; n],
-            widening: 1.0,
-            excess: vec![0.0; n],
-        };
-        new.renew(readings, settings, model);
-        new
-    }
-
-    /// Recomputes the predictions at another model.
-    pub(super) fn renew(&mut self, readings: Readings<'_>, settings: &Settings, model: &Model) {
-        let at = At::raw(*model, *settings);
-        noise::predict(&readings, &at, &mut self.sigma, &mut self.excess);
+    fn sigma_of(&self, i: usize) -> f64 {
+        self.sigma[i] * self.widening
     }
 }
 
@@ -79,102 +67,102 @@ pub(super) struct PoseProblem<'a> {
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
     /// Values to which the parameters are tied, to `ANCHOR` of |g| each, when the poses leave some undetermined.
-    pub anchor: Option<DVector<f64>>,
+    pub anchor: Option<Parameters>,
 }
 
 impl PoseProblem<'_> {
-    /// Whitened residual of reading `i` and its gradient.
-    fn row(&self, model: &Model, i: usize) -> (f64, SVector<f64, N_PARAMETERS>) {
-        let u = self.standard.apply(&self.readings.values[i]);
-        let f = model.correct(&u);
-        let residual = self.misfit(&f, i);
-        let slope = residual_gradient(&f, &u, self.settings);
-        let sigma = self.fixed.sigma_of(i);
-        (residual / sigma, slope / sigma)
+    fn n(&self) -> usize {
+        self.readings.values.len()
+    }
+
+    /// Number of rows of the anchor.
+    fn n_held(&self) -> usize {
+        self.anchor.map_or(0, |_| N_PARAMETERS)
+    }
+
+    fn model(&self, x: &DVector<f64>) -> Model {
+        unpack_standardised(x.as_slice(), self.settings.frame)
+    }
+
+    fn standardised(&self, i: usize) -> Vector3<f64> {
+        self.standard.apply(&self.readings.values[i])
     }
 
     fn misfit(&self, f: &Vector3<f64>, i: usize) -> f64 {
         f.norm() - self.settings.gravity - self.fixed.excess[i]
     }
 
-    fn collapses(&self, model: &Model) -> bool {
-        model.s.determinant().abs() < SMALLEST_VOLUME * self.volume
-    }
-
-    /// Rows of the readings, and of the anchor below them.
-    pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        let model = unpack_standardised(x.as_slice(), self.settings.frame);
-        let n = self.readings.values.len();
-        let extra = self.anchor.as_ref().map_or(0, DVector::len);
-        let mut residuals = DVector::zeros(n + extra);
-        let mut jacobian = DMatrix::zeros(n + extra, N_PARAMETERS);
-        for i in 0..n {
-            let (residual, slope) = self.row(&model, i);
-            residuals[i] = residual;
-            jacobian.row_mut(i).tr_copy_from(&slope);
-        }
-        if let Some(anchor) = &self.anchor {
-            let width = ANCHOR * self.settings.gravity;
-            residuals
-                .rows_mut(n, extra)
-                .copy_from(&((x - anchor) / width));
-            jacobian
-                .view_mut((n, 0), (extra, N_PARAMETERS))
-                .fill_diagonal(1.0 / width);
-        }
-        (residuals, jacobian)
-    }
-
-    /// χ² of the readings, with the widened sigmas.
-    pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
-        let n = self.readings.values.len();
-        self.residuals(x).rows(0, n).norm_squared()
-    }
-
-    /// Jacobian rows of the readings alone.
-    pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
-        let (_, jacobian) = self.linearise(x);
-        jacobian.rows(0, self.readings.values.len()).into_owned()
-    }
-
+    /// Whitened residuals of the readings, then those of the anchor; infinite where `S` collapses.
     pub(super) fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
-        let model = unpack_standardised(x.as_slice(), self.settings.frame);
-        let n = self.readings.values.len();
-        let extra = self.anchor.as_ref().map_or(0, DVector::len);
-        let mut residuals = DVector::from_element(n + extra, f64::INFINITY);
-        if self.collapses(&model) {
+        let (n, model) = (self.n(), self.model(x));
+        let mut residuals = DVector::from_element(n + self.n_held(), f64::INFINITY);
+        if model.s.determinant().abs() < SMALLEST_VOLUME * self.volume {
             return residuals;
         }
         for i in 0..n {
-            let f = model.correct(&self.standard.apply(&self.readings.values[i]));
+            let f = model.correct(&self.standardised(i));
             residuals[i] = self.misfit(&f, i) / self.fixed.sigma_of(i);
         }
         if let Some(anchor) = &self.anchor {
             let held = (x - anchor) / (ANCHOR * self.settings.gravity);
-            residuals.rows_mut(n, extra).copy_from(&held);
+            residuals.rows_mut(n, N_PARAMETERS).copy_from(&held);
         }
         residuals
     }
 
-    /// The readings with their predicted noise.
-    pub(super) fn with_noise(&self) -> WithNoise<'_> {
-        self.fixed.with_noise(self.readings)
+    /// Derivatives of the rows.
+    pub(super) fn jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let (n, model) = (self.n(), self.model(x));
+        let mut jacobian = DMatrix::zeros(n + self.n_held(), N_PARAMETERS);
+        for i in 0..n {
+            let u = self.standardised(i);
+            let slope = residual_gradient(&model.correct(&u), &u, self.settings);
+            let row = slope / self.fixed.sigma_of(i);
+            jacobian.row_mut(i).tr_copy_from(&row);
+        }
+        let held = 1.0 / (ANCHOR * self.settings.gravity);
+        jacobian.rows_mut(n, self.n_held()).fill_diagonal(held);
+        jacobian
     }
 
-    /// `E[Jᵀr]` at the truth, see [`noise::noise_in_gradient`].
-    pub(super) fn noise_in_gradient(&self, x: &[f64]) -> Parameters {
-        let at = At {
-            model: unpack_standardised(x, self.settings.frame),
-            standard: self.standard,
-            settings: *self.settings,
-            widening: self.fixed.widening,
-        };
-        noise::noise_in_gradient(&self.readings, &self.fixed.sigma, &at)
+    /// χ² of the readings, with the widened sigmas.
+    pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
+        self.residuals(x).rows(0, self.n()).norm_squared()
+    }
+
+    /// Jacobian rows of the readings alone.
+    pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        self.jacobian(x).rows(0, self.n()).into_owned()
+    }
+
+    /// `E[Jᵀr]` at the truth: a whitened residual and its own derivative share noise, so that their product has a mean.
+    ///
+    /// With `n` the noise of a reading, `E[∂r/∂S_jk · r] = u_j (Σ Sᵀ u)_k + (P S Σ Sᵀ u)_j a_k/|g|`, `P = I - uuᵀ`, and
+    /// for `b` the second term without `a`.
+    pub(super) fn noise_in_gradient(&self, x: &DVector<f64>) -> Parameters {
+        let model = self.model(x);
+        let mut sum = Parameters::zeros();
+        for i in 0..self.n() {
+            let a = self.standardised(i);
+            let up = model.correct(&a).normalize();
+            let noise = self.readings.noise_of(i) / self.standard.size.powi(2);
+            let shared = noise * model.s.transpose() * up;
+            let spread = model.s * shared;
+            let across = (spread - up * up.dot(&spread)) / self.settings.gravity;
+            let mut first = columns(&up, &shared, self.settings.frame);
+            first.fixed_rows_mut::<3>(6).fill(0.0);
+            let mean = first + columns(&across, &a, self.settings.frame);
+            sum += mean / self.fixed.sigma_of(i).powi(2);
+        }
+        sum
     }
 
     /// Norm residuals in m/s² of a model in raw units.
     pub(super) fn in_m_s2(&self, model: &Model) -> Vec<f64> {
-        sums::misfits(&self.with_noise(), &At::raw(*model, *self.settings))
+        let values = self.readings.values.iter().enumerate();
+        values
+            .map(|(i, value)| self.misfit(&model.correct(value), i))
+            .collect()
     }
 }
 
@@ -182,8 +170,18 @@ impl PoseProblem<'_> {
 ///
 /// In true coordinates `δf = M f + z`, a pose measures `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the nine
 /// parameters depends on directions and noise alone.
-pub(super) fn is_weak(with_noise: &WithNoise<'_>, settings: &Settings, model: &Model) -> bool {
-    let information = sums::information(with_noise, &At::raw(*model, *settings));
+pub(super) fn is_weak(
+    readings: Readings<'_>,
+    fixed: &FixedNoise,
+    settings: &Settings,
+    model: &Model,
+) -> bool {
+    let mut information = SMatrix::<f64, N_PARAMETERS, N_PARAMETERS>::zeros();
+    for (value, sigma) in readings.values.iter().zip(&fixed.sigma) {
+        let up = model.correct(value).normalize();
+        let row = columns(&up, &up, Frame::Lower) * (settings.gravity / sigma);
+        information += row * row.transpose();
+    }
     information
         .cholesky()
         .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)
@@ -197,14 +195,18 @@ pub fn residual_gradient(
     u: &Vector3<f64>,
     settings: &Settings,
 ) -> SVector<f64, N_PARAMETERS> {
-    let along = f / f.norm();
+    columns(&(f / f.norm()), u, settings.frame)
+}
+
+/// Derivatives of `along · (S u + b)` with respect to the solver's parameters.
+fn columns(along: &Vector3<f64>, u: &Vector3<f64>, frame: Frame) -> SVector<f64, N_PARAMETERS> {
     let mut slope = SVector::<f64, N_PARAMETERS>::zeros();
     for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
         slope[k] = along[i] * u[j];
-        if settings.frame == Frame::Symmetric && i != j {
+        if frame == Frame::Symmetric && i != j {
             slope[k] += along[j] * u[i];
         }
     }
-    slope.fixed_rows_mut::<3>(6).copy_from(&along);
+    slope.fixed_rows_mut::<3>(6).copy_from(along);
     slope
 }

@@ -1,12 +1,10 @@
 //! Bindings of the accelerometer fits.
 
-use nalgebra::{Matrix3, Vector3};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
 use pyo3::prelude::*;
 
-use super::arrays::{as_vectors, flat3, matrices3, rows, rows3};
-use crate::norm_invariant::{self, Fit, Frame, Model, Readings, Settings};
+use super::arrays::{as_vectors, flat3, matrices3, rows};
+use crate::norm_invariant::{self, Fit, Frame, Readings, Settings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ANCHOR", norm_invariant::ANCHOR)?;
@@ -109,51 +107,24 @@ impl NormFit {
     }
 }
 
-/// Starting values of `S` and `b`.
-type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>);
-
 #[pyfunction]
-#[pyo3(signature = (readings, noise, settings, start=None, pose=None))]
 fn fit_norm(
     py: Python<'_>,
     readings: PyReadonlyArray2<'_, f64>,
     noise: PyReadonlyArray3<'_, f64>,
     settings: &Bound<'_, NormSettings>,
-    start: Option<Start<'_>>,
-    pose: Option<PyReadonlyArray1<'_, i64>>,
 ) -> PyResult<NormFit> {
     let readings = flat3("readings", &readings)?;
-    let pose: Vec<usize> = pose
-        .iter()
-        .flat_map(|pose| pose.as_array().iter().copied().collect::<Vec<i64>>())
-        .map(|k| usize::try_from(k).map_err(|_| PyValueError::new_err("pose numbers start at 0")))
-        .collect::<PyResult<_>>()?;
     let noise = matrices3("noise", &noise)?;
-    let start = start
-        .map(|(s, b)| {
-            let s = rows3("start S", &s)?;
-            let b: Vec<f64> = b.as_array().iter().copied().collect();
-            if s.len() != 3 || b.len() != 3 {
-                return Err(PyValueError::new_err(
-                    "a start is S of shape (3, 3) and b of shape (3,)",
-                ));
-            }
-            Ok(Model {
-                s: Matrix3::from_rows(&[s[0].transpose(), s[1].transpose(), s[2].transpose()]),
-                b: Vector3::from_column_slice(&b),
-            })
-        })
-        .transpose()?;
     let settings = settings.get().0;
     super::run(py, || {
         norm_invariant::fit(
             Readings {
                 values: as_vectors(&readings),
                 noise: &noise,
-                pose: &pose,
             },
             &settings,
-            start,
+            None,
         )
     })
     .map(NormFit)
@@ -177,7 +148,6 @@ fn fit_norm_held_out<'py>(
             Readings {
                 values: as_vectors(&readings),
                 noise: &noise,
-                pose: &[],
             },
             &settings,
             &full,

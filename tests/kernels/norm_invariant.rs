@@ -15,11 +15,7 @@ fn settings(frame: Frame) -> Settings {
 
 /// Readings that share their noise, or have one each.
 fn of<'a>(values: &'a [Vector3<f64>], noise: &'a [Matrix3<f64>]) -> Readings<'a> {
-    Readings {
-        values,
-        noise,
-        pose: &[],
-    }
+    Readings { values, noise }
 }
 
 proptest! {
