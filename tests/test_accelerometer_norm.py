@@ -109,7 +109,6 @@ def test_the_first_advised_pose_beats_every_other_candidate(kept):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"frame": "case"}, "do not determine the case"),
         ({"axis_signs": (1, 2, 3)}, "axis signs"),
         ({"raw_unit": "furlong"}, "furlong"),
     ],

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 
-use super::parameters::{in_frame, map_to_entries, pack, unpack};
+use super::parameters::{lower, map_to_entries, pack, unpack};
 use super::problem::{self, FixedNoise, PoseProblem};
 use super::start::Starts;
-use super::{Fit, Model, N_PARAMETERS, Readings, Settings};
+use super::{Fit, Model, N_PARAMETERS, Readings};
 use crate::ellipsoid::Standardisation;
 use crate::error::{Error, Result};
 use crate::gauss_newton::{self, Options, Solution};
@@ -30,62 +30,59 @@ const WORTHLESS: &str = "the poses do not determine the scales: they are too few
 ///
 /// # Errors
 /// When readings are malformed or all the same, or the fit collapses to `S = 0`.
-pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
+pub fn fit(readings: Readings<'_>, gravity: f64, start: Option<Model>) -> Result<Fit> {
     let Some(given) = start else {
-        return fit_from(readings, settings, None);
+        return fit_from(readings, gravity, None);
     };
-    match fit_from(readings, settings, Some(given)) {
-        Ok(found)
-            if found.stop.is_converged() && !is_shrunken(&found.model, readings, settings) =>
-        {
+    match fit_from(readings, gravity, Some(given)) {
+        Ok(found) if found.stop.is_converged() && !is_shrunken(&found.model, readings, gravity) => {
             Ok(found)
         }
         // A malformed start is an error to report; it is not replaced.
         Err(error @ Error::BadInput(_)) => Err(error),
-        first => fit_from(readings, settings, None).or(first),
+        first => fit_from(readings, gravity, None).or(first),
     }
 }
 
 /// Whether a triad is far smaller than the sphere through the readings.
-fn is_shrunken(model: &Model, readings: Readings<'_>, settings: &Settings) -> bool {
+fn is_shrunken(model: &Model, readings: Readings<'_>, gravity: f64) -> bool {
     Starts::of(readings.values)
-        .and_then(|starts| starts.sphere(settings))
+        .and_then(|starts| starts.sphere(gravity))
         .is_ok_and(|sphere| model.s.determinant().abs() < 1e-2 * sphere.s.determinant().abs())
 }
 
-fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
+fn fit_from(readings: Readings<'_>, gravity: f64, start: Option<Model>) -> Result<Fit> {
     readings.check()?;
-    if !settings.gravity.is_finite() || settings.gravity <= 0.0 {
+    if !gravity.is_finite() || gravity <= 0.0 {
         return Err(Error::bad_input(format!(
-            "gravity must be a positive number in m/s², got {}",
-            settings.gravity
+            "gravity must be a positive number in m/s², got {gravity}"
         )));
     }
     let starts = Starts::of(readings.values)?;
     let standard = starts.standard;
     let nominal = match start {
-        Some(model) => in_frame(&model, settings.frame)?,
-        None => starts.sphere(settings)?,
+        Some(model) => lower(&model)?,
+        None => starts.sphere(gravity)?,
     };
-    let mut fixed = FixedNoise::at(readings, settings, &nominal, 1.0);
-    let is_anchored = problem::is_weak(readings, &fixed, settings, &nominal);
+    let mut fixed = FixedNoise::at(readings, gravity, &nominal, 1.0);
+    let is_anchored = problem::is_weak(readings, &fixed, gravity, &nominal);
     let begin = if is_anchored || start.is_some() {
         nominal
     } else {
-        starts.best(settings)?
+        starts.best(gravity)?
     };
-    if spread(&begin, &standard) < SMALLEST_SPREAD * settings.gravity {
+    if spread(&begin, &standard) < SMALLEST_SPREAD * gravity {
         return Err(Error::not_determined(WORTHLESS));
     }
     let first = pack(&begin, &standard);
     let mut theta = DVector::from_column_slice(first.as_slice());
     let mut iterations = 0;
     for renewal in 0.. {
-        let model = unpack(theta.as_slice(), settings.frame, &standard);
-        fixed = FixedNoise::at(readings, settings, &model, fixed.widening);
+        let model = unpack(theta.as_slice(), &standard);
+        fixed = FixedNoise::at(readings, gravity, &model, fixed.widening);
         let problem = PoseProblem {
             readings,
-            settings,
+            gravity,
             standard,
             fixed: &fixed,
             volume: (begin.s * standard.size).determinant().abs(),
@@ -122,7 +119,7 @@ fn spread(model: &Model, standard: &Standardisation) -> f64 {
 }
 
 fn finish(problem: &PoseProblem<'_>, solution: &Solution) -> Result<Fit> {
-    let (settings, standard) = (problem.settings, &problem.standard);
+    let standard = &problem.standard;
     let held = &solution.certainty;
     // Noise in a reading enters residual and derivative alike: it biases S towards zero, by (σ/g)² of itself.
     let pull = problem.noise_in_gradient(&solution.parameters);
@@ -134,14 +131,14 @@ fn finish(problem: &PoseProblem<'_>, solution: &Solution) -> Result<Fit> {
             Options::default().rank_tolerance,
         ),
     };
-    let model = unpack(theta.as_slice(), settings.frame, standard);
+    let model = unpack(theta.as_slice(), standard);
     let shrink = (model.s * standard.size).determinant().abs() / problem.volume;
     if shrink < 2.0 * problem::SMALLEST_VOLUME
-        || spread(&model, standard) < SMALLEST_SPREAD * settings.gravity
+        || spread(&model, standard) < SMALLEST_SPREAD * problem.gravity
     {
         return Err(Error::not_determined(WORTHLESS));
     }
-    let map = map_to_entries(settings.frame, standard);
+    let map = map_to_entries(standard);
     let residuals = problem.in_m_s2(&model);
     let sigmas = problem.fixed.sigma.clone();
     let whitened = residuals.iter().zip(&sigmas).map(|(r, s)| (r / s).powi(2));

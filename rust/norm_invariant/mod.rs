@@ -1,6 +1,6 @@
 //! Accelerometer triad from static poses alone: `|S a' + b| = |g|` in every orientation (model.md, section 3).
 //!
-//! Nine parameters, `S` lower triangular or symmetric. The residual `|S a' + b| - |g|` of a pose is divided by the
+//! Nine parameters, `S` lower triangular. The residual `|S a' + b| - |g|` of a pose is divided by the
 //! noise of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is fixed while the solver runs and
 //! renewed between runs: if it varied with `S`, a large `S` would lower the cost.
 
@@ -14,10 +14,9 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 pub use fitting::fit;
 pub use held_out::{HeldOut, held_out};
-pub use parameters::in_frame;
 pub use problem::residual_gradient;
 
-pub use crate::sensor_model::{Frame, Model};
+pub use crate::sensor_model::Model;
 
 use crate::error::{Error, Result};
 use crate::gauss_newton::{Certainty, Stop};
@@ -28,26 +27,15 @@ pub const N_PARAMETERS: usize = 9;
 /// Parameters of the solver.
 type Parameters = SVector<f64, N_PARAMETERS>;
 
-impl Frame {
-    /// `(row, column)` of the six free entries of `S`; a symmetric `S` has the mirrored one as well.
-    const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-}
-
-/// Options of the fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// |g| in m/s².
-    pub gravity: f64,
-    /// Body frame of the result.
-    pub frame: Frame,
-}
+/// `(row, column)` of the six free entries of `S`.
+const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// A fitted triad.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The fitted `S` and `b`.
     pub model: Model,
-    /// Covariance of `S` row by row, then `b`; zero for entries fixed by the frame. For the stated noise, not rescaled.
+    /// Covariance of `S` row by row, then `b`; zero above the diagonal of `S`. For the stated noise, not rescaled.
     pub covariance: SMatrix<f64, 12, 12>,
     /// `|S a' + b| - |g|` in m/s² (less the mean inflation that noise across gravity gives a norm).
     pub residuals: Vec<f64>,

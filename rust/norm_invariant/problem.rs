@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
 use super::parameters::unpack_standardised;
-use super::{ANCHOR, Frame, Model, N_PARAMETERS, Parameters, Readings, Settings, UNKNOWN};
+use super::{ANCHOR, ENTRIES, Model, N_PARAMETERS, Parameters, Readings, UNKNOWN};
 use crate::ellipsoid::Standardisation;
 
 /// Least volume of `S` as a part of the start's: below it lies the minimum `S = 0, |b| = |g|`.
@@ -20,14 +20,9 @@ pub(super) struct FixedNoise {
 }
 
 impl FixedNoise {
-    pub(super) fn at(
-        readings: Readings<'_>,
-        settings: &Settings,
-        model: &Model,
-        widening: f64,
-    ) -> Self {
+    pub(super) fn at(readings: Readings<'_>, gravity: f64, model: &Model, widening: f64) -> Self {
         let (sigma, excess) = (0..readings.values.len())
-            .map(|i| predicted(readings, settings, model, i))
+            .map(|i| predicted(readings, gravity, model, i))
             .unzip();
         Self {
             sigma,
@@ -44,7 +39,7 @@ impl FixedNoise {
 /// Standard error and expected excess of one residual.
 pub(super) fn predicted(
     readings: Readings<'_>,
-    settings: &Settings,
+    gravity: f64,
     model: &Model,
     i: usize,
 ) -> (f64, f64) {
@@ -55,13 +50,14 @@ pub(super) fn predicted(
     let across = noise.trace() - along;
     // A pose whose noisy axes all lie across gravity still has some noise along it.
     let floor = 1e-6 * noise.trace();
-    (along.max(floor).sqrt(), across / (2.0 * settings.gravity))
+    (along.max(floor).sqrt(), across / (2.0 * gravity))
 }
 
 /// Data of the problem at one set of predictions.
 pub(super) struct PoseProblem<'a> {
     pub readings: Readings<'a>,
-    pub settings: &'a Settings,
+    /// |g|, m/s².
+    pub gravity: f64,
     pub standard: Standardisation,
     pub fixed: &'a FixedNoise,
     /// `|det S|` of the start, in standardised readings.
@@ -80,21 +76,17 @@ impl PoseProblem<'_> {
         self.anchor.map_or(0, |_| N_PARAMETERS)
     }
 
-    fn model(&self, x: &DVector<f64>) -> Model {
-        unpack_standardised(x.as_slice(), self.settings.frame)
-    }
-
     fn standardised(&self, i: usize) -> Vector3<f64> {
         self.standard.apply(&self.readings.values[i])
     }
 
     fn misfit(&self, f: &Vector3<f64>, i: usize) -> f64 {
-        f.norm() - self.settings.gravity - self.fixed.excess[i]
+        f.norm() - self.gravity - self.fixed.excess[i]
     }
 
     /// Whitened residuals of the readings, then those of the anchor; infinite where `S` collapses.
     pub(super) fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
-        let (n, model) = (self.n(), self.model(x));
+        let (n, model) = (self.n(), unpack_standardised(x.as_slice()));
         let mut residuals = DVector::from_element(n + self.n_held(), f64::INFINITY);
         if model.s.determinant().abs() < SMALLEST_VOLUME * self.volume {
             return residuals;
@@ -104,7 +96,7 @@ impl PoseProblem<'_> {
             residuals[i] = self.misfit(&f, i) / self.fixed.sigma_of(i);
         }
         if let Some(anchor) = &self.anchor {
-            let held = (x - anchor) / (ANCHOR * self.settings.gravity);
+            let held = (x - anchor) / (ANCHOR * self.gravity);
             residuals.rows_mut(n, N_PARAMETERS).copy_from(&held);
         }
         residuals
@@ -112,15 +104,15 @@ impl PoseProblem<'_> {
 
     /// Derivatives of the rows.
     pub(super) fn jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
-        let (n, model) = (self.n(), self.model(x));
+        let (n, model) = (self.n(), unpack_standardised(x.as_slice()));
         let mut jacobian = DMatrix::zeros(n + self.n_held(), N_PARAMETERS);
         for i in 0..n {
             let u = self.standardised(i);
-            let slope = residual_gradient(&model.correct(&u), &u, self.settings);
+            let slope = residual_gradient(&model.correct(&u), &u);
             let row = slope / self.fixed.sigma_of(i);
             jacobian.row_mut(i).tr_copy_from(&row);
         }
-        let held = 1.0 / (ANCHOR * self.settings.gravity);
+        let held = 1.0 / (ANCHOR * self.gravity);
         jacobian.rows_mut(n, self.n_held()).fill_diagonal(held);
         jacobian
     }
@@ -140,7 +132,7 @@ impl PoseProblem<'_> {
     /// With `n` the noise of a reading, `E[∂r/∂S_jk · r] = u_j (Σ Sᵀ u)_k + (P S Σ Sᵀ u)_j a_k/|g|`, `P = I - uuᵀ`, and
     /// for `b` the second term without `a`.
     pub(super) fn noise_in_gradient(&self, x: &DVector<f64>) -> Parameters {
-        let model = self.model(x);
+        let model = unpack_standardised(x.as_slice());
         let mut sum = Parameters::zeros();
         for i in 0..self.n() {
             let a = self.standardised(i);
@@ -148,10 +140,10 @@ impl PoseProblem<'_> {
             let noise = self.readings.noise_of(i) / self.standard.size.powi(2);
             let shared = noise * model.s.transpose() * up;
             let spread = model.s * shared;
-            let across = (spread - up * up.dot(&spread)) / self.settings.gravity;
-            let mut first = columns(&up, &shared, self.settings.frame);
+            let across = (spread - up * up.dot(&spread)) / self.gravity;
+            let mut first = columns(&up, &shared);
             first.fixed_rows_mut::<3>(6).fill(0.0);
-            let mean = first + columns(&across, &a, self.settings.frame);
+            let mean = first + columns(&across, &a);
             sum += mean / self.fixed.sigma_of(i).powi(2);
         }
         sum
@@ -173,13 +165,13 @@ impl PoseProblem<'_> {
 pub(super) fn is_weak(
     readings: Readings<'_>,
     fixed: &FixedNoise,
-    settings: &Settings,
+    gravity: f64,
     model: &Model,
 ) -> bool {
     let mut information = SMatrix::<f64, N_PARAMETERS, N_PARAMETERS>::zeros();
     for (value, sigma) in readings.values.iter().zip(&fixed.sigma) {
         let up = model.correct(value).normalize();
-        let row = columns(&up, &up, Frame::Lower) * (settings.gravity / sigma);
+        let row = columns(&up, &up) * (gravity / sigma);
         information += row * row.transpose();
     }
     information
@@ -190,22 +182,15 @@ pub(super) fn is_weak(
 /// Gradient of the residual in m/s² with respect to the solver's parameters, `S_xx S_yx S_yy S_zx S_zy S_zz` and `b`,
 /// at a (standardised) reading `u` with `f = S u + b`.
 #[must_use]
-pub fn residual_gradient(
-    f: &Vector3<f64>,
-    u: &Vector3<f64>,
-    settings: &Settings,
-) -> SVector<f64, N_PARAMETERS> {
-    columns(&(f / f.norm()), u, settings.frame)
+pub fn residual_gradient(f: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_PARAMETERS> {
+    columns(&(f / f.norm()), u)
 }
 
 /// Derivatives of `along · (S u + b)` with respect to the solver's parameters.
-fn columns(along: &Vector3<f64>, u: &Vector3<f64>, frame: Frame) -> SVector<f64, N_PARAMETERS> {
+fn columns(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_PARAMETERS> {
     let mut slope = SVector::<f64, N_PARAMETERS>::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
         slope[k] = along[i] * u[j];
-        if frame == Frame::Symmetric && i != j {
-            slope[k] += along[j] * u[i];
-        }
     }
     slope.fixed_rows_mut::<3>(6).copy_from(along);
     slope

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Model, Settings};
+use super::Model;
 use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
 
@@ -34,14 +34,14 @@ impl Starts {
     ///
     /// # Errors
     /// When there is none.
-    pub(super) fn sphere(&self, settings: &Settings) -> Result<Model> {
-        self.unit_sphere(settings)
+    pub(super) fn sphere(&self, gravity: f64) -> Result<Model> {
+        self.unit_sphere(gravity)
             .map(|model| self.standard.undo(&model))
     }
 
-    fn unit_sphere(&self, settings: &Settings) -> Result<Model> {
+    fn unit_sphere(&self, gravity: f64) -> Result<Model> {
         let (centre, radius) = ellipsoid::fit_sphere(&self.u).ok_or_else(|| self.none())?;
-        let s = Matrix3::identity() * (settings.gravity / radius);
+        let s = Matrix3::identity() * (gravity / radius);
         Ok(Model { s, b: -s * centre })
     }
 
@@ -49,18 +49,17 @@ impl Starts {
     ///
     /// # Errors
     /// When there is neither.
-    pub(super) fn best(&self, settings: &Settings) -> Result<Model> {
-        let g = settings.gravity;
-        let model_of = |quadric: Result<ellipsoid::Quadric>| quadric.ok()?.model(g, settings.frame);
+    pub(super) fn best(&self, gravity: f64) -> Result<Model> {
+        let model_of = |quadric: Result<ellipsoid::Quadric>| quadric.ok()?.model(gravity);
         let ellipsoid = model_of(ellipsoid::fit_quadric(&self.u))
             .or_else(|| model_of(ellipsoid::fit_ellipsoid(&self.u)));
         let misfit = |model: &Model| -> f64 {
-            let square = |u| (model.correct(u).norm() - g).powi(2);
+            let square = |u| (model.correct(u).norm() - gravity).powi(2);
             self.u.iter().map(square).sum()
         };
         ellipsoid
             .into_iter()
-            .chain([self.unit_sphere(settings)?])
+            .chain([self.unit_sphere(gravity)?])
             .map(|model| (misfit(&model), model))
             .filter(|(misfit, model)| misfit.is_finite() && model.s.determinant().abs() > 0.0)
             .min_by(|(a, _), (b, _)| a.total_cmp(b))

@@ -4,39 +4,14 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
 use pyo3::prelude::*;
 
 use super::arrays::{as_vectors, flat3, matrices3, rows};
-use crate::norm_invariant::{self, Fit, Frame, Readings, Settings};
+use crate::norm_invariant::{self, Fit, Readings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ANCHOR", norm_invariant::ANCHOR)?;
-    module.add_class::<NormSettings>()?;
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
     Ok(())
-}
-
-/// Options of the norm fit.
-#[pyclass(frozen)]
-struct NormSettings(Settings);
-
-#[pymethods]
-impl NormSettings {
-    #[new]
-    #[pyo3(signature = (gravity_m_s2, *, symmetric=false))]
-    fn new(gravity_m_s2: f64, symmetric: bool) -> Self {
-        Self(Settings {
-            gravity: gravity_m_s2,
-            frame: frame(symmetric),
-        })
-    }
-}
-
-fn frame(symmetric: bool) -> Frame {
-    if symmetric {
-        Frame::Symmetric
-    } else {
-        Frame::Lower
-    }
 }
 
 /// A fitted triad; arrays are copies.
@@ -112,18 +87,17 @@ fn fit_norm(
     py: Python<'_>,
     readings: PyReadonlyArray2<'_, f64>,
     noise: PyReadonlyArray3<'_, f64>,
-    settings: &Bound<'_, NormSettings>,
+    gravity_m_s2: f64,
 ) -> PyResult<NormFit> {
     let readings = flat3("readings", &readings)?;
     let noise = matrices3("noise", &noise)?;
-    let settings = settings.get().0;
     super::run(py, || {
         norm_invariant::fit(
             Readings {
                 values: as_vectors(&readings),
                 noise: &noise,
             },
-            &settings,
+            gravity_m_s2,
             None,
         )
     })
@@ -135,13 +109,12 @@ fn fit_norm_held_out<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
     noise: PyReadonlyArray3<'py, f64>,
-    settings: &Bound<'py, NormSettings>,
+    gravity_m_s2: f64,
     fit: &Bound<'py, NormFit>,
     folds: Vec<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let readings = flat3("readings", &readings)?;
     let noise = matrices3("noise", &noise)?;
-    let settings = settings.get().0;
     let full = fit.get().0.clone();
     let flat = super::run(py, || {
         let poses = norm_invariant::held_out(
@@ -149,7 +122,7 @@ fn fit_norm_held_out<'py>(
                 values: as_vectors(&readings),
                 noise: &noise,
             },
-            &settings,
+            gravity_m_s2,
             &full,
             &folds,
         )?;

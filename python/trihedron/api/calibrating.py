@@ -152,7 +152,7 @@ def calibrate(
             raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         try:
-            calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal)
+            calibration = _by_poses(recording, segments, gravity, source, method, axis_signs, gyroscope_nominal)
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
             grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
@@ -222,7 +222,6 @@ def _by_poses(
     gravity: float,
     source: str,
     method: Method,
-    frame: Frame,
     axis_signs: Sequence[int] | None,
     nominal: float | None,
 ) -> Calibration:
@@ -233,10 +232,9 @@ def _by_poses(
         segments.norm_sigma,
         gravity,
         raw_unit=recording.accelerometer_unit,
-        frame=frame,
         axis_signs=axis_signs,
     )
-    alone = _alone(accelerometer, found, frame, gravity, source, recording)
+    alone = _alone(accelerometer, found, "lower", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
     try:

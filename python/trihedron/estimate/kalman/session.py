@@ -170,16 +170,16 @@ def calibrate_session_without_references(
         extra_variance=extra,
         raw_unit=recording.accelerometer_unit.value,
     )
-    observability, weak = _observed(poses, gravity_m_s2, frame, recording.accelerometer_unit)
+    observability, weak = _observed(poses, gravity_m_s2, recording.accelerometer_unit)
     accelerometer = replace(result.accelerometer, observability=observability)
     return replace(result, accelerometer=accelerometer, findings=(*findings, *result.findings, *weak))
 
 
 def _observed(
-    poses: PoseReadings, gravity_m_s2: float, frame: NormFrame, unit: AccelerationUnit
+    poses: PoseReadings, gravity_m_s2: float, unit: AccelerationUnit
 ) -> tuple[Observability, tuple[Finding, ...]]:
     """What the poses determine, judged as by ``calibrate``: one verdict for one session."""
-    sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit, frame=frame)
+    sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit)
     assert sensor.quality is not None
     force = poses.mean @ sensor.S.T + sensor.b
     sigma = sensor.quality.sigma / gravity_m_s2
