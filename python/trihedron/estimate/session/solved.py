@@ -1,6 +1,7 @@
 """Solution of a recording's session: initial scale, outlier moves, fit of both sensors, and their uncertainties."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -61,12 +62,22 @@ class SolvedSession:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A session fitted to the moves ``used`` (m,), without clipped moves and outliers; ``seen`` are all tilt errors."""
+    """A session fitted to the moves ``used`` (m,), without clipped moves and outliers."""
 
+    log: Log
     measured: MoveMeasurements
     used: BoolArray
     solution: SessionSolution
-    seen: Carried
+
+    @cached_property
+    def shown(self) -> MoveMeasurements:
+        """The moves as corrected by the solution."""
+        return self.solution.as_read(self.measured)
+
+    @cached_property
+    def seen(self) -> Carried:
+        """Tilt errors after all moves."""
+        return self.log.carried(self.shown, (self.solution.S_a, self.solution.b_a, self.solution.S_w))
 
     @property
     def outliers(self) -> tuple[int, ...]:
@@ -83,8 +94,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _fitted(log, measured, near)
     solution, seen = found.solution, found.seen
-    shown = solution.as_read(measured)
-    left_out = held_out(shown, log.anchors_s(measured), solution)
+    left_out = held_out(found.shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -133,10 +143,7 @@ def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
 
 
 def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _Fit:
-    solution = solve_session(log.observed(measured, used, near), *near)
-    shown = solution.as_read(measured)
-    seen = log.carried(shown, (solution.S_a, solution.b_a, solution.S_w))
-    return _Fit(measured, used, solution, seen)
+    return _Fit(log, measured, used, solve_session(log.observed(measured, used, near), *near))
 
 
 def _denied(found: _Fit) -> BoolArray:
