@@ -240,10 +240,7 @@ def _by_poses(
     try:
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
-            both = calibrate_joint(recording, segments, accelerometer, gravity, source, nominal)
-            # The joint fit states its own excess residual.
-            still = [finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
-            return replace(both, findings=(*still, *both.findings))
+            return calibrate_joint(recording, segments, alone, nominal)
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
     except INPUT_ERRORS as error:
         return _without_gyroscope(alone, error)
