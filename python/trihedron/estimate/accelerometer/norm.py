@@ -52,20 +52,18 @@ def calibrate_norm(
             "better eighteen (six faces and twelve edges of a cube)"
         )
     # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
-    flip = np.outer(signs, signs)
-    positive, turned = values * signs, noise * flip
-    fit = _core.fit_norm(positive, turned, g)
+    positive = values * signs
+    fit = _core.fit_norm(positive, noise, g)
     n = len(values)
     folds = [i * LEAVE_ONE_OUT_LIMIT // n if n > LEAVE_ONE_OUT_LIMIT else i for i in range(n)]
-    apart = _core.fit_norm_held_out(positive, turned, g, fit, folds)
-    return _assemble(fit, apart, values, noise, g, unit, signs)
+    apart = _core.fit_norm_held_out(positive, noise, g, fit, folds)
+    return _assemble(fit, apart, values, g, unit, signs)
 
 
 def _assemble(
     fit: _core.NormFit,
     apart: FloatArray,
     values: FloatArray,
-    noise: FloatArray,
     g: float,
     unit: AccelerationUnit,
     signs: FloatArray,
@@ -75,9 +73,8 @@ def _assemble(
     S = fit.S * signs
     f = values @ S.T + fit.b
     up = f / np.linalg.norm(f, axis=1)[:, None]
-    residual, sigma = norm_residual(f, S, noise, g)
+    residual, sigma, chi2 = fit.residuals, fit.sigmas, fit.chi2
     dof = len(values) - N_PARAMETERS
-    chi2 = fit.chi2
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
