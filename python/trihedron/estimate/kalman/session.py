@@ -24,6 +24,8 @@ from trihedron.records import (
     Recording,
     Segments,
 )
+from trihedron.sensor_model import correct
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit
 
 
@@ -181,9 +183,8 @@ def _observed(
     """What the poses determine, judged as by ``calibrate``: one verdict for one session."""
     sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit)
     assert sensor.quality is not None
-    force = poses.mean @ sensor.S.T + sensor.b
     sigma = sensor.quality.sigma / gravity_m_s2
-    design = PoseDesign.of(force / np.linalg.norm(force, axis=1)[:, None], sigma)
+    design = PoseDesign.of(directions_of(correct(poses.mean, sensor.S, sensor.b)), sigma)
     observability = design.observability(float(np.median(sigma)))
     outliers = [finding for finding in seen if finding.code is FindingCode.OUTLIER_POSE]
     weak = observability_findings(

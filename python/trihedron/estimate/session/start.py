@@ -15,7 +15,7 @@ from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
 from trihedron.records import Recording, Segments, SensorCalibration
 from trihedron.sensor_model import reframing
-from trihedron.transforms import cross_matrix
+from trihedron.transforms import cross_matrix, directions_of
 from trihedron.units import rate_to_si
 
 ASTRAY_DEG = 5.0
@@ -117,8 +117,7 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
 
     A rotation about the vertical has no tilt error whatever the gyro's scale.
     """
-    forces = measured.reading @ S_a.T + b_a
-    up = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    up = directions_of(measured.reading @ S_a.T + b_a)
     chord = np.linalg.norm(up[measured.links[:, 0]] - up[measured.links[:, 1]], axis=1)
     tells = ~measured.is_lost & (chord > math.radians(ASTRAY_DEG))
     return median(angle_deg[tells if np.any(tells) else ~measured.is_lost])
