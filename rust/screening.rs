@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::allan::prefix::Prefix;
+use crate::allan::prefix::write_running_sum;
 use crate::allan::readings::Readings;
 use crate::error::{Error, Result};
 use crate::interrupt;
@@ -45,18 +45,11 @@ pub struct Jump {
     pub difference: f64,
 }
 
-/// Events of one channel at every scale; readings that are not finite count as the mean.
+/// Events of one channel at every scale, with the running sum in memory of the caller, one longer than the readings;
+/// readings that are not finite count as the mean.
 ///
 /// # Errors
 /// `BadInput` for a scale that does not fit into the log.
-pub fn jumps(readings: &impl Readings, scales: &[Scale]) -> Result<Vec<Jump>> {
-    jumps_in(readings, scales, &mut vec![0.0; readings.len() + 1])
-}
-
-/// As [`jumps`], with the running sum in memory of the caller, one longer than the readings.
-///
-/// # Errors
-/// As [`jumps`].
 ///
 /// # Panics
 /// When `workspace` has another length.
@@ -73,7 +66,7 @@ pub fn jumps_in(
             "every scale must hold at least one reading, and the log two of them",
         ));
     }
-    Prefix::write(readings, workspace);
+    write_running_sum(readings, workspace);
     let sums = &*workspace;
     Ok(scales
         .par_iter()

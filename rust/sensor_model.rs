@@ -2,15 +2,6 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// The body frame in which `S` is expressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
-    /// X along accelerometer X, Y in the plane of accelerometer X and Y: `S` lower triangular.
-    Lower,
-    /// `S` symmetric.
-    Symmetric,
-}
-
 /// Direct model `f = S a' + b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from trihedron import _core, calibrate
+from trihedron import calibrate
 from trihedron.estimate.accelerometer import bending
 from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
 from trihedron.estimate.accelerometer.norm import calibrate_norm
@@ -109,7 +109,6 @@ def test_the_first_advised_pose_beats_every_other_candidate(kept):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"frame": "case"}, "do not determine the case"),
         ({"axis_signs": (1, 2, 3)}, "axis signs"),
         ({"raw_unit": "furlong"}, "furlong"),
     ],
@@ -117,38 +116,6 @@ def test_the_first_advised_pose_beats_every_other_candidate(kept):
 def test_malformed_questions_are_answered_in_words(arguments, words):
     with pytest.raises(ValueError, match=words):
         calibrate_norm(readings(cube_poses(), 1), SIGMA, G, **arguments)
-
-
-@pytest.mark.parametrize("n", [20_001, 150_001])
-def test_very_many_readings_are_fitted_as_carefully_as_few(n):
-    """From a share's answer full steps are taken; a start of one's own takes the careful way."""
-    rng = np.random.default_rng(n)
-    up = rng.standard_normal((40, 3))
-    up = np.repeat(up / np.linalg.norm(up, axis=1, keepdims=True), -(-n // 40), axis=0)[:n]
-    true = np.array([[1.02, 0.0, 0.0], [0.004, 0.985, 0.0], [-0.009, 0.012, 1.01]])
-    raw = (9.81 * up - [0.1, -0.2, 0.05]) @ np.linalg.inv(true).T + 0.03 * rng.standard_normal((n, 3))
-    settings, noise = _core.NormSettings(9.81), 9e-4 * np.eye(3)[None]
-    near = _core.fit_norm(raw, noise, settings)
-    careful = _core.fit_norm(raw, noise, settings, (true, np.zeros(3)))
-    # The step that ends the way is 1e-7 long, and the remainder behind it a hundredth of it.
-    np.testing.assert_allclose(near.S, careful.S, atol=2e-9)
-    np.testing.assert_allclose(near.b, careful.b, atol=2e-8)
-    np.testing.assert_allclose(near.sigmas, careful.sigmas, rtol=1e-6)
-    # An entry that is nearly nothing moves by as little of the largest ones.
-    np.testing.assert_allclose(near.covariance, careful.covariance, atol=1e-6 * np.abs(careful.covariance).max())
-    assert abs(near.chi2 / careful.chi2 - 1.0) < 1e-6
-
-
-def test_noise_by_pose_is_noise_by_reading():
-    rng, settings = np.random.default_rng(2), _core.NormSettings(G)
-    raw, pose = np.tile(readings(cube_poses(), 1), (3, 1)) + rng.normal(size=(54, 3)), np.tile(np.arange(18), 3)
-    noise = np.array([np.diag([1.0, 2.0, 1.0 + k]) for k in range(18)])
-    by_pose, by_reading = _core.fit_norm(raw, noise, settings, None, pose), _core.fit_norm(raw, noise[pose], settings)
-    np.testing.assert_array_equal(by_pose.S, by_reading.S)
-    np.testing.assert_array_equal(by_pose.b, by_reading.b)
-    for few, owner in ((noise[:17], pose), (noise, pose[1:])):
-        with pytest.raises(ValueError, match=r"\w"):
-            _core.fit_norm(raw, few, settings, None, owner)
 
 
 def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():

@@ -12,9 +12,7 @@ from confidence.motion import G
 from confidence.sensor import lower, recorded
 from confidence.sessions import hand, manual, table
 from trihedron import calibrate, diagnose
-from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT
-from trihedron.estimate.session.solved import calibrate_joint
 from trihedron.records import FindingCode
 from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
 from true_segments import segments_from_truth
@@ -167,9 +165,7 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
         part = np.linspace(-0.5, 0.5, recording.n_samples)[:, np.newaxis]
         drifting = replace(recording, accelerometer=recording.accelerometer + drift * part)
         segments = segments_from_truth(drifting, truth)
-        means = segments.accelerometer_mean, segments.accelerometer_sigma_mean
-        alone, _ = calibrate_norm(*means, truth.gravity_m_s2, raw_unit="m/s^2")
-        found = calibrate_joint(drifting, segments, alone, truth.gravity_m_s2, "given")
+        found = calibrate(drifting, segments=segments, gravity_m_s2=truth.gravity_m_s2)
         middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
         # f = S a' + b, so that b is minus the bias.
         away.append(found.accelerometer.b + drift * middle)

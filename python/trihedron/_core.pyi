@@ -14,10 +14,6 @@ class InputError(ValueError): ...
 ANCHOR: float
 
 @final
-class NormSettings:
-    def __new__(cls, gravity_m_s2: float, *, symmetric: bool = False) -> NormSettings: ...
-
-@final
 class NormFit:
     S: FloatArray
     b: FloatArray
@@ -31,15 +27,9 @@ class NormFit:
     stopped_because: str
     n_iterations: int
 
-def fit_norm(
-    readings: FloatArray,
-    noise: FloatArray,
-    settings: NormSettings,
-    start: tuple[FloatArray, FloatArray] | None = None,
-    pose: npt.NDArray[np.int64] | None = None,
-) -> NormFit: ...
+def fit_norm(readings: FloatArray, noise: FloatArray, gravity_m_s2: float) -> NormFit: ...
 def fit_norm_held_out(
-    readings: FloatArray, noise: FloatArray, settings: NormSettings, fit: NormFit, folds: Sequence[int]
+    readings: FloatArray, noise: FloatArray, gravity_m_s2: float, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...
 
 # allan

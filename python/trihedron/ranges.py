@@ -1,5 +1,7 @@
 """Runs of true values in a mask, as ranges ``[first, last)``."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from trihedron.arrays import BoolArray, IntArray
@@ -27,6 +29,17 @@ def grown(mask: BoolArray, part: Range) -> Range:
     while last < len(mask) and mask[last]:
         last += 1
     return first, last
+
+
+def merged(ranges: Iterable[Range]) -> list[Range]:
+    """Ranges in order, those that overlap or touch as one."""
+    out: list[Range] = []
+    for first, last in sorted(ranges):
+        if out and first <= out[-1][1]:
+            out[-1] = (out[-1][0], max(last, out[-1][1]))
+        else:
+            out.append((first, last))
+    return out
 
 
 def rows_beside(ranges: IntArray, beside: int, n: int) -> tuple[IntArray, IntArray]:

@@ -43,3 +43,8 @@ def rotation_by(vector: FloatArray) -> FloatArray:
         return np.asarray(np.eye(3) + cross + 0.5 * cross @ cross, dtype=np.float64)
     out: FloatArray = np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * cross @ cross
     return out
+
+
+def directions_of(vectors: FloatArray) -> FloatArray:
+    """Unit vectors (n, 3) along vectors (n, 3)."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

@@ -25,7 +25,7 @@ pub mod weighted;
 
 use crate::error::{Error, Result};
 
-pub use readings::{Column, FromFn, Readings};
+pub use readings::{Column, Readings};
 pub use stream::Stream;
 
 /// Which variance of the family.
@@ -108,20 +108,13 @@ pub fn check_clusters(n: usize, clusters: &[usize], kind: Kind) -> Result<()> {
     Ok(())
 }
 
-/// Variances of one channel; a reading that is not finite is missing.
+/// Variances of one channel, with the running sum in memory of the caller, one longer than the readings; a reading that
+/// is not finite is missing.
 ///
 /// Missing readings are never interpolated: see [`weighted`].
 ///
 /// # Errors
 /// `BadInput` for cluster sizes without a term, infinite readings, or missing readings where the kind allows none.
-pub fn variances(readings: &impl Readings, clusters: &[usize], kind: Kind) -> Result<Curve> {
-    variances_in(readings, clusters, kind, &mut vec![0.0; readings.len() + 1])
-}
-
-/// As [`variances`], with the running sum in memory of the caller, one longer than the readings.
-///
-/// # Errors
-/// As [`variances`].
 ///
 /// # Panics
 /// When `workspace` has another length.
@@ -132,7 +125,7 @@ pub fn variances_in(
     workspace: &mut [f64],
 ) -> Result<Curve> {
     check_clusters(readings.len(), clusters, kind)?;
-    let (centre, present) = prefix::Prefix::write(readings, workspace);
+    let (centre, present) = prefix::write_running_sum(readings, workspace);
     match present {
         None => Ok(from_running_sum(workspace, clusters, kind)),
         Some(0) => Err(Error::bad_input("the channel holds no finite reading")),

@@ -7,17 +7,6 @@ use super::readings::Readings;
 /// Readings per block; block starts are summed in twice the working precision, so that no error grows along it.
 const BLOCK: usize = 4096;
 
-/// Running sum of one channel without its mean.
-#[derive(Debug, Clone)]
-pub struct Prefix {
-    /// `n + 1` values, the first zero. Readings that are missing count as the mean.
-    pub sums: Vec<f64>,
-    /// Constant subtracted from every reading, in their unit.
-    pub centre: f64,
-    /// Number of finite readings when some are missing, `None` when all are present.
-    pub present: Option<usize>,
-}
-
 /// `a + b` as a rounded sum and its rounding error (Knuth's two-sum).
 #[inline]
 #[must_use]
@@ -39,80 +28,69 @@ pub fn compensated_sum(values: impl IntoIterator<Item = f64>) -> f64 {
     high + low
 }
 
-impl Prefix {
-    /// Running sum of the readings.
-    pub fn new(readings: &impl Readings) -> Self {
-        let mut sums = vec![0.0; readings.len() + 1];
-        let (centre, present) = Self::write(readings, &mut sums);
-        Self {
-            sums,
-            centre,
-            present,
-        }
-    }
-
-    /// Write the running sum into `sums`, one longer than the readings; gives the fields `centre` and `present`.
-    ///
-    /// # Panics
-    /// When `sums` has another length.
-    pub fn write(readings: &impl Readings, sums: &mut [f64]) -> (f64, Option<usize>) {
-        let n = readings.len();
-        assert_eq!(
-            sums.len(),
-            n + 1,
-            "a running sum is one longer than its readings"
-        );
-        let blocks = n.div_ceil(BLOCK);
-        let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
-        // About a first reading rather than zero: a bias of 1e4 times the noise would cost four digits of the noise.
-        let pivot = (0..n)
-            .map(|i| readings.get(i))
-            .find(|v| v.is_finite())
-            .unwrap_or(0.0);
-        let partial: Vec<(f64, usize)> = (0..blocks)
-            .into_par_iter()
-            .with_min_len(16)
-            .map_init(
-                || vec![0.0; BLOCK],
-                |buffer, b| {
-                    let buffer = &mut buffer[..range(b).len()];
-                    readings.fill(b * BLOCK, buffer);
-                    block_sum(buffer, pivot)
-                },
-            )
-            .collect();
-        let present: usize = partial.iter().map(|p| p.1).sum();
-        let total = compensated_sum(partial.iter().map(|p| p.0));
-        let shift = if present == 0 {
-            0.0
-        } else {
-            total / present as f64
-        };
-        let centre = pivot + shift;
-        // The rounded centre is subtracted from the readings; block starts must use it too, at a level of 1e9.
-        let shift = centre - pivot;
-        let (mut high, mut low) = (0.0, 0.0);
-        let starts: Vec<f64> = partial
-            .iter()
-            .map(|&(sum, count)| {
-                let start = high + low;
-                let (s, e) = two_sum(high, sum - shift * count as f64);
-                high = s;
-                low += e;
-                start
-            })
-            .collect();
-        sums[0] = 0.0;
-        sums[1..]
-            .par_chunks_mut(BLOCK)
-            .with_min_len(16)
-            .enumerate()
-            .for_each(|(b, out)| {
-                readings.fill(b * BLOCK, out);
-                running(out, centre, starts[b], partial[b].1 < out.len());
-            });
-        (centre, (present < n).then_some(present))
-    }
+/// Writes the running sum of one channel without its mean into `sums`, one longer than the readings, the first 0;
+/// readings that are missing count as the mean. Returns the constant subtracted from every reading, and the number of
+/// finite readings where some are missing.
+///
+/// # Panics
+/// When `sums` has another length.
+pub fn write_running_sum(readings: &impl Readings, sums: &mut [f64]) -> (f64, Option<usize>) {
+    let n = readings.len();
+    assert_eq!(
+        sums.len(),
+        n + 1,
+        "a running sum is one longer than its readings"
+    );
+    let blocks = n.div_ceil(BLOCK);
+    let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
+    // About a first reading rather than zero: a bias of 1e4 times the noise would cost four digits of the noise.
+    let pivot = (0..n)
+        .map(|i| readings.get(i))
+        .find(|v| v.is_finite())
+        .unwrap_or(0.0);
+    let partial: Vec<(f64, usize)> = (0..blocks)
+        .into_par_iter()
+        .with_min_len(16)
+        .map_init(
+            || vec![0.0; BLOCK],
+            |buffer, b| {
+                let buffer = &mut buffer[..range(b).len()];
+                readings.fill(b * BLOCK, buffer);
+                block_sum(buffer, pivot)
+            },
+        )
+        .collect();
+    let present: usize = partial.iter().map(|p| p.1).sum();
+    let total = compensated_sum(partial.iter().map(|p| p.0));
+    let shift = if present == 0 {
+        0.0
+    } else {
+        total / present as f64
+    };
+    let centre = pivot + shift;
+    // The rounded centre is subtracted from the readings; block starts must use it too, at a level of 1e9.
+    let shift = centre - pivot;
+    let (mut high, mut low) = (0.0, 0.0);
+    let starts: Vec<f64> = partial
+        .iter()
+        .map(|&(sum, count)| {
+            let start = high + low;
+            let (s, e) = two_sum(high, sum - shift * count as f64);
+            high = s;
+            low += e;
+            start
+        })
+        .collect();
+    sums[0] = 0.0;
+    sums[1..]
+        .par_chunks_mut(BLOCK)
+        .with_min_len(16)
+        .enumerate()
+        .for_each(|(b, out)| {
+            readings.fill(b * BLOCK, out);
+            running(out, centre, starts[b], partial[b].1 < out.len());
+        });
+    (centre, (present < n).then_some(present))
 }
 
 /// Sum about `pivot` of the readings present, and their number.

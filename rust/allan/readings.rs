@@ -1,17 +1,16 @@
-//! Source of the readings of one channel: an array of any number type, a column of rows, a function.
+//! Source of the readings of one channel: an array of any number type, a column of rows.
 
 /// Readings of one channel; one that is not finite is missing.
+#[expect(
+    clippy::len_without_is_empty,
+    reason = "a channel without readings is an error where one is asked for"
+)]
 pub trait Readings: Sync {
     /// Number of readings.
     fn len(&self) -> usize;
 
     /// Reading `i`.
     fn get(&self, i: usize) -> f64;
-
-    /// Whether there are no readings.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
 
     /// Readings from `first` on, as many as `out` holds.
     fn fill(&self, first: usize, out: &mut [f64]) {
@@ -52,19 +51,5 @@ impl<T: Copy + Into<f64> + Sync> Readings for Column<'_, T> {
                 *v = row[self.channel].into();
             }
         }
-    }
-}
-
-/// Readings given by a function of their index.
-#[derive(Debug, Clone, Copy)]
-pub struct FromFn<F>(pub usize, pub F);
-
-impl<F: Fn(usize) -> f64 + Sync> Readings for FromFn<F> {
-    fn len(&self) -> usize {
-        self.0
-    }
-
-    fn get(&self, i: usize) -> f64 {
-        (self.1)(i)
     }
 }

@@ -77,13 +77,6 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// The same with a chosen instruction set; results differ by rounding.
-    #[must_use]
-    pub fn with(mut self, instructions: Instructions) -> Self {
-        self.instructions = instructions;
-        self
-    }
-
     fn n_steps(&self) -> usize {
         self.time_s.len() - 1
     }

@@ -3,14 +3,12 @@
 //! `|S a' + b| = |g|` is the quadric `a'ᵀ M a' + 2 mᵀ a' = |g|² - c` with `M = SᵀS`, `m = Sᵀb`, `c = bᵀb`. Readings
 //! are centred on their mean and divided by their spread before the linear step.
 
-mod moments;
 mod standard;
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use crate::error::{Error, Result};
-use crate::sensor_model::{Frame, Model};
-pub(crate) use moments::Moments;
+use crate::sensor_model::Model;
 pub use standard::Standardisation;
 
 /// `uᵀ A u + 2 hᵀ u = 1` in standardised readings.
@@ -49,14 +47,10 @@ impl Quadric {
     ///
     /// `None` when the quadric is not an ellipsoid.
     #[must_use]
-    pub fn model(&self, gravity: f64, frame: Frame) -> Option<Model> {
+    pub fn model(&self, gravity: f64) -> Option<Model> {
         let inverse = self.a.cholesky()?.inverse();
         let kappa = gravity * gravity / (1.0 + self.h.dot(&(inverse * self.h)));
-        let m = self.a * kappa;
-        let s = match frame {
-            Frame::Lower => reversed_cholesky(&m)?,
-            Frame::Symmetric => symmetric_root(&m)?,
-        };
+        let s = reversed_cholesky(&(self.a * kappa))?;
         let b = s.transpose().try_inverse()? * (self.h * kappa);
         Some(Model { s, b })
     }
@@ -71,18 +65,6 @@ pub fn reversed_cholesky(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let l = (flip * m * flip).cholesky()?.l();
     // (P L P)(P Lᵀ P) = M with P L P upper: its transpose is the lower S of SᵀS = M.
     Some((flip * l * flip).transpose())
-}
-
-/// Symmetric positive definite `S` with `S² = M`.
-#[must_use]
-pub fn symmetric_root(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let eigen = m.symmetric_eigen();
-    if eigen.eigenvalues.min() <= 0.0 {
-        return None;
-    }
-    let v = eigen.eigenvectors;
-    let root = v * Matrix3::from_diagonal(&eigen.eigenvalues.map(f64::sqrt)) * v.transpose();
-    Some((root + root.transpose()) * 0.5)
 }
 
 /// Least squares on the quadric's nine coefficients; the result need not be an ellipsoid.

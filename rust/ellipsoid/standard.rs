@@ -1,7 +1,6 @@
 //! Readings centred on their mean and scaled to unit size.
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::sensor_model::Model;
@@ -22,8 +21,9 @@ impl Standardisation {
     /// When all readings are the same, or one is missing, infinite or beyond any sensor.
     pub fn of(readings: &[Vector3<f64>]) -> Result<Self> {
         let n = readings.len().max(1) as f64;
-        let centre = sums(readings, |x, _| x, &Vector3::zeros()) / n;
-        let size = (sums(readings, |x, c| (x - c) * (x - c), &centre).sum() / n).sqrt();
+        let centre = readings.iter().sum::<Vector3<f64>>() / n;
+        let from_centre = readings.iter().map(|a| (a - centre).norm_squared());
+        let size = (from_centre.sum::<f64>() / n).sqrt();
         if !size.is_finite() {
             return Err(Error::bad_input(
                 "the readings hold numbers that are missing, infinite or too large for any sensor",
@@ -52,36 +52,4 @@ impl Standardisation {
             b: model.b - s * self.centre,
         }
     }
-}
-
-/// Numbers summed side by side: eight readings, three numbers each.
-const WIDE: usize = 24;
-/// Readings per share; shares are summed in order.
-const SHARE: usize = 16_384;
-
-/// `Σ f(x, c)` of each axis.
-fn sums(
-    readings: &[Vector3<f64>],
-    f: impl Fn(f64, f64) -> f64 + Sync + Send,
-    centre: &Vector3<f64>,
-) -> Vector3<f64> {
-    let beside: [f64; WIDE] = std::array::from_fn(|k| centre[k % 3]);
-    let share = |readings: &[Vector3<f64>]| {
-        let (rows, rest) = bytemuck::cast_slice::<_, f64>(readings).as_chunks::<WIDE>();
-        let mut wide = [0.0; WIDE];
-        for row in rows {
-            for k in 0..WIDE {
-                wide[k] += f(row[k], beside[k]);
-            }
-        }
-        for (k, x) in rest.iter().enumerate() {
-            wide[k] += f(*x, beside[k]);
-        }
-        Vector3::from_fn(|axis, _| wide.iter().skip(axis).step_by(3).sum())
-    };
-    if readings.len() <= SHARE {
-        return share(readings);
-    }
-    let parts: Vec<Vector3<f64>> = readings.par_chunks(SHARE).map(share).collect();
-    parts.into_iter().sum()
 }

@@ -11,28 +11,21 @@ pub struct Linear {
     pub rhs: DVector<f64>,
     /// F of GN1.
     pub cost: f64,
-    /// Σ r² of the whitened residuals, without weights.
-    pub chi2: f64,
     /// Number of residuals.
     pub n_residuals: usize,
 }
 
 impl Linear {
-    /// From weighted residuals and Jacobian: an orthogonal compression when there are more rows than columns.
+    /// From whitened residuals and Jacobian: an orthogonal compression when there are more rows than columns.
     #[must_use]
-    pub fn from_rows(
-        residuals: DVector<f64>,
-        jacobian: DMatrix<f64>,
-        cost: f64,
-        chi2: f64,
-    ) -> Self {
+    pub fn from_rows(residuals: DVector<f64>, jacobian: DMatrix<f64>) -> Self {
         let (m, p) = jacobian.shape();
+        let cost = 0.5 * residuals.norm_squared();
         if m <= p + 1 {
             return Self {
                 r_factor: jacobian,
                 rhs: residuals,
                 cost,
-                chi2,
                 n_residuals: m,
             };
         }
@@ -43,42 +36,7 @@ impl Linear {
             r_factor: qr.r(),
             rhs: rotated.rows(0, p).into_owned(),
             cost,
-            chi2,
             n_residuals: m,
-        }
-    }
-
-    /// From the normal equations, for problems with too many rows to store: only half of the digits determine the rank.
-    #[must_use]
-    pub fn from_normal_equations(
-        gram: &DMatrix<f64>,
-        gradient: &DVector<f64>,
-        cost: f64,
-        chi2: f64,
-        n_residuals: usize,
-    ) -> Self {
-        let p = gram.nrows();
-        // Scaled to a unit diagonal first: raw counts would otherwise spread the eigenvalues over 12 decades.
-        let scale = DVector::from_fn(p, |j, _| positive_or_one(gram[(j, j)].max(0.0).sqrt()));
-        let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
-        let eigen = scaled.symmetric_eigen();
-        let floor = f64::EPSILON * p as f64 * eigen.eigenvalues.amax();
-        let mut r_factor = eigen.eigenvectors.transpose();
-        let mut rhs = &r_factor * gradient.component_div(&scale);
-        for k in 0..p {
-            let value = eigen.eigenvalues[k];
-            let root = if value > floor { value.sqrt() } else { 0.0 };
-            rhs[k] = if root > 0.0 { rhs[k] / root } else { 0.0 };
-            for j in 0..p {
-                r_factor[(k, j)] *= root * scale[j];
-            }
-        }
-        Self {
-            r_factor,
-            rhs,
-            cost,
-            chi2,
-            n_residuals,
         }
     }
 }
@@ -183,6 +141,6 @@ pub(super) fn column_norms(matrix: &DMatrix<f64>) -> DVector<f64> {
     })
 }
 
-pub fn positive_or_one(value: f64) -> f64 {
+pub(super) fn positive_or_one(value: f64) -> f64 {
     if value > 0.0 { value } else { 1.0 }
 }

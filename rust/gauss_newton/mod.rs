@@ -28,8 +28,7 @@ use nalgebra::DVector;
 
 use crate::error::{Error, Result};
 use crate::interrupt;
-pub use dense::{Problem, Solution, minimise, minimise_problem};
-pub(crate) use linear::positive_or_one;
+pub use dense::{Solution, minimise};
 pub use linear::{Certainty, Linear, certainty};
 
 /// Stopping criteria.
@@ -150,8 +149,6 @@ pub struct Ended<P, L> {
     pub stop: Stop,
     /// Linearisations made.
     pub iterations: usize,
-    /// Left side of GN4.
-    pub gradient: f64,
     /// Length of the undamped step, as [`Local::length`] counts it.
     pub step: f64,
 }
@@ -207,7 +204,6 @@ pub fn descend<D: Descent>(
                 local,
                 stop,
                 iterations,
-                gradient,
                 step,
             });
         }

@@ -124,12 +124,6 @@ impl AxisFilter {
         self.layout.n()
     }
 
-    /// Meaning of the noise states.
-    #[must_use]
-    pub fn layout(&self) -> Layout {
-        self.layout
-    }
-
     /// Number of poses processed.
     #[must_use]
     pub fn n_poses(&self) -> usize {

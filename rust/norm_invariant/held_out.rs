@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::problem::predicted;
-use super::{Fit, N_PARAMETERS, Readings, Settings, fit};
+use super::{Fit, N_PARAMETERS, Readings, fit};
 use crate::error::{Error, Result};
 
 /// One pose, predicted without it.
@@ -24,7 +24,7 @@ pub struct HeldOut {
 /// When the folds do not match the readings.
 pub fn held_out(
     readings: Readings<'_>,
-    settings: &Settings,
+    gravity: f64,
     full: &Fit,
     folds: &[usize],
 ) -> Result<Vec<HeldOut>> {
@@ -38,7 +38,7 @@ pub fn held_out(
     let n_folds = folds.iter().max().map_or(0, |last| last + 1);
     let by_fold: Vec<Vec<(usize, HeldOut)>> = (0..n_folds)
         .into_par_iter()
-        .map(|fold| one_fold(readings, settings, full, folds, fold))
+        .map(|fold| one_fold(readings, gravity, full, folds, fold))
         .collect();
     let blank = HeldOut {
         residual: f64::NAN,
@@ -54,7 +54,7 @@ pub fn held_out(
 
 fn one_fold(
     readings: Readings<'_>,
-    settings: &Settings,
+    gravity: f64,
     full: &Fit,
     folds: &[usize],
     fold: usize,
@@ -65,9 +65,8 @@ fn one_fold(
     let rest = Readings {
         values: &values,
         noise: &noise,
-        pose: &[],
     };
-    let Ok(other) = fit(rest, settings, Some(full.model)) else {
+    let Ok(other) = fit(rest, gravity, Some(full.model)) else {
         return Vec::new();
     };
     if other.is_anchored || other.certainty.rank < N_PARAMETERS {
@@ -84,7 +83,7 @@ fn one_fold(
         .map(|i| {
             let reading = &readings.values[i];
             let f = other.model.correct(reading);
-            let (noise, excess) = predicted(readings, settings, &other.model, i);
+            let (noise, excess) = predicted(readings, gravity, &other.model, i);
             let u = f / f.norm();
             let mut slope = nalgebra::SVector::<f64, 12>::zeros();
             for row in 0..3 {
@@ -97,7 +96,7 @@ fn one_fold(
             (
                 i,
                 HeldOut {
-                    residual: f.norm() - settings.gravity - excess,
+                    residual: f.norm() - gravity - excess,
                     sigma: (noise * noise + model_variance).sqrt(),
                     chi2_per_dof,
                 },

@@ -1,30 +1,22 @@
 //! Accelerometer triad from static poses alone: `|S a' + b| = |g|` in every orientation (model.md, section 3).
 //!
-//! Nine parameters, `S` lower triangular or symmetric. The residual `|S a' + b| - |g|` of a pose is divided by the
+//! Nine parameters, `S` lower triangular. The residual `|S a' + b| - |g|` of a pose is divided by the
 //! noise of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is fixed while the solver runs and
 //! renewed between runs: if it varied with `S`, a large `S` would lower the cost.
 
-mod descent;
 mod fitting;
 mod held_out;
-mod lanes;
-mod near;
-mod noise;
 mod parameters;
 mod problem;
-mod settled;
 mod start;
-mod sums;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-use rayon::prelude::*;
 
 pub use fitting::fit;
 pub use held_out::{HeldOut, held_out};
-pub use parameters::in_frame;
 pub use problem::residual_gradient;
 
-pub use crate::sensor_model::{Frame, Model};
+pub use crate::sensor_model::Model;
 
 use crate::error::{Error, Result};
 use crate::gauss_newton::{Certainty, Stop};
@@ -35,26 +27,15 @@ pub const N_PARAMETERS: usize = 9;
 /// Parameters of the solver.
 type Parameters = SVector<f64, N_PARAMETERS>;
 
-impl Frame {
-    /// `(row, column)` of the six free entries of `S`; a symmetric `S` has the mirrored one as well.
-    const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-}
-
-/// Options of the fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// |g| in m/s².
-    pub gravity: f64,
-    /// Body frame of the result.
-    pub frame: Frame,
-}
+/// `(row, column)` of the six free entries of `S`.
+const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// A fitted triad.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The fitted `S` and `b`.
     pub model: Model,
-    /// Covariance of `S` row by row, then `b`; zero for entries fixed by the frame. For the stated noise, not rescaled.
+    /// Covariance of `S` row by row, then `b`; zero above the diagonal of `S`. For the stated noise, not rescaled.
     pub covariance: SMatrix<f64, 12, 12>,
     /// `|S a' + b| - |g|` in m/s² (less the mean inflation that noise across gravity gives a norm).
     pub residuals: Vec<f64>,
@@ -72,40 +53,25 @@ pub struct Fit {
     pub iterations: usize,
 }
 
-/// Readings with the noise covariance of each: `noise` has one entry for all, or one per pose.
+/// Readings with the noise covariance of each: `noise` has one entry for all, or one per reading.
 #[derive(Debug, Clone, Copy)]
 pub struct Readings<'a> {
     /// Raw readings.
     pub values: &'a [Vector3<f64>],
     /// Noise covariances, raw unit squared.
     pub noise: &'a [Matrix3<f64>],
-    /// The pose of each reading; empty where each is a pose of its own.
-    pub pose: &'a [usize],
 }
 
 impl Readings<'_> {
     fn noise_of(&self, i: usize) -> &Matrix3<f64> {
-        if self.noise.len() == 1 {
-            return &self.noise[0];
-        }
-        &self.noise[self.pose.get(i).copied().unwrap_or(i)]
+        self.noise.get(i).unwrap_or(&self.noise[0])
     }
 
     fn check(&self) -> Result<()> {
         if self.values.is_empty() {
             return Err(Error::bad_input("there are no static poses to fit"));
         }
-        if !self.pose.is_empty() {
-            let last = self.pose.iter().max().copied().unwrap_or(0);
-            if self.pose.len() != self.values.len() || last >= self.noise.len() {
-                return Err(Error::bad_input(format!(
-                    "{} pose numbers up to {last} do not belong to {} readings of {} poses",
-                    self.pose.len(),
-                    self.values.len(),
-                    self.noise.len()
-                )));
-            }
-        } else if self.noise.len() != 1 && self.noise.len() != self.values.len() {
+        if self.noise.len() != 1 && self.noise.len() != self.values.len() {
             return Err(Error::bad_input(format!(
                 "{} noise covariances do not belong to {} readings",
                 self.noise.len(),
@@ -113,12 +79,7 @@ impl Readings<'_> {
             )));
         }
         let is_finite = |a: &Vector3<f64>| a.iter().all(|value| value.is_finite());
-        // No branch per reading; the index is searched for only where one is not finite.
-        let all_finite =
-            |part: &[Vector3<f64>]| part.iter().fold(true, |all, a| all & is_finite(a));
-        if !self.values.par_chunks(sums::SHARE).all(all_finite)
-            && let Some(i) = self.values.iter().position(|a| !is_finite(a))
-        {
+        if let Some(i) = self.values.iter().position(|a| !is_finite(a)) {
             return Err(Error::bad_input(format!("reading {i} is not finite")));
         }
         for (i, noise) in self.noise.iter().enumerate() {
@@ -132,9 +93,6 @@ impl Readings<'_> {
         Ok(())
     }
 }
-
-/// Above this many readings rows are not kept: the normal equations are summed in one parallel pass.
-const ROWS_KEPT: usize = 20_000;
 
 /// Standard error, in |g|, above which a scale, an angle or a bias counts as undetermined by the poses: errors no
 /// longer propagate linearly, and no triad is made that badly.

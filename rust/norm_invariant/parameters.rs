@@ -2,25 +2,18 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::{Frame, Model, N_PARAMETERS, Parameters};
+use super::{ENTRIES, Model, N_PARAMETERS, Parameters};
 use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
 
-/// The model with the same norms in the given frame.
+/// The model with the same norms and a lower triangular `S`.
 ///
 /// # Errors
 /// When `S` is singular.
-pub fn in_frame(model: &Model, frame: Frame) -> Result<Model> {
-    let m = model.s.transpose() * model.s;
-    let s = match frame {
-        Frame::Lower => ellipsoid::reversed_cholesky(&m),
-        Frame::Symmetric => ellipsoid::symmetric_root(&m),
-    }
-    .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
-    let inverse = model
-        .s
-        .try_inverse()
-        .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
+pub(super) fn lower(model: &Model) -> Result<Model> {
+    let singular = || Error::bad_input("the starting S is singular");
+    let s = ellipsoid::reversed_cholesky(&(model.s.transpose() * model.s)).ok_or_else(singular)?;
+    let inverse = model.s.try_inverse().ok_or_else(singular)?;
     Ok(Model {
         s,
         b: s * inverse * model.b,
@@ -32,7 +25,7 @@ pub(super) fn pack(model: &Model, standard: &Standardisation) -> Parameters {
     let s = model.s * standard.size;
     let d = model.b + model.s * standard.centre;
     let mut theta = Parameters::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
         theta[k] = s[(i, j)];
     }
     theta.fixed_rows_mut::<3>(6).copy_from(&d);
@@ -40,13 +33,10 @@ pub(super) fn pack(model: &Model, standard: &Standardisation) -> Parameters {
 }
 
 /// `S` and `d` in standardised readings.
-pub(super) fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
+pub(super) fn unpack_standardised(theta: &[f64]) -> Model {
     let mut s = Matrix3::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
         s[(i, j)] = theta[k];
-        if frame == Frame::Symmetric {
-            s[(j, i)] = theta[k];
-        }
     }
     Model {
         s,
@@ -54,25 +44,16 @@ pub(super) fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
     }
 }
 
-pub(super) fn unpack(theta: &Parameters, frame: Frame, standard: &Standardisation) -> Model {
-    standard.undo(&unpack_standardised(theta.as_slice(), frame))
+pub(super) fn unpack(theta: &[f64], standard: &Standardisation) -> Model {
+    standard.undo(&unpack_standardised(theta))
 }
 
 /// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
-pub(super) fn map_to_entries(
-    frame: Frame,
-    standard: &Standardisation,
-) -> SMatrix<f64, 12, N_PARAMETERS> {
+pub(super) fn map_to_entries(standard: &Standardisation) -> SMatrix<f64, 12, N_PARAMETERS> {
     let mut map = SMatrix::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
-        let mut place = |row: usize, column: usize| {
-            map[(3 * row + column, k)] = 1.0 / standard.size;
-            map[(9 + row, k)] -= standard.centre[column] / standard.size;
-        };
-        place(i, j);
-        if frame == Frame::Symmetric && i != j {
-            place(j, i);
-        }
+    for (k, &(row, column)) in ENTRIES.iter().enumerate() {
+        map[(3 * row + column, k)] = 1.0 / standard.size;
+        map[(9 + row, k)] = -standard.centre[column] / standard.size;
     }
     for i in 0..3 {
         map[(9 + i, 6 + i)] = 1.0;

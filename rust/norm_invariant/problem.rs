@@ -1,11 +1,9 @@
-//! The norm residual and its analytic Jacobian, row by row.
+//! The norm residual and its analytic Jacobian, row by row, with the noise that is predicted for each.
 
-use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
-use super::noise;
 use super::parameters::unpack_standardised;
-use super::sums::{self, At, WithNoise};
-use super::{ANCHOR, Frame, Model, N_PARAMETERS, Parameters, Readings, Settings, UNKNOWN};
+use super::{ANCHOR, ENTRIES, Model, N_PARAMETERS, Parameters, Readings, UNKNOWN};
 use crate::ellipsoid::Standardisation;
 
 /// Least volume of `S` as a part of the start's: below it lies the minimum `S = 0, |b| = |g|`.
@@ -22,41 +20,26 @@ pub(super) struct FixedNoise {
 }
 
 impl FixedNoise {
-    fn sigma_of(&self, i: usize) -> f64 {
-        self.sigma[i] * self.widening
-    }
-
-    /// The readings with their predicted noise.
-    pub(super) fn with_noise<'a>(&'a self, readings: Readings<'a>) -> WithNoise<'a> {
-        WithNoise {
-            values: readings.values,
-            sigma: &self.sigma,
-            excess: &self.excess,
+    pub(super) fn at(readings: Readings<'_>, gravity: f64, model: &Model, widening: f64) -> Self {
+        let (sigma, excess) = (0..readings.values.len())
+            .map(|i| predicted(readings, gravity, model, i))
+            .unzip();
+        Self {
+            sigma,
+            widening,
+            excess,
         }
     }
 
-    pub(super) fn at(readings: Readings<'_>, settings: &Settings, model: &Model) -> Self {
-        let n = readings.values.len();
-        let mut new = Self {
-            sigma: vec![0.0; n],
-            widening: 1.0,
-            excess: vec![0.0; n],
-        };
-        new.renew(readings, settings, model);
-        new
-    }
-
-    /// Recomputes the predictions at another model.
-    pub(super) fn renew(&mut self, readings: Readings<'_>, settings: &Settings, model: &Model) {
-        let at = At::raw(*model, *settings);
-        noise::predict(&readings, &at, &mut self.sigma, &mut self.excess);
+    fn sigma_of(&self, i: usize) -> f64 {
+        self.sigma[i] * self.widening
     }
 }
 
 /// Standard error and expected excess of one residual.
 pub(super) fn predicted(
     readings: Readings<'_>,
-    settings: &Settings,
+    gravity: f64,
     model: &Model,
     i: usize,
 ) -> (f64, f64) {
@@ -67,114 +50,111 @@ pub(super) fn predicted(
     let across = noise.trace() - along;
     // A pose whose noisy axes all lie across gravity still has some noise along it.
     let floor = 1e-6 * noise.trace();
-    (along.max(floor).sqrt(), across / (2.0 * settings.gravity))
+    (along.max(floor).sqrt(), across / (2.0 * gravity))
 }
 
 /// Data of the problem at one set of predictions.
 pub(super) struct PoseProblem<'a> {
     pub readings: Readings<'a>,
-    pub settings: &'a Settings,
+    /// |g|, m/s².
+    pub gravity: f64,
     pub standard: Standardisation,
     pub fixed: &'a FixedNoise,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
     /// Values to which the parameters are tied, to `ANCHOR` of |g| each, when the poses leave some undetermined.
-    pub anchor: Option<DVector<f64>>,
+    pub anchor: Option<Parameters>,
 }
 
 impl PoseProblem<'_> {
-    /// Whitened residual of reading `i` and its gradient.
-    fn row(&self, model: &Model, i: usize) -> (f64, SVector<f64, N_PARAMETERS>) {
-        let u = self.standard.apply(&self.readings.values[i]);
-        let f = model.correct(&u);
-        let residual = self.misfit(&f, i);
-        let slope = residual_gradient(&f, &u, self.settings);
-        let sigma = self.fixed.sigma_of(i);
-        (residual / sigma, slope / sigma)
+    fn n(&self) -> usize {
+        self.readings.values.len()
+    }
+
+    /// Number of rows of the anchor.
+    fn n_held(&self) -> usize {
+        self.anchor.map_or(0, |_| N_PARAMETERS)
+    }
+
+    fn standardised(&self, i: usize) -> Vector3<f64> {
+        self.standard.apply(&self.readings.values[i])
     }
 
     fn misfit(&self, f: &Vector3<f64>, i: usize) -> f64 {
-        f.norm() - self.settings.gravity - self.fixed.excess[i]
+        f.norm() - self.gravity - self.fixed.excess[i]
     }
 
-    fn collapses(&self, model: &Model) -> bool {
-        model.s.determinant().abs() < SMALLEST_VOLUME * self.volume
-    }
-
-    /// Rows of the readings, and of the anchor below them.
-    pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        let model = unpack_standardised(x.as_slice(), self.settings.frame);
-        let n = self.readings.values.len();
-        let extra = self.anchor.as_ref().map_or(0, DVector::len);
-        let mut residuals = DVector::zeros(n + extra);
-        let mut jacobian = DMatrix::zeros(n + extra, N_PARAMETERS);
-        for i in 0..n {
-            let (residual, slope) = self.row(&model, i);
-            residuals[i] = residual;
-            jacobian.row_mut(i).tr_copy_from(&slope);
-        }
-        if let Some(anchor) = &self.anchor {
-            let width = ANCHOR * self.settings.gravity;
-            residuals
-                .rows_mut(n, extra)
-                .copy_from(&((x - anchor) / width));
-            jacobian
-                .view_mut((n, 0), (extra, N_PARAMETERS))
-                .fill_diagonal(1.0 / width);
-        }
-        (residuals, jacobian)
-    }
-
-    /// χ² of the readings, with the widened sigmas.
-    pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
-        let n = self.readings.values.len();
-        self.residuals(x).rows(0, n).norm_squared()
-    }
-
-    /// Jacobian rows of the readings alone.
-    pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
-        let (_, jacobian) = self.linearise(x);
-        jacobian.rows(0, self.readings.values.len()).into_owned()
-    }
-
+    /// Whitened residuals of the readings, then those of the anchor; infinite where `S` collapses.
     pub(super) fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
-        let model = unpack_standardised(x.as_slice(), self.settings.frame);
-        let n = self.readings.values.len();
-        let extra = self.anchor.as_ref().map_or(0, DVector::len);
-        let mut residuals = DVector::from_element(n + extra, f64::INFINITY);
-        if self.collapses(&model) {
+        let (n, model) = (self.n(), unpack_standardised(x.as_slice()));
+        let mut residuals = DVector::from_element(n + self.n_held(), f64::INFINITY);
+        if model.s.determinant().abs() < SMALLEST_VOLUME * self.volume {
             return residuals;
         }
         for i in 0..n {
-            let f = model.correct(&self.standard.apply(&self.readings.values[i]));
+            let f = model.correct(&self.standardised(i));
             residuals[i] = self.misfit(&f, i) / self.fixed.sigma_of(i);
         }
         if let Some(anchor) = &self.anchor {
-            let held = (x - anchor) / (ANCHOR * self.settings.gravity);
-            residuals.rows_mut(n, extra).copy_from(&held);
+            let held = (x - anchor) / (ANCHOR * self.gravity);
+            residuals.rows_mut(n, N_PARAMETERS).copy_from(&held);
         }
         residuals
     }
 
-    /// The readings with their predicted noise.
-    pub(super) fn with_noise(&self) -> WithNoise<'_> {
-        self.fixed.with_noise(self.readings)
+    /// Derivatives of the rows.
+    pub(super) fn jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let (n, model) = (self.n(), unpack_standardised(x.as_slice()));
+        let mut jacobian = DMatrix::zeros(n + self.n_held(), N_PARAMETERS);
+        for i in 0..n {
+            let u = self.standardised(i);
+            let slope = residual_gradient(&model.correct(&u), &u);
+            let row = slope / self.fixed.sigma_of(i);
+            jacobian.row_mut(i).tr_copy_from(&row);
+        }
+        let held = 1.0 / (ANCHOR * self.gravity);
+        jacobian.rows_mut(n, self.n_held()).fill_diagonal(held);
+        jacobian
     }
 
-    /// `E[Jᵀr]` at the truth, see [`noise::noise_in_gradient`].
-    pub(super) fn noise_in_gradient(&self, x: &[f64]) -> Parameters {
-        let at = At {
-            model: unpack_standardised(x, self.settings.frame),
-            standard: self.standard,
-            settings: *self.settings,
-            widening: self.fixed.widening,
-        };
-        noise::noise_in_gradient(&self.readings, &self.fixed.sigma, &at)
+    /// χ² of the readings, with the widened sigmas.
+    pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
+        self.residuals(x).rows(0, self.n()).norm_squared()
+    }
+
+    /// Jacobian rows of the readings alone.
+    pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        self.jacobian(x).rows(0, self.n()).into_owned()
+    }
+
+    /// `E[Jᵀr]` at the truth: a whitened residual and its own derivative share noise, so that their product has a mean.
+    ///
+    /// With `n` the noise of a reading, `E[∂r/∂S_jk · r] = u_j (Σ Sᵀ u)_k + (P S Σ Sᵀ u)_j a_k/|g|`, `P = I - uuᵀ`, and
+    /// for `b` the second term without `a`.
+    pub(super) fn noise_in_gradient(&self, x: &DVector<f64>) -> Parameters {
+        let model = unpack_standardised(x.as_slice());
+        let mut sum = Parameters::zeros();
+        for i in 0..self.n() {
+            let a = self.standardised(i);
+            let up = model.correct(&a).normalize();
+            let noise = self.readings.noise_of(i) / self.standard.size.powi(2);
+            let shared = noise * model.s.transpose() * up;
+            let spread = model.s * shared;
+            let across = (spread - up * up.dot(&spread)) / self.gravity;
+            let mut first = columns(&up, &shared);
+            first.fixed_rows_mut::<3>(6).fill(0.0);
+            let mean = first + columns(&across, &a);
+            sum += mean / self.fixed.sigma_of(i).powi(2);
+        }
+        sum
     }
 
     /// Norm residuals in m/s² of a model in raw units.
     pub(super) fn in_m_s2(&self, model: &Model) -> Vec<f64> {
-        sums::misfits(&self.with_noise(), &At::raw(*model, *self.settings))
+        let values = self.readings.values.iter().enumerate();
+        values
+            .map(|(i, value)| self.misfit(&model.correct(value), i))
+            .collect()
     }
 }
 
@@ -182,8 +162,18 @@ impl PoseProblem<'_> {
 ///
 /// In true coordinates `δf = M f + z`, a pose measures `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the nine
 /// parameters depends on directions and noise alone.
-pub(super) fn is_weak(with_noise: &WithNoise<'_>, settings: &Settings, model: &Model) -> bool {
-    let information = sums::information(with_noise, &At::raw(*model, *settings));
+pub(super) fn is_weak(
+    readings: Readings<'_>,
+    fixed: &FixedNoise,
+    gravity: f64,
+    model: &Model,
+) -> bool {
+    let mut information = SMatrix::<f64, N_PARAMETERS, N_PARAMETERS>::zeros();
+    for (value, sigma) in readings.values.iter().zip(&fixed.sigma) {
+        let up = model.correct(value).normalize();
+        let row = columns(&up, &up) * (gravity / sigma);
+        information += row * row.transpose();
+    }
     information
         .cholesky()
         .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)
@@ -192,19 +182,16 @@ pub(super) fn is_weak(with_noise: &WithNoise<'_>, settings: &Settings, model: &M
 /// Gradient of the residual in m/s² with respect to the solver's parameters, `S_xx S_yx S_yy S_zx S_zy S_zz` and `b`,
 /// at a (standardised) reading `u` with `f = S u + b`.
 #[must_use]
-pub fn residual_gradient(
-    f: &Vector3<f64>,
-    u: &Vector3<f64>,
-    settings: &Settings,
-) -> SVector<f64, N_PARAMETERS> {
-    let along = f / f.norm();
+pub fn residual_gradient(f: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_PARAMETERS> {
+    columns(&(f / f.norm()), u)
+}
+
+/// Derivatives of `along · (S u + b)` with respect to the solver's parameters.
+fn columns(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_PARAMETERS> {
     let mut slope = SVector::<f64, N_PARAMETERS>::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
         slope[k] = along[i] * u[j];
-        if settings.frame == Frame::Symmetric && i != j {
-            slope[k] += along[j] * u[i];
-        }
     }
-    slope.fixed_rows_mut::<3>(6).copy_from(&along);
+    slope.fixed_rows_mut::<3>(6).copy_from(along);
     slope
 }

@@ -7,16 +7,14 @@
 //! step the rotation vector is `φ = φ₀ + φ₀ × φ₁` (fourth-order Magnus), and the step is the exact exponential
 //! `B ← exp(−[φ]×) B`. Equations (5.1)-(5.5) of docs/model-gyroscope.md.
 
-mod lanes;
-mod prepared;
+mod moves;
 mod steps;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
+use self::moves::SteppedMove;
 use crate::error::{Error, Result};
-use crate::rotation::skew;
-pub use prepared::{PreparedMove, prepare};
 pub use steps::{StepWeights, step_weights};
 
 /// 3 × 9 sensitivity of a rotation vector to `S`, column `3 i + j` for `S_ij`.
@@ -89,27 +87,19 @@ pub struct Turn {
     pub wrt_bias_after: Matrix3<f64>,
     /// Covariance of `θ` from rate noise, timestamp errors and lost samples, rad².
     pub cov_noise: Matrix3<f64>,
-    /// Integrated time, s.
-    pub duration_s: f64,
 }
 
-impl Turn {
-    /// `∂B/∂p` for the parameter whose column of `G` is `theta`: `−B [θ]×`.
-    #[must_use]
-    pub fn derivative(&self, theta: &Vector3<f64>) -> Matrix3<f64> {
-        -self.rotation * skew(theta)
-    }
-}
-
-/// Prepares and integrates every move, in parallel; for a single integration: the prepared moves are not stored.
+/// Rotation and sensitivities of every move, in parallel, for `ω = S w' + b`, `b` linear from `bias_before` to
+/// `bias_after`, rad/s; non-finite rows and repeated timestamps are bridged.
 ///
 /// # Errors
-/// As [`prepare`], for the first move that fails, and when there are not as many biases as moves.
+/// When the range leaves the record, the anchors coincide or time runs backward, for the first move that fails; and
+/// when there are not as many biases as moves.
 #[expect(
     clippy::too_many_arguments,
-    reason = "what is prepared and what is integrated"
+    reason = "what is read and what it is integrated with"
 )]
-pub fn integrate_once(
+pub fn integrate_moves(
     time_s: &[f64],
     raw: &[Vector3<f64>],
     ranges: &[MoveRange],
@@ -131,9 +121,24 @@ pub fn integrate_once(
         .par_iter()
         .zip(bias_before.par_iter().zip(bias_after))
         .map(|(range, (before, after))| {
-            prepared::integrate_once(time_s, raw, range, model, |span_s| {
-                noise.beside(scale, before, after, span_s)
-            })
+            let steps = SteppedMove::of(time_s, raw, range, model)?;
+            Ok(steps.integrate(scale, before, after, noise))
         })
+        .collect()
+}
+
+/// `∫ w' dt` over every move, raw unit · s, and the integrated times, s.
+///
+/// # Errors
+/// As [`integrate_moves`].
+pub fn raw_integrals(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    ranges: &[MoveRange],
+    model: RateModel,
+) -> Result<Vec<(Vector3<f64>, f64)>> {
+    ranges
+        .par_iter()
+        .map(|range| Ok(SteppedMove::of(time_s, raw, range, model)?.raw_integral()))
         .collect()
 }

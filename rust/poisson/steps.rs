@@ -121,7 +121,7 @@ impl StepWeights {
 
 /// Ratio of neighbouring steps (jitter, one lost sample) above which a cubic through them is worse than a straight
 /// line: across a longer gap it overshoots.
-pub(super) const UNEVEN_STEPS: f64 = 3.0;
+const UNEVEN_STEPS: f64 = 3.0;
 
 /// Integration steps between the samples `used` (ascending, of strictly increasing time).
 #[must_use]

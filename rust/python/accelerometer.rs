@@ -1,44 +1,17 @@
 //! Bindings of the accelerometer fits.
 
-use nalgebra::{Matrix3, Vector3};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
 use pyo3::prelude::*;
 
-use super::arrays::{as_vectors, flat3, matrices3, rows, rows3};
-use crate::norm_invariant::{self, Fit, Frame, Model, Readings, Settings};
+use super::arrays::{as_vectors, flat3, matrices3, rows};
+use crate::norm_invariant::{self, Fit, Readings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ANCHOR", norm_invariant::ANCHOR)?;
-    module.add_class::<NormSettings>()?;
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
     Ok(())
-}
-
-/// Options of the norm fit.
-#[pyclass(frozen)]
-struct NormSettings(Settings);
-
-#[pymethods]
-impl NormSettings {
-    #[new]
-    #[pyo3(signature = (gravity_m_s2, *, symmetric=false))]
-    fn new(gravity_m_s2: f64, symmetric: bool) -> Self {
-        Self(Settings {
-            gravity: gravity_m_s2,
-            frame: frame(symmetric),
-        })
-    }
-}
-
-fn frame(symmetric: bool) -> Frame {
-    if symmetric {
-        Frame::Symmetric
-    } else {
-        Frame::Lower
-    }
 }
 
 /// A fitted triad; arrays are copies.
@@ -109,51 +82,23 @@ impl NormFit {
     }
 }
 
-/// Starting values of `S` and `b`.
-type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>);
-
 #[pyfunction]
-#[pyo3(signature = (readings, noise, settings, start=None, pose=None))]
 fn fit_norm(
     py: Python<'_>,
     readings: PyReadonlyArray2<'_, f64>,
     noise: PyReadonlyArray3<'_, f64>,
-    settings: &Bound<'_, NormSettings>,
-    start: Option<Start<'_>>,
-    pose: Option<PyReadonlyArray1<'_, i64>>,
+    gravity_m_s2: f64,
 ) -> PyResult<NormFit> {
     let readings = flat3("readings", &readings)?;
-    let pose: Vec<usize> = pose
-        .iter()
-        .flat_map(|pose| pose.as_array().iter().copied().collect::<Vec<i64>>())
-        .map(|k| usize::try_from(k).map_err(|_| PyValueError::new_err("pose numbers start at 0")))
-        .collect::<PyResult<_>>()?;
     let noise = matrices3("noise", &noise)?;
-    let start = start
-        .map(|(s, b)| {
-            let s = rows3("start S", &s)?;
-            let b: Vec<f64> = b.as_array().iter().copied().collect();
-            if s.len() != 3 || b.len() != 3 {
-                return Err(PyValueError::new_err(
-                    "a start is S of shape (3, 3) and b of shape (3,)",
-                ));
-            }
-            Ok(Model {
-                s: Matrix3::from_rows(&[s[0].transpose(), s[1].transpose(), s[2].transpose()]),
-                b: Vector3::from_column_slice(&b),
-            })
-        })
-        .transpose()?;
-    let settings = settings.get().0;
     super::run(py, || {
         norm_invariant::fit(
             Readings {
                 values: as_vectors(&readings),
                 noise: &noise,
-                pose: &pose,
             },
-            &settings,
-            start,
+            gravity_m_s2,
+            None,
         )
     })
     .map(NormFit)
@@ -164,22 +109,20 @@ fn fit_norm_held_out<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
     noise: PyReadonlyArray3<'py, f64>,
-    settings: &Bound<'py, NormSettings>,
+    gravity_m_s2: f64,
     fit: &Bound<'py, NormFit>,
     folds: Vec<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let readings = flat3("readings", &readings)?;
     let noise = matrices3("noise", &noise)?;
-    let settings = settings.get().0;
     let full = fit.get().0.clone();
     let flat = super::run(py, || {
         let poses = norm_invariant::held_out(
             Readings {
                 values: as_vectors(&readings),
                 noise: &noise,
-                pose: &[],
             },
-            &settings,
+            gravity_m_s2,
             &full,
             &folds,
         )?;

@@ -6,10 +6,8 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rayon::prelude::*;
 
 use super::arrays::{as_vectors, flat1, flat3, matrix3, rows3, stack3, vector3};
-use crate::error::Result as KernelResult;
 use crate::poisson::{self, MoveRange, RateModel};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -108,7 +106,7 @@ fn integrate_moves<'py>(
     let noise = &noise.0;
     let turns = super::run_long(py, || {
         let model = RateModel::of_degree(rate_degree)?;
-        poisson::integrate_once(
+        poisson::integrate_moves(
             &time_s,
             as_vectors(&raw),
             &ranges,
@@ -147,22 +145,16 @@ fn integrate_raw_rate<'py>(
     let anchors_s =
         numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
     let ranges = ranges(&moves, &anchors_s.readonly())?;
-    let prepared = super::run_long(py, || {
+    let found = super::run_long(py, || {
         let model = RateModel::of_degree(rate_degree)?;
-        ranges
-            .par_iter()
-            .map(|range| {
-                let one = poisson::prepare(&time_s, as_vectors(&raw), range, model)?;
-                Ok((one.raw_angle(), one.duration_s()))
-            })
-            .collect::<KernelResult<Vec<_>>>()
+        poisson::raw_integrals(&time_s, as_vectors(&raw), &ranges, model)
     })?;
-    let angles: Vec<f64> = prepared
+    let angles: Vec<f64> = found
         .iter()
         .flat_map(|(angle, _)| angle.as_slice().to_vec())
         .collect();
     Ok((
-        angles.to_pyarray(py).reshape([prepared.len(), 3])?,
-        prepared.iter().map(|&(_, duration)| duration).collect(),
+        angles.to_pyarray(py).reshape([found.len(), 3])?,
+        found.iter().map(|&(_, duration)| duration).collect(),
     ))
 }

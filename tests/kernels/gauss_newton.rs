@@ -75,18 +75,15 @@ fn fewer_rows_than_parameters_still_give_all_directions() {
 
 proptest! {
     #[test]
-    fn normal_equations_and_rows_compress_to_the_same_problem(
+    fn rows_are_compressed_to_their_normal_equations(
         entries in prop::collection::vec(-1.0..1.0f64, 36), r in prop::collection::vec(-1.0..1.0f64, 12)
     ) {
         let jacobian = DMatrix::from_row_slice(12, 3, &entries);
         let residuals = DVector::from_vec(r);
         let gram = jacobian.transpose() * &jacobian;
         let gradient = jacobian.transpose() * &residuals;
-        let rows = Linear::from_rows(residuals, jacobian, 0.0, 0.0);
-        let normal = Linear::from_normal_equations(&gram, &gradient, 0.0, 0.0, 12);
+        let rows = Linear::from_rows(residuals, jacobian);
         prop_assert!((rows.r_factor.transpose() * &rows.r_factor - &gram).norm() < 1e-12);
-        prop_assert!((normal.r_factor.transpose() * &normal.r_factor - &gram).norm() < 1e-12);
         prop_assert!((rows.r_factor.transpose() * &rows.rhs - &gradient).norm() < 1e-12);
-        prop_assert!((normal.r_factor.transpose() * &normal.rhs - &gradient).norm() < 1e-9);
     }
 }

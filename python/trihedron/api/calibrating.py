@@ -154,7 +154,7 @@ def calibrate(
             raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         try:
-            calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, gyroscope_nominal)
+            calibration = _by_poses(recording, segments, gravity, source, method, axis_signs, gyroscope_nominal)
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
             grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
@@ -234,7 +234,6 @@ def _by_poses(
     gravity: float,
     source: str,
     method: Method,
-    frame: Frame,
     axis_signs: Sequence[int] | None,
     nominal: float | None,
 ) -> Calibration:
@@ -245,19 +244,15 @@ def _by_poses(
         segments.norm_sigma,
         gravity,
         raw_unit=recording.accelerometer_unit,
-        frame=frame,
         axis_signs=axis_signs,
     )
-    alone = _alone(accelerometer, found, frame, gravity, source, recording)
+    alone = _alone(accelerometer, found, "lower", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
     try:
         # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
         if method == "joint" and alone.is_trustworthy:
-            both = calibrate_joint(recording, segments, accelerometer, gravity, source, nominal)
-            # The joint fit states its own excess residual.
-            still = [finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
-            return replace(both, findings=(*still, *both.findings))
+            return calibrate_joint(recording, segments, alone, nominal)
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
     except INPUT_ERRORS as error:
         return _without_gyroscope(alone, error)

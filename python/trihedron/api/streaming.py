@@ -20,6 +20,7 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_text
 from trihedron.files.checkpoint import Checkpoint, made_of
+from trihedron.ranges import merged
 from trihedron.read import ChunkedLog, open_chunks
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
@@ -197,7 +198,7 @@ def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
         else:
             ranges += [(pose.outer_start, pose.start + kept), (pose.stop - kept, pose.outer_stop)]
     ranges += [(move.start, move.stop) for move in segments.moves]
-    joined = _joined(ranges or [(0, log.n_samples)])
+    joined = merged(ranges or [(0, log.n_samples)])
     starts = np.array([a for a, _ in joined])
     offsets = np.concatenate([[0], np.cumsum([b - a for a, b in joined])])
 
@@ -239,16 +240,6 @@ def _moved_pose(pose: Pose, place: Any, kept: int) -> Pose:
         disturbed,
         pose.is_unsteady,
     )
-
-
-def _joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    out: list[tuple[int, int]] = []
-    for a, b in sorted(ranges):
-        if out and a <= out[-1][1]:
-            out[-1] = (out[-1][0], max(out[-1][1], b))
-        else:
-            out.append((a, b))
-    return out
 
 
 def apply_file(

@@ -16,6 +16,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.sensor_model import correct
 from trihedron.simulate import Scenario
+from trihedron.transforms import directions_of
 from trihedron.units import degrees_from_radians, rate_to_si
 
 AIMED_AT = (0.9, 1.1)
@@ -155,8 +156,7 @@ def _gravity(segments: Segments, calibration: Calibration) -> FloatArray | None:
     mean = segments.accelerometer_mean
     if mean is None:
         return None
-    force = correct(mean, calibration.accelerometer.S, calibration.accelerometer.b)
-    return np.asarray(force / np.linalg.norm(force, axis=1, keepdims=True))
+    return directions_of(correct(mean, calibration.accelerometer.S, calibration.accelerometer.b))
 
 
 # Rates in the world frame in place of the body frame: detected by gravity before and after the moves.
@@ -195,7 +195,7 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
     mean, still = segments.accelerometer_mean, segments.gyroscope_mean
     if still is None or len(segments.moves) < FEWEST_MOVES or len(segments.moves) != segments.n_poses - 1:
         return None
-    up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    up = directions_of(mean)
     to_body = np.eye(3)
     carried, misses = [to_body[:, 2]], []
     for move in segments.moves:

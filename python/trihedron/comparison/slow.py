@@ -18,6 +18,7 @@ from trihedron.records.domains import Domain
 from trihedron.records.pose_noise import Measured
 from trihedron.segment import resegment
 from trihedron.sensor_model import correct
+from trihedron.transforms import directions_of
 
 TESTS = 48.0
 """Divisor of alpha: a half goes to parameters, three eighths to noise, a twelfth to slow noise, for two sensors."""
@@ -157,8 +158,7 @@ def _biases(
     if means is None:
         return ()
     S, b = (np.array(found.extended.accelerometer[name]) for name in ("S", "b"))
-    force = correct(means, S, b)
-    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    up = directions_of(correct(means, S, b))
     return (PoseBiases(values[:, 0], np.sqrt((up**2 @ density**2) / length_s), time_s, length_s, up),)
 
 

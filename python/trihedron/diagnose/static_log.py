@@ -34,6 +34,7 @@ from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.session.model import LOWER, Prior
+from trihedron.transforms import directions_of
 from trihedron.units import rate_to_si
 
 DOMAINS: tuple[Domain, Domain] = ("static-accel", "static-gyro")
@@ -290,13 +291,13 @@ def static_pieces(recording: Recording) -> StaticPieces | None:
         variance[name] = np.maximum(np.nanmedian(own[is_quiet], axis=0), rounding)
         is_calm &= is_quiet
     force = recording.accelerometer
-    early, late = (_directions(np.array([np.nanmean(force[a + k : a + k + length // 2], axis=0) for a, _ in spans]))
+    early, late = (directions_of(np.array([np.nanmean(force[a + k : a + k + length // 2], axis=0) for a, _ in spans]))
                    for k in (0, length // 2))  # fmt: skip
     is_calm &= np.linalg.norm(late - early, axis=1) < TURNS_RAD
     if is_calm.sum() < max(FEWEST_PIECES, MOSTLY_STILL * len(spans)):
         return None
     orientation = np.full(len(spans), -1)
-    orientation[is_calm] = _orientations(_directions(early + late)[is_calm])
+    orientation[is_calm] = _orientations(directions_of(early + late)[is_calm])
     keep = np.flatnonzero(orientation >= 0)
     if len(keep) < FEWEST_PIECES:
         return None
@@ -315,10 +316,6 @@ def static_pieces(recording: Recording) -> StaticPieces | None:
     return StaticPieces(segments, orientation[keep])
 
 
-def _directions(force: FloatArray) -> FloatArray:
-    return np.asarray(force / np.linalg.norm(force, axis=1, keepdims=True))
-
-
 def _orientations(up: FloatArray) -> IntArray:
     """(n,) number of the orientation of every piece, the most frequent first; -1 for handling."""
     out = np.full(len(up), -1, dtype=np.int64)
@@ -328,6 +325,6 @@ def _orientations(up: FloatArray) -> IntArray:
         if not len(free) or near.sum(axis=1).max() < max(LEAST_SHARE * len(up), 2.0):
             break
         # A drifting bias widens an orientation: it is selected about the mean of the largest group.
-        centre = _directions(up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)[None])[0]
+        centre = directions_of(up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)[None])[0]
         out[free[up[free] @ centre > np.cos(SAME_POSE_RAD)]] = number
     return out

@@ -11,6 +11,7 @@ from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
 from trihedron.report.directions import equal_area
 from trihedron.report.drawn import said
+from trihedron.transforms import directions_of
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 STRONG = 0.5
@@ -115,8 +116,7 @@ def move_noise_deg(quality: FitQuality) -> FloatArray:
 
 def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
     """Directions of "up", with the most useful next poses."""
-    force = means @ sensor.S.T + sensor.b
-    up = force / np.linalg.norm(force, axis=1)[:, None]
+    up = directions_of(means @ sensor.S.T + sensor.b)
     advice = sensor.observability.advice if sensor.observability is not None else ()
     wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
     discs = []

@@ -14,6 +14,7 @@ from trihedron.segment.channels import Channels, mean_present
 from trihedron.segment.noise import MeanNoise, pool_mean_noise, split_by_halves
 from trihedron.segment.runs import Run, means_of
 from trihedron.session.rounding import TWO_CODES
+from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si
 
 PIECE = 1 << 18
@@ -220,12 +221,8 @@ def upright(mean: FloatArray, *, has_unit: bool) -> FloatArray | None:
                 found = np.linalg.lstsq(design, np.ones(len(x)), rcond=None)[0]
                 square = found[:3]
                 if square.min() > 0.0 and square.max() < MOST_UNEVEN**2 * square.min():
-                    return _unit(2.0 * square * x + found[3:])
-    return _unit(mean) if has_unit and np.isfinite(mean).all() and np.any(mean, axis=1).all() else None
-
-
-def _unit(rows: FloatArray) -> FloatArray:
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+                    return directions_of(2.0 * square * x + found[3:])
+    return directions_of(mean) if has_unit and np.isfinite(mean).all() and np.any(mean, axis=1).all() else None
 
 
 def along_verticals(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:

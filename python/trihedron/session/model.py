@@ -12,6 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.session.noise import START_STRENGTHS, SessionNoise, Strengths
+from trihedron.transforms import directions_of
 
 LOWER = np.tril_indices(3)
 """Indices of a lower-triangular scale, row by row."""
@@ -106,8 +107,7 @@ class SessionReadings(SessionNoise):
         self, gravity_m_s2: float, accel_S: FloatArray, accel_b: FloatArray, gyro_S: FloatArray, n_effects: int = 0
     ) -> SessionState:
         """The state with S and b on centred readings, every pose at its measured vertical and gyro bias."""
-        force, none = self.pose_force @ accel_S.T + accel_b, np.zeros((self.n_poses, 3))
-        up = force / np.linalg.norm(force, axis=1, keepdims=True)
+        up, none = directions_of(self.pose_force @ accel_S.T + accel_b), np.zeros((self.n_poses, 3))
         bias = none if self.pose_rate is None else self.pose_rate @ gyro_S.T
         return SessionState(gravity_m_s2, accel_S, accel_b, gyro_S, up, bias, none, np.zeros(n_effects))
 

@@ -15,6 +15,7 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.rounding import rounding_of_moves
+from trihedron.transforms import directions_of
 
 LEAST_SHARE = 1e-9
 """Least error of a pose mean over the largest reading, for logs without scatter (a simulation without noise)."""
@@ -268,8 +269,7 @@ def bias_drift(calibration: Calibration, segments: Segments, n: int) -> FloatArr
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     quality = accel.quality
     if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
-        up = segments.accelerometer_mean @ accel.S.T + accel.b
-        up = up / np.linalg.norm(up, axis=1, keepdims=True)
+        up = directions_of(segments.accelerometer_mean @ accel.S.T + accel.b)
         if len(up) == len(quality.residual):
             noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
             out[:3] = between_sessions(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))

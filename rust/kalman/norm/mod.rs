@@ -316,10 +316,4 @@ impl NormFilter {
     pub fn innovations(&self) -> &[Innovation] {
         &self.innovations
     }
-
-    /// Number of poses processed.
-    #[must_use]
-    pub fn n_poses(&self) -> usize {
-        self.poses.len()
-    }
 }

@@ -15,8 +15,9 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import design_rows, wrt_relative_errors
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.probability import fdtrc
-from trihedron.records import Calibration, Finding, FindingCode, Segments, SensorCalibration
-from trihedron.sensor_model import in_frame
+from trihedron.records import Calibration, Finding, FindingCode, Segments
+from trihedron.sensor_model import correct, in_frame
+from trihedron.transforms import directions_of
 
 NONLINEARITY = 2e-3
 """Fraction of the range: data sheets of consumer accelerometers state 0.1 to 0.5 %."""
@@ -94,7 +95,7 @@ def with_bending(calibration: Calibration, segments: Segments, drift: FloatArray
         return calibration
     frame, calibration = calibration.frame, in_frame(calibration, "lower")
     fitted, is_known = calibration.accelerometer, np.isfinite(seen.residual)  # excluded poses have no residual
-    up = verticals(fitted, reading)[is_known]
+    up = directions_of(correct(reading, fitted.S, fitted.b))[is_known]
     curves = np.zeros((len(up), 0)) if drift is None else np.einsum("ni,nik->nk", up, drift[is_known])
     errors = (up, seen.residual[is_known], seen.sigma[is_known], curves)
     if _is_noise(*errors):
@@ -190,13 +191,6 @@ def shape_of(
     return Shape(names, p, float(shift.max()) * gravity_m_s2, shift_sigma) if shift_sigma > MATTERS else None
 
 
-def verticals(fitted: SensorCalibration, reading: FloatArray) -> FloatArray:
-    """Unit verticals (n, 3) of poses from their mean readings (n, 3)."""
-    up: FloatArray = reading @ fitted.S.T + fitted.b
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    return up
-
-
 def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
     """A calibration's findings; a nonlinear shape in the gravity errors of static poses, with the shift of S and b that
     it causes, replaces an earlier NONLINEAR_RESIDUAL finding."""
@@ -204,7 +198,7 @@ def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, 
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return calibration.findings
     seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # excluded poses have no residual
-    up = verticals(fitted, reading)[is_known]
+    up = directions_of(correct(reading, fitted.S, fitted.b))[is_known]
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)
     if shape is None:

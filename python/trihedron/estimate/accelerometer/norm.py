@@ -11,9 +11,8 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
-from trihedron.records import Finding, FindingCode, FitQuality, Frame, SensorCalibration
+from trihedron.records import Finding, FindingCode, FitQuality, SensorCalibration
 from trihedron.records.words import words
-from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
 
 METHOD = "norm of gravity in static poses"
@@ -28,10 +27,9 @@ def calibrate_norm(
     gravity_m_s2: float,
     *,
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
-    frame: Frame = "lower",
     axis_signs: npt.ArrayLike | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
-    """Accelerometer triad from the mean readings of poses, whatever their orientation.
+    """Accelerometer triad from the mean readings of poses, whatever their orientation, in the lower-triangular frame.
 
     Minimises ``Σ ((|S a' + b| - |g|)/σ)²`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
     ``means`` (n, 3) are raw, ``sigma_means`` their standard errors (3,) or (n, 3).
@@ -48,50 +46,40 @@ def calibrate_norm(
     g = checked_gravity(gravity_m_s2)
     signs = checked_signs(axis_signs)
     unit = AccelerationUnit(raw_unit)
-    if frame not in ("lower", "symmetric"):
-        raise InputError(
-            f"poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
-            "they do not determine the case"
-        )
-    settings = _core.NormSettings(g, symmetric=frame == "symmetric")
     if len(values) < 3:
         raise InputError(
             f"{len(values)} poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
     # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
-    flip = np.outer(signs, signs)
-    positive, turned = values * signs, noise * flip
-    fit = _core.fit_norm(positive, turned, settings)
+    positive = values * signs
+    fit = _core.fit_norm(positive, noise, g)
     n = len(values)
     folds = [i * LEAVE_ONE_OUT_LIMIT // n if n > LEAVE_ONE_OUT_LIMIT else i for i in range(n)]
-    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
-    return _assemble(fit, apart, values, noise, g, unit, signs, frame)
+    apart = _core.fit_norm_held_out(positive, noise, g, fit, folds)
+    return _assemble(fit, apart, values, g, unit, signs)
 
 
 def _assemble(
     fit: _core.NormFit,
     apart: FloatArray,
     values: FloatArray,
-    noise: FloatArray,
     g: float,
     unit: AccelerationUnit,
     signs: FloatArray,
-    frame: Frame,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Residuals, covariance and findings of a fitted triad, for the raw axes with their own signs."""
     # f = S₊ (D a') + b: flipping a raw axis flips a column of S.
     S = fit.S * signs
     f = values @ S.T + fit.b
     up = f / np.linalg.norm(f, axis=1)[:, None]
-    residual, sigma = norm_residual(f, S, noise, g)
+    residual, sigma, chi2 = fit.residuals, fit.sigmas, fit.chi2
     dof = len(values) - N_PARAMETERS
-    chi2 = fit.chi2
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
     if fit.is_anchored:
-        covariance = _anchored_covariance(design.information / scale, S, fit.b, g, frame)
+        covariance = _anchored_covariance(design.information / scale, S, fit.b, g)
     else:
         turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
         covariance = fit.covariance * np.outer(turn, turn) * scale
@@ -173,13 +161,10 @@ def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> 
     return norm - g - (total - along) / (2.0 * g), sigma
 
 
-def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
+def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float) -> FloatArray:
     """Covariance (12, 12) of S, b with the prior σ ``ANCHOR``, in |g|, on the nine relative errors (model.md, 3)."""
     physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
-    to_lower = reframing(S, b, "lower")
-    L, low = to_lower.rotation @ S, to_lower.rotation @ b
-    back = reframing(L, low, frame)
-    jacobian = back.jacobian @ wrt_relative_errors(L, low, g)
+    jacobian = wrt_relative_errors(S, b, g)
     return jacobian @ physical @ jacobian.T
 
 

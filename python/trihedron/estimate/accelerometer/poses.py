@@ -16,6 +16,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import Observability
 from trihedron.records.words import Words, words
+from trihedron.transforms import directions_of
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 """Row and column of each of the six entries of M."""
@@ -38,11 +39,7 @@ def parameter_names() -> tuple[Words, ...]:
     return (*entries, *(words("bias-of-axis", axis=j + 1) for j in range(3)))
 
 
-def _unit(directions: FloatArray) -> FloatArray:
-    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
-
-
-CANDIDATES: FloatArray = _unit(np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)]))
+CANDIDATES: FloatArray = directions_of(np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)]))
 """(26, 3) upward unit vectors: faces, edges and corners of a cube, the poses that are easy to set by hand."""
 
 

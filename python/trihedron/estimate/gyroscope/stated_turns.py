@@ -18,6 +18,7 @@ from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_f
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
+from trihedron.transforms import directions_of
 
 SAME_POSE = 2.0 * np.sin(0.5 * np.radians(5.0))
 """Largest change of gravity in a turn on a table, relative: twice the table's tilt, which is two degrees at most."""
@@ -71,8 +72,7 @@ def _turns(
 ) -> tuple[list[TurnName], MeasuredTurns, FloatArray, FloatArray]:
     """Moves that do not change gravity's direction, their stated angles (k,) [rad], and the vertical (k, 3) in each."""
     assert segments.accelerometer_mean is not None
-    up = correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b)
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    up = directions_of(correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b))
     is_level = [np.linalg.norm(up[one.pose_after] - up[one.pose_before]) < SAME_POSE for one in segments.moves]
     known = stated(recording, [one for one, level in zip(segments.moves, is_level, strict=True) if level], angles_deg)
     numbers, moves, angles = zip(*known, strict=True) if known else ((), (), ())

@@ -24,6 +24,8 @@ from trihedron.records import (
     Recording,
     Segments,
 )
+from trihedron.sensor_model import correct
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit
 
 
@@ -170,20 +172,19 @@ def calibrate_session_without_references(
         extra_variance=extra,
         raw_unit=recording.accelerometer_unit.value,
     )
-    observability, weak = _observed(poses, gravity_m_s2, frame, recording.accelerometer_unit)
+    observability, weak = _observed(poses, gravity_m_s2, recording.accelerometer_unit)
     accelerometer = replace(result.accelerometer, observability=observability)
     return replace(result, accelerometer=accelerometer, findings=(*findings, *result.findings, *weak))
 
 
 def _observed(
-    poses: PoseReadings, gravity_m_s2: float, frame: NormFrame, unit: AccelerationUnit
+    poses: PoseReadings, gravity_m_s2: float, unit: AccelerationUnit
 ) -> tuple[Observability, tuple[Finding, ...]]:
     """What the poses determine, judged as by ``calibrate``: one verdict for one session."""
-    sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit, frame=frame)
+    sensor, seen = calibrate_norm(poses.mean, poses.sigma_mean, gravity_m_s2, raw_unit=unit)
     assert sensor.quality is not None
-    force = poses.mean @ sensor.S.T + sensor.b
     sigma = sensor.quality.sigma / gravity_m_s2
-    design = PoseDesign.of(force / np.linalg.norm(force, axis=1)[:, None], sigma)
+    design = PoseDesign.of(directions_of(correct(poses.mean, sensor.S, sensor.b)), sigma)
     observability = design.observability(float(np.median(sigma)))
     outliers = [finding for finding in seen if finding.code is FindingCode.OUTLIER_POSE]
     weak = observability_findings(

@@ -30,6 +30,7 @@ from trihedron.estimate.noise.screening import (
 from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up, wave
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
+from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding, FindingCode
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
 
@@ -281,17 +282,6 @@ def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCu
     # Drift that the temperature explains is stated with it.
     others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
     return replace(axis, findings=others) if seen.is_heated else axis
-
-
-def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Intervals ``(start, stop)`` in order, overlapping ones merged."""
-    out: list[tuple[int, int]] = []
-    for start, stop in sorted(stretches):
-        if out and start <= out[-1][1]:
-            out[-1] = (out[-1][0], max(stop, out[-1][1]))
-        else:
-            out.append((start, stop))
-    return out
 
 
 def _checked_stretch(stretch: tuple[float, float], n: int, rate_hz: float) -> tuple[int, int]:

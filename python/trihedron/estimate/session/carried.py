@@ -21,6 +21,7 @@ from trihedron.sensor_model import norms
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
+from trihedron.transforms import directions_of
 
 N_GYROSCOPE = 9
 N_FOLDS = 5
@@ -225,8 +226,7 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
     wrt_accelerometer = np.concatenate([by_S.reshape(m, 3, 9), rotation - np.eye(3)], axis=2)
     moved = np.einsum("mij,mj->mi", rotation, start)
     residual = moved - end
-    unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
-    unit_end = end / np.linalg.norm(end, axis=1, keepdims=True)
+    unit_moved, unit_end = directions_of(moved), directions_of(end)
     angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
     turn = rotation @ np.cross(np.eye(3), start[:, None, :])
 

@@ -95,13 +95,15 @@ def arranged(
         ),
         "rate_density": np.where(is_coarse, measured.noise_density, noise.rate_density),
     }
-    effects, moves_before = _effects(recording, measured, readings, ranges), np.array(before, dtype=np.int64)
+    edges, moves_before = np.array(ranges, dtype=np.int64), np.array(before, dtype=np.int64)
+    kept = np.concatenate([np.arange(a, b) for a, b in ranges])
+    effects = _effects(recording, measured, readings, edges, kept)
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
-        time_s=_samples_of(ranges, measured.time_s),
-        force=_samples_of(ranges, force) - force_origin,
-        rate=_samples_of(ranges, rate) - rate_origin,
-        ranges=_in_turn(ranges),
+        time_s=measured.time_s,
+        force=force - force_origin,
+        rate=rate - rate_origin,
+        ranges=edges,
         before=moves_before,
         unresolved=unresolved,
     )
@@ -114,26 +116,25 @@ def arranged(
         effect_sigma=np.array([
             *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
-        effect_time_s=np.concatenate([pose_time_s, _samples_of(ranges, measured.time_s)]), pose_lasts_s=lasts_s,
+        effect_time_s=np.concatenate([pose_time_s, measured.time_s[kept]]), pose_lasts_s=lasts_s,
         n_hidden=len(coarse),
     )  # fmt: skip
 
 
 def _effects(
-    recording: Recording, measured: MoveMeasurements, readings: FloatArray, ranges: list[tuple[int, int]]
+    recording: Recording, measured: MoveMeasurements, readings: FloatArray, edges: IntArray, kept: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """``force_effect`` and ``rate_effect`` of :class:`Observed`; ``readings`` (samples, 3) are the accelerometer's."""
+    """``force_effect`` and ``rate_effect`` of :class:`Observed`; ``readings`` (samples, 3) are the accelerometer's,
+    ``edges`` (m, 2) and ``kept`` (k,) the samples of the moves."""
     n_poses = len(measured.reading)
     places = np.eye(3)[:, measured.is_undithered]
-    force, rate = (
-        _samples_of(ranges, values - sharpened(values, measured.time_s, 1.0)) for values in (readings, measured.rate)
-    )
+    force, rate = ((values - sharpened(values, measured.time_s, 1.0))[kept] for values in (readings, measured.rate))
     time_s = recording.with_distinct_timestamps().time_s[measured.rows]
     none = np.zeros((*force.shape, places.shape[1]))
-    shared = _samples_of(ranges, measured.shared_errors)
-    slope = _slopes(time_s, readings, ranges)
+    shared = measured.shared_errors[kept]
+    slope = _core.move_derivative(time_s, readings, edges)[kept]
     of_force = np.concatenate([none, force[:, :, None], np.zeros(shared.shape), slope[:, :, None]], axis=2)
-    hidden = _samples_of(ranges, measured.is_hidden)[:, :, None] * places
+    hidden = measured.is_hidden[kept][:, :, None] * places
     of_rate = np.concatenate([hidden, rate[:, :, None], shared, np.zeros((*rate.shape, 1))], axis=2)
     at_rest = np.zeros((2, n_poses, *of_rate.shape[1:]))
     at_rest[1, :, :, : places.shape[1]] = places
@@ -148,22 +149,3 @@ def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatA
     sizes = float(np.linalg.norm(S_a, 2)), observed.gravity_m_s2, float(np.linalg.norm(S_w, 2))
     sigma = np.repeat(sizes, (6, 3, 9)) * np.repeat((HELD if is_given else 1.0, 1.0), (9, 9))
     return replace(observed, prior=Prior(mean, np.diag(sigma**2), is_weak=True))
-
-
-def _samples_of(ranges: list[tuple[int, int]], samples: FloatArray) -> FloatArray:
-    """Samples of the moves alone, move after move, from (n,) or (n, 3): nothing else of a long log is read."""
-    return np.concatenate([samples[a:b] for a, b in ranges]) if ranges else samples[:0]
-
-
-def _in_turn(ranges: list[tuple[int, int]]) -> IntArray:
-    """Range (m, 2) of each move in the result of :func:`_samples_of`."""
-    ends = np.cumsum([b - a for a, b in ranges], dtype=np.int64)
-    starts = np.concatenate([[0], ends[:-1]]) if ranges else ends
-    return np.ascontiguousarray(np.column_stack([starts, ends]), dtype=np.int64).reshape(-1, 2)
-
-
-def _slopes(time_s: FloatArray, values: FloatArray, ranges: list[tuple[int, int]]) -> FloatArray:
-    """Time derivative of ``values`` (n, 3), per second, at the samples of ``ranges``, move after move."""
-    if not ranges:
-        return np.zeros((0, 3))
-    return _core.move_derivative(_samples_of(ranges, time_s), _samples_of(ranges, values), _in_turn(ranges))

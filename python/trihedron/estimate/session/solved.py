@@ -1,6 +1,7 @@
 """Solution of a recording's session: initial scale, outlier moves, fit of both sensors, and their uncertainties."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted,
 from trihedron.estimate.session.observed import with_prior
 from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
-from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 
 
 def calibrate_moves(
@@ -61,12 +62,22 @@ class SolvedSession:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A session fitted to the moves ``used`` (m,), without clipped moves and outliers; ``seen`` are all tilt errors."""
+    """A session fitted to the moves ``used`` (m,), without clipped moves and outliers."""
 
+    log: Log
     measured: MoveMeasurements
     used: BoolArray
     solution: SessionSolution
-    seen: Carried
+
+    @cached_property
+    def shown(self) -> MoveMeasurements:
+        """The moves as corrected by the solution."""
+        return self.solution.as_read(self.measured)
+
+    @cached_property
+    def seen(self) -> Carried:
+        """Tilt errors after all moves."""
+        return self.log.carried(self.shown, (self.solution.S_a, self.solution.b_a, self.solution.S_w))
 
     @property
     def outliers(self) -> tuple[int, ...]:
@@ -75,7 +86,7 @@ class _Fit:
 
 
 def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedSession:
-    """Fit the session model from the initial scale with the least tilt errors (docs/model-session.md).
+    """Fit the session model (docs/model-session.md).
 
     Raises ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
@@ -83,8 +94,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _fitted(log, measured, near)
     solution, seen = found.solution, found.seen
-    shown = solution.as_read(measured)
-    left_out = held_out(shown, log.anchors_s(measured), solution)
+    left_out = held_out(found.shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
@@ -133,10 +143,7 @@ def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
 
 
 def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _Fit:
-    solution = solve_session(log.observed(measured, used, near), *near)
-    shown = solution.as_read(measured)
-    seen = log.carried(shown, (solution.S_a, solution.b_a, solution.S_w))
-    return _Fit(measured, used, solution, seen)
+    return _Fit(log, measured, used, solve_session(log.observed(measured, used, near), *near))
 
 
 def _denied(found: _Fit) -> BoolArray:
@@ -226,51 +233,35 @@ def scale_by_gravity(
 
 
 def calibrate_joint(
-    recording: Recording,
-    segments: Segments,
-    accelerometer: SensorCalibration,
-    gravity_m_s2: float,
-    gravity_source: str,
-    nominal_scale: FloatArray | float | None = None,
+    recording: Recording, segments: Segments, alone: Calibration, nominal_scale: FloatArray | float | None = None
 ) -> Calibration:
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
     lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
-    ``accelerometer``, calibrated alone; ``nominal_scale`` and errors are those of ``calibrate_moves``.
+    ``alone``, the accelerometer calibrated by poses, whose residuals it replaces; ``nominal_scale`` and errors are
+    those of ``calibrate_moves``.
     """
-    log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=False)
+    log = Log(recording, segments, alone.accelerometer, alone.gravity_m_s2, is_given=False)
     found = solved(log, nominal_scale)
     solution, left_out = found.solution, found.held_out
-    held = None if left_out is None else (left_out.norm, left_out.norm_sigma)
-    quality = norm_quality(solution, held)
-    calibration = Calibration(
-        accelerometer=SensorCalibration(
+    quality = norm_quality(solution, None if left_out is None else (left_out.norm, left_out.norm_sigma))
+    has_temperature = recording.temperature_degc is not None
+    of_residual = residual_findings(quality.chi2, quality, *solution.accel_bias_change, has_temperature=has_temperature)
+    still = [finding for finding in alone.findings if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
+    calibration = replace(
+        alone,
+        accelerometer=replace(
+            alone.accelerometer,
             S=solution.S_a,
             b=solution.b_a,
             covariance=found.covariance[:12, :12],
-            raw_unit=accelerometer.raw_unit,
-            si_unit=accelerometer.si_unit,
             method="joint",
             quality=quality,
-            observability=accelerometer.observability,
         ),
         gyroscope=found.gyroscope,
         covariance=found.covariance,
-        frame="lower",
-        gravity_m_s2=gravity_m_s2,
-        gravity_source=gravity_source,
-        recording_source=recording.source,
-        recording_sha256=recording.sha256,
-        findings=(
-            *residual_findings(
-                quality.chi2,
-                quality,
-                *solution.accel_bias_change,
-                has_temperature=recording.temperature_degc is not None,
-            ),
-            *found.findings,
-        ),
+        findings=(*still, *of_residual, *found.findings),
         averaging=solution.averaging,
     )
     return with_bending(calibration, segments, solution.accel_drift)

@@ -1,4 +1,4 @@
-"""Initial values for the fit of a session: the scale with the least tilt errors."""
+"""Initial values for the fit of a session, without outlier moves."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import approached, are_far, usual_miss
@@ -15,7 +15,7 @@ from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
 from trihedron.records import Recording, Segments, SensorCalibration
 from trihedron.sensor_model import reframing
-from trihedron.transforms import cross_matrix
+from trihedron.transforms import cross_matrix, directions_of
 from trihedron.units import rate_to_si
 
 ASTRAY_DEG = 5.0
@@ -99,27 +99,17 @@ def is_enough(used: BoolArray) -> bool:
 
 
 def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
-    """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given."""
+    """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
+
+    Raises ``InputError`` as :func:`initial_scale`, and when the gyro clipped in every move.
+    """
     if np.all(measured.is_lost):
         raise GyroClippedError(measured)
-    return _nearest(log, measured, starts(log.recording, measured, log.accelerometer, nominal))
-
-
-def _nearest(log: Log, measured: MoveMeasurements, scales: FloatArray) -> Near:
-    """The best fit from the initial scales (k, 3, 3): that with the least χ² after each was fitted to the moves."""
     S_a, b_a, R = lower(log.accelerometer.S, log.accelerometer.b)
+    near = S_a, b_a, R @ initial_scale(log.recording, measured, log.accelerometer, nominal)
     observed = arranged(log.recording, log.segments, measured, log.gravity_m_s2, ~measured.is_lost)
-    found = []
-    for scale in scales:
-        near = S_a, b_a, R @ scale
-        try:
-            core = approached(with_prior(observed, *near, is_given=True), *near)
-        except INPUT_ERRORS:
-            continue
-        found.append((core.chi2, np.asarray(core.rate_scale)))
-    if not found:
-        raise InputError("the gyro fit has no usable start: give --gyro-nominal, in rad/s per raw unit")
-    return S_a, b_a, min(found, key=lambda one: one[0])[1]
+    core = approached(with_prior(observed, *near, is_given=True), *near)
+    return S_a, b_a, np.asarray(core.rate_scale)
 
 
 def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
@@ -127,14 +117,13 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
 
     A rotation about the vertical has no tilt error whatever the gyro's scale.
     """
-    forces = measured.reading @ S_a.T + b_a
-    up = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    up = directions_of(measured.reading @ S_a.T + b_a)
     chord = np.linalg.norm(up[measured.links[:, 0]] - up[measured.links[:, 1]], axis=1)
     tells = ~measured.is_lost & (chord > math.radians(ASTRAY_DEG))
     return median(angle_deg[tells if np.any(tells) else ~measured.is_lost])
 
 
-# Initial gyro scales: from integrals over the moves, as given, or nominal of the unit.
+# Initial gyro scale: from integrals over the moves, as given, or nominal of the unit.
 
 
 FEWEST_MOVES = 3
@@ -191,30 +180,27 @@ def integral_start(
     return out
 
 
-def starts(
+def initial_scale(
     recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: FloatArray | None
 ) -> FloatArray:
-    """Initial scales (k, 3, 3): the nominal one, else that of the unit, and that of :func:`integral_start`.
+    """Initial scale (3, 3): that of :func:`integral_start`, else the nominal one, else that of the unit.
 
     Raises ``InputError`` when readings are counts, no nominal scale is given and the moves do not determine a start.
     """
-    found = []
-    if nominal is not None:
-        found.append(nominal)
     linear = integral_start(recording, measured, accelerometer)
     if linear is not None:
-        found.append(linear)
+        return linear
     unit = rate_to_si(recording.gyroscope_unit)
-    if unit is not None and nominal is None:
-        found.append(unit * np.eye(3))
-    if not found and np.any(measured.is_lost):
+    if nominal is not None:
+        return nominal
+    if unit is not None:
+        return unit * np.eye(3)
+    if np.any(measured.is_lost):
         raise GyroClippedError(measured)
-    if not found:
-        raise InputError(
-            "the moves do not determine a first guess of the gyro scale and its readings are counts: "
-            "give --gyro-nominal in rad/s per count, or add moves about all three axes"
-        )
-    return np.ascontiguousarray(np.stack(found))
+    raise InputError(
+        "the moves do not determine a first guess of the gyro scale and its readings are counts: "
+        "give --gyro-nominal in rad/s per count, or add moves about all three axes"
+    )
 
 
 _ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
