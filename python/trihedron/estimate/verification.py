@@ -20,6 +20,7 @@ from trihedron.estimate.verified_parameters import (
     shifted_parameters,
     uncalibrated,
 )
+from trihedron.gravity import earth_rate_up
 from trihedron.records import (
     Calibration,
     Finding,
@@ -65,7 +66,9 @@ def verify_calibration(
     rest = np.zeros((0, 3))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and segments.gyroscope_mean is not None:
-        rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
+        force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
+        turned = earth_rate_up(recording.latitude_deg) / gravity_m_s2 * force
+        rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b - turned
         if any(move.stop - move.start >= 2 for move in segments.moves):
             moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
