@@ -90,11 +90,8 @@ class EarthRate(Effect):
     """rad/s: the size is known."""
 
     def variants(self, context: Context) -> list[Variant]:
-        attitude = context.pose_attitude
-        attitude = np.where(np.isfinite(attitude), attitude, 0.0)
+        columns = np.where(np.isfinite(context.attitude), context.attitude, 0.0)
         known = context.obs.earth_up_rad_s
-        columns = context.between_poses(attitude)
-
         names, units = ("horizontal_x", "horizontal_y", "vertical"), ("rad/s",) * 3
         if not known:
             return [Variant(acting_on(1, columns), names, units)]
