@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
+from trihedron.diagnose.session.solve import Distortion
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
@@ -63,7 +64,7 @@ class SensorLag(Effect):
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         if not _has_size(variant) or not value[0] > 0.0:
             return None
-        sensor = 1 if variant.distortion.force is None else 0
+        sensor = int(variant.label.startswith(SENSORS[1].label))
         return _filtered(context, sensor, variant.scale * float(value[0]), variant.label)
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
@@ -77,19 +78,24 @@ def _has_size(variant: Variant) -> bool:
     return SECOND in variant.label or MEAN in variant.label
 
 
-def _filtered(context: Context, sensor: int, time_s: float, label: str) -> Variant:
-    """What a second-order low-pass of this delay adds to readings, -(τ y' + τ²/2 y''), or a running mean,
-    y(t) - y(t + τ) + τ²/6 y''(t + τ)."""
-    values = context.rate if sensor else context.force
-    step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
-    ahead = time_s if MEAN in label else 0.0
-    late = context.shifted(values, ahead) if ahead else values
-    bent = (time_s / step) ** 2 * (
-        context.shifted(values, ahead + step) - 2.0 * late + context.shifted(values, ahead - step)
-    )
-    column = values - late + bent / 6.0 if ahead else -(time_s * context.derivative(values) + 0.5 * bent)
-    distortion = acting_on(sensor, column[:, :, None])
-    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s)
+def _filtered(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
+    """What a second-order low-pass of this lag, or a running mean over twice the lag, adds to readings.
+
+    That of the gyro on a clock that is late by the lag: the accelerometer is early, and the rate keeps its phase. With
+    the lag in the rate a fit that begins without one ends in another minimum.
+    """
+    values, late_s = (context.rate, lag_s) if sensor else (context.force, 0.0)
+    step = max(0.5 * lag_s, 1.0 / context.obs.recording.rate_hz)
+    at = (lag_s if MEAN in label else 0.0) - late_s
+    here, after, before = (context.shifted(values, t) for t in (at, at + step, at - step))
+    bent = (lag_s / step) ** 2 * (after - 2.0 * here + before)
+    truth = here - bent / 6.0
+    if SECOND in label:
+        truth = here + lag_s * context.shifted(context.derivative(values), at) + 0.5 * bent
+    column = (values - truth)[:, :, None]
+    early = (context.force - context.shifted(context.force, -lag_s))[:, :, None]
+    distortion = Distortion(early, column) if sensor else acting_on(0, column)
+    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=lag_s)
 
 
 class AccelGyroTimeOffset(Effect):
