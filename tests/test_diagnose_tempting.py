@@ -100,6 +100,26 @@ def test_the_earth_is_no_force_on_the_gyro_where_clipped_moves_break_the_chain_o
     assert "gyro-g-sensitivity" not in found
 
 
+def test_at_a_stated_latitude_the_vertical_part_of_earth_rate_is_no_force_on_the_gyro():
+    scenario = with_effect(session("tactical"), "gyro-g-sensitivity", matrix=np.diag([2e-5, -3e-5, 1e-5]))
+    recording, truth = simulate(with_effect(scenario, "earth-rate", latitude_deg=65.0, heading_deg=40.0), 1)
+    # The place of a log is known by its latitude, |g| here by the scenario.
+    found = trihedron.diagnose(recording.with_same_readings(latitude_deg=65.0), gravity_m_s2=truth.gravity_m_s2)
+    effects = {effect.id: {p.name: p for p in effect.parameters} for effect in found.effects}
+    assert set(effects) == {"gyro-g-sensitivity", "earth-rate"}
+    for name, size in (("G_xx", 2e-5), ("G_yy", -3e-5), ("G_zz", 1e-5)):
+        parameter = effects["gyro-g-sensitivity"][name]
+        assert abs(parameter.value - size) < 3.0 * parameter.std
+        assert parameter.std < 2e-6
+
+
+def test_a_gyro_that_does_not_read_the_earth_has_no_g_sensitivity_at_a_stated_latitude():
+    recording, truth = simulate(session("tactical"), 1)
+    found = trihedron.diagnose(recording.with_same_readings(latitude_deg=65.0), gravity_m_s2=truth.gravity_m_s2)
+    assert [effect.id for effect in found.effects] == ["earth-rate"]
+    assert "stated_vertical" in {p.name for p in found.effects[0].parameters}
+
+
 def test_a_wrong_scale_is_not_lost_samples():
     scenario = session()
     known = trihedron.calibrate(simulate(scenario, 1)[0], gravity_m_s2=9.80665).calibration

@@ -160,19 +160,34 @@ def added(log, truth, of_rate):
     return replace(log, gyroscope=log.gyroscope + of_rate @ np.linalg.inv(truth.gyroscope_S).T)
 
 
-def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter():
+# A field whose horizontal part is a third of its vertical one is no g-sensitivity.
+@pytest.mark.parametrize("field", [(0.8, 0.3, -0.5), (1.2, 0.6, -3.76)], ids=["inclined", "steep"])
+def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(field):
     log, truth, _, _ = session(4, 22)
-    vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply([0.8, 0.3, -0.5])
+    vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply(field)
     log = added(log, truth, 0.05 * DEG * vector @ np.array([[1.0, 0.2, 0], [0, -0.8, 0.5], [0.3, 0, 0.9]]))
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert "gyro-bias-repeatability" not in [effect.id for effect in result.effects]
+    assert not {"gyro-bias-repeatability", "gyro-g-sensitivity"} & {effect.id for effect in result.effects}
     assert result.verdict == "unexplained"
     assert result.relations[0].depends_on == ("vector fixed in the world frame",)
     angle = next(p for p in result.relations[0].coefficients if p.unit == "deg")
     # The vector may as well point the other way, its coupling being reversed.
-    true = np.degrees(np.arccos(-0.5 / np.sqrt(0.98)))
+    true = np.degrees(np.arccos(field[2] / np.linalg.norm(field)))
     assert min(abs(angle.value - true), abs(180.0 - angle.value - true)) < 4.0 * angle.std
     assert "fixed in the world frame" in to_text(diagnosis_report(result))
+
+
+def test_a_gyro_that_averages_over_many_samples_lags_and_has_no_other_effect():
+    log, truth, _, _ = session(7, 22)
+    n = round(0.08 * log.rate_hz)
+    before = np.concatenate([np.repeat(log.gyroscope[:1], n - 1, axis=0), log.gyroscope])
+    mean = np.apply_along_axis(np.convolve, 0, before, np.full(n, 1.0 / n), mode="valid")
+    result = diagnose(replace(log, gyroscope=mean), gravity_m_s2=truth.gravity_m_s2)
+    (effect,) = result.effects
+    assert effect.id == "sensor-lag"
+    (lag,) = effect.parameters
+    assert lag.name == "gyro_lag"
+    assert abs(lag.value - 0.5 * (n - 1) / log.rate_hz) < 4.0 * lag.std
 
 
 def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():

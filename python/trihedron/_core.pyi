@@ -543,7 +543,7 @@ class SessionModel:
     def __new__(
         cls,
         *,
-        gravity_m_s2: float,
+        gravity: _Pair,
         poses: SessionPoses,
         moves: SessionMoves,
         noise: _Pair,

@@ -48,6 +48,11 @@ LEAST_M_S2, MOST_M_S2 = normal_gravity(0.0, 20000.0), normal_gravity(90.0, -1000
 """Gravity of all places that latitude and height can state: another value is in another unit, or a slip."""
 
 
+def earth_rate_up(latitude_deg: float | None) -> float:
+    """Upward component [rad/s] of the Earth's rotation at a latitude [deg]; 0 where none is stated."""
+    return 0.0 if latitude_deg is None else earth_rate_north_up(latitude_deg)[1]
+
+
 def earth_rate_north_up(latitude_deg: float) -> tuple[float, float]:
     """Northward and upward components [rad/s] of the Earth's rotation at a latitude [deg]."""
     latitude = math.radians(latitude_deg)

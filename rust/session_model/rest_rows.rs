@@ -77,7 +77,7 @@ impl Session {
         };
         let inverse = state.rate_scale.try_inverse().ok_or_else(collapsed)?;
         for i in 0..layout.n_poses {
-            let mut asked = Vector3::zeros();
+            let mut asked = state.up[i] * self.earth_up;
             add_effect(distortion.rate.as_ref(), distortion.k, i, state, &mut asked);
             let read = inverse * asked;
             let mut group = at_rest(rate, i, &(read + state.pose_rate_bias[i]), layout);
@@ -98,6 +98,10 @@ impl Session {
                     &-Vector3::ith(row, 1.0),
                     &weight,
                 );
+            }
+            let tilt = inverse * tangent_plane(&state.up[i]) * self.earth_up;
+            for c in 0..2 {
+                set(&mut group.rows.here, c, &-tilt.column(c), &weight);
             }
             set_effect(
                 distortion.rate.as_ref(),

@@ -22,7 +22,7 @@ impl Fit {
     #[must_use]
     pub fn session_bias(&self, session: &Session) -> Option<SessionBias> {
         let rate = session.rate.as_ref()?;
-        let (weights, spread) = pooled(rate, &self.read_biases(rate));
+        let (weights, spread) = pooled(rate, &self.read_biases(session, rate));
         let mut mean = Vector3::zeros();
         let mut variance = Vector3::zeros();
         for (w, z) in weights.iter().zip(&self.state.pose_rate_bias) {
@@ -36,8 +36,8 @@ impl Fit {
         })
     }
 
-    /// Raw mean of every pose less the effects there.
-    fn read_biases(&self, rate: &StaticMeans) -> Vec<Vector3<f64>> {
+    /// Raw mean of every pose less the Earth's rotation about the vertical and the effects there.
+    fn read_biases(&self, session: &Session, rate: &StaticMeans) -> Vec<Vector3<f64>> {
         let effects = super::Distortion::at(
             self.distortion.rate.as_ref(),
             self.distortion.k,
@@ -47,9 +47,12 @@ impl Fit {
         rate.mean
             .iter()
             .enumerate()
-            .map(|(i, mean)| match (&effects, inverse) {
-                (Some(effects), Some(inverse)) => mean - inverse * effects[i],
-                _ => *mean,
+            .map(|(i, mean)| {
+                let mut known = self.state.up[i] * session.earth_up;
+                if let Some(effects) = &effects {
+                    known += effects[i];
+                }
+                inverse.map_or(*mean, |inverse| mean - inverse * known)
             })
             .collect()
     }

@@ -94,6 +94,7 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
         .map(|i| inverse_force * (up[i] * G - force_bias) + slow[i])
         .collect();
     let session = Session {
+        earth_up: 0.0,
         gravity: G,
         time_s: pose_time,
         force: at_rest(force_mean, noise_force),

@@ -133,7 +133,7 @@ def calibrate(
     if method not in METHODS:
         raise InputError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
-    recording = recording_of(recording)
+    recording = recording_of(recording, latitude_deg)
     segments = segments_of(segments, recording, progress)
     if reference is not None:
         from trihedron.api.referring import calibration_by, held_against

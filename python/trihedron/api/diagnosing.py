@@ -86,7 +86,8 @@ def diagnose(
     notify = progress or (lambda _fraction, _text: None)
     # A reference and a simulation are imported where one is given: that takes longer than reading the log.
     place = (gravity_m_s2, latitude_deg, height_m)
-    recording = recording_of(recording)
+    # A simulation need not contain the rotation of the Earth: beside one the recording is taken as it is.
+    recording = recording_of(recording, latitude_deg if against is None else None)
     if against is not None:
         from trihedron.api.beside import shared_log
         from trihedron.api.diagnosing_with_simulation import opened

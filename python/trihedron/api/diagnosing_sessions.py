@@ -61,7 +61,7 @@ def diagnose_sessions(
     given: list[tuple[Recording, Segments, Calibration]] = []
     results = []
     for one in recordings:
-        recording = recording_of(one)
+        recording = recording_of(one, latitude_deg)
         try:
             result = calibrate(recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
         except INPUT_ERRORS as error:

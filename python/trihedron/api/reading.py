@@ -163,13 +163,14 @@ def _check_even(name: str, given: Any) -> None:
         raise WrongTypeError(f"{name} is an array of numbers, and its rows have different lengths.") from None
 
 
-def recording_of(given: AnyRecording) -> Recording:
-    """A recording: the record itself, that of a result, or one read from an input of :func:`read`.
+def recording_of(given: AnyRecording, latitude_deg: float | None = None) -> Recording:
+    """A recording: the record itself, that of a result, or one read from an input of :func:`read`; at the latitude of
+    its place where that is stated.
 
     Raises ``InputError`` when it cannot be read, is of another type, or is several recordings.
     """
     if isinstance(given, Recording):
-        return given
+        return given if latitude_deg is None else given.with_same_readings(latitude_deg=latitude_deg)
     if (
         isinstance(given, list | tuple)
         and given
@@ -179,7 +180,7 @@ def recording_of(given: AnyRecording) -> Recording:
             f"one recording is taken here, and {len(given)} were given: several of one unit are for "
             "trihedron.calibrate_sessions and trihedron.diagnose_sessions."
         )
-    return read(given)
+    return recording_of(read(given), latitude_deg)
 
 
 def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:

@@ -76,7 +76,7 @@ def verify(
     """
     known = calibration_of(calibration)
     changed = [one for one in known.findings if one.code is FindingCode.BIAS_DRIFT]
-    recording = recording_of(recording)
+    recording = recording_of(recording, latitude_deg)
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     if known.extensions.get("effects"):
@@ -197,7 +197,7 @@ def rank(
     """
     if len(calibrations) < 2:
         raise InputError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")
-    recording = recording_of(recording)
+    recording = recording_of(recording, latitude_deg)
     named = [(_name(given, k), _read(given)) for k, given in enumerate(calibrations)]
     stated = [known.gravity_m_s2 for _, known in named if "maker" not in known.extensions]
     of_files = (float(np.median(stated)), "that of the calibrations") if stated else None

@@ -278,6 +278,15 @@ class Context:
         return out
 
     @cached_property
+    def attitude(self) -> FloatArray:
+        """(points, 3, 3) :attr:`pose_attitude`, in moves rotated on by the gyro from the pose before."""
+        poses, path, h = self.pose_attitude, self.fitted.path, self.obs.n_poses
+        out = np.concatenate([poses, np.zeros((self.n_points - h, 3, 3))])
+        for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
+            out[where] = path.attitude[where.start - h : where.stop - h] @ poses[before]
+        return out
+
+    @cached_property
     def noise_density(self) -> FloatArray:
         """(2, 3) white noise, SI per √Hz: accelerometer, gyro."""
         obs, state = self.obs, self.fitted.state

@@ -21,6 +21,7 @@ from trihedron.estimate.verified_parameters import (
     uncalibrated,
 )
 from trihedron.estimate.verified_static_rate import bias_findings, expected_change, rate_findings, static_rate
+from trihedron.gravity import earth_rate_up
 from trihedron.records import (
     Calibration,
     Finding,
@@ -64,17 +65,19 @@ def verify_calibration(
     empty = np.zeros(0)
     moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
     gyroscope = calibration.gyroscope
+    force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     rest, rest_noise = static_rate(gyroscope, segments)
     rest_sigma = expected_change(calibration, recording, segments, rest_noise)
-    if gyroscope is not None and len(rest) and any(move.stop - move.start >= 2 for move in segments.moves):
-        moves = _carried(calibration, gyroscope, recording, segments)
+    if gyroscope is not None and len(rest):
+        rest = rest - earth_rate_up(recording.latitude_deg) / gravity_m_s2 * force
+        if any(move.stop - move.start >= 2 for move in segments.moves):
+            moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     changed = _changed(parameters)
     judged = (calibration, without, recording, segments)
     worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
-    force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     of_rates = tuple(rate_findings(rest, rest_sigma, force))
     beyond_noise = (*of_poses, *_angle_findings(moves, changed, segments))
     return Verification(

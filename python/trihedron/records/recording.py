@@ -97,6 +97,8 @@ class Recording(Presented):
         Name of the source for display; hash of the bytes that were read (of the arrays when made in memory).
     start_epoch_s : float
         Unix time of the first sample where the log has it, else 0.
+    latitude_deg : float or None
+        Latitude of the place, once it is stated: the gyro reads the Earth's rotation about the vertical.
     findings : tuple of Finding
         Findings of the audit of the log.
     sampling : Sampling
@@ -138,6 +140,7 @@ class Recording(Presented):
     onboard: Onboard | None = None
     rows_in_file: int = 0
     rows_read: int = 0
+    latitude_deg: float | None = None
 
     def __post_init__(self) -> None:
         time_s = _readonly(self.time_s, "time_s", (None,))

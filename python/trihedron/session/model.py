@@ -61,13 +61,17 @@ def contiguous(values: FloatArray | None) -> FloatArray | None:
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SessionReadings(SessionNoise):
     """Pose means ``pose_force``, ``pose_rate`` (h, 3) of a session with their noise, relative to ``force_origin``,
-    ``rate_origin`` (3,): counts around 32768 would cost the normal equations ten digits."""
+    ``rate_origin`` (3,): counts around 32768 would cost the normal equations ten digits.
+
+    ``earth_up_rad_s`` is the Earth's rotation about the vertical, which the gyro reads in every pose; 0 where unknown.
+    """
 
     force_origin: FloatArray
     rate_origin: FloatArray
     pose_time_s: FloatArray
     pose_force: FloatArray
     pose_rate: FloatArray | None
+    earth_up_rad_s: float = 0.0
 
     @property
     def n_poses(self) -> int:
@@ -98,7 +102,7 @@ class SessionReadings(SessionNoise):
         """
         unit = self.scatter_unit()
         return _core.SessionModel(
-            gravity_m_s2=gravity_m_s2, poses=self.core_poses(), moves=moves, noise=timing_s,
+            gravity=(gravity_m_s2, self.earth_up_rad_s), poses=self.core_poses(), moves=moves, noise=timing_s,
             prior=None if prior is None else (prior.mean, prior.covariance, prior.is_weak),
             scatter=(unit, self.force_scatter / float(unit[0, 0])) if is_scatter_free else None,
         )  # fmt: skip

@@ -130,14 +130,14 @@ fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
 
 #[pymethods]
 impl SessionModel {
-    /// `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it
+    /// `gravity`: |g| m/s², rotation of the Earth about the vertical rad/s (0 where no latitude is known). `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it
     /// is weak. `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter
     /// that is expected from its noise inside poses, 0 where there is none.
     #[new]
-    #[pyo3(signature = (*, gravity_m_s2, poses, moves, noise, prior, scatter))]
+    #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter))]
     fn new(
         py: Python<'_>,
-        gravity_m_s2: f64,
+        gravity: Pair,
         poses: &SessionPoses,
         moves: &SessionMoves,
         noise: Pair,
@@ -165,7 +165,8 @@ impl SessionModel {
             nominal_step_s,
         };
         let session = Session {
-            gravity: gravity_m_s2,
+            gravity: gravity.0,
+            earth_up: gravity.1,
             time_s: poses.time_s.clone(),
             force: poses.force.clone(),
             rate: poses.rate.clone(),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -16,6 +17,10 @@ N_GRID = 121
 """Latitudes and azimuths at which the likelihood is computed: 1.5° and 3°, then closer about the best."""
 CLOSER = 6.0
 """Steps of the grid to either side of the best that the next grid covers, where an angle is surer than a step."""
+STATED = "stated_vertical"
+"""Parameter of a log without Earth rate: the vertical component that the session model subtracts."""
+KNOWN = 1e-4
+"""Error of the stated latitude [rad], some hundred metres on the ground."""
 MISSES = 6.63
 """χ² of the vector's length, one degree of freedom, p = 0.01: above it the vector is not Earth rate."""
 
@@ -65,8 +70,18 @@ def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
     return np.asarray(unit * EARTH_RATE_RAD_S)
 
 
+def _nearest(variant: Variant, value: FloatArray, covariance: FloatArray) -> Turning:
+    """The nearest Earth rate to the fitted components, with the vertical one where the latitude states it."""
+    known = [up for up, _ in variant.shape.values()]
+    exact = np.full(len(known), (KNOWN * EARTH_RATE_RAD_S) ** 2)
+    return nearest_turning(np.append(value, known), block_diag(covariance, np.diag(exact)))
+
+
 class EarthRate(Effect):
-    """Earth rate in the level frame of the first pose: two horizontal components and the vertical one."""
+    """Earth rate in the level frame of the first pose: two horizontal components and the vertical one.
+
+    At a stated latitude the session model contains the vertical one already.
+    """
 
     id = "earth-rate"
     needs_moves = True
@@ -75,25 +90,38 @@ class EarthRate(Effect):
     """rad/s: the size is known."""
 
     def variants(self, context: Context) -> list[Variant]:
-        attitude = context.pose_attitude
-        attitude = np.where(np.isfinite(attitude), attitude, 0.0)
-        names = ("horizontal_x", "horizontal_y", "vertical")
-        return [Variant(acting_on(1, context.between_poses(attitude)), names, ("rad/s",) * 3)]
+        columns = np.where(np.isfinite(context.attitude), context.attitude, 0.0)
+        known = context.obs.earth_up_rad_s
+        names, units = ("horizontal_x", "horizontal_y", "vertical"), ("rad/s",) * 3
+        if not known:
+            return [Variant(acting_on(1, columns), names, units)]
+        # Not all gyros read it: those of a simulation, or those whose bias is removed where they are static.
+        return [
+            Variant(acting_on(1, columns[:, :, :2]), names[:2], units[:2], {"vertical": (known, "rad/s")}),
+            Variant(acting_on(1, columns[:, :, 2:]), names[2:], units[2:], {STATED: (known, "rad/s")}, label="absent"),
+        ]
 
-    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
+        if STATED in variant.shape:
+            return float((value[0] + variant.shape[STATED][0]) ** 2 / covariance[0, 0]) < MISSES
         # The length of Earth rate is known: any other vector is another effect.
-        return nearest_turning(value, covariance).chi2 < MISSES
+        return _nearest(variant, value, covariance).chi2 < MISSES
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
-        near = nearest_turning(value, covariance)
+        own = super().parameters(variant, value, covariance)
+        if STATED in variant.shape:
+            return own
+        near = _nearest(variant, value, covariance)
         angles = (("latitude", near.latitude, near.latitude_std), ("north_azimuth", near.azimuth, near.azimuth_std))
         return (
             *(EffectParameter(n, degrees_from_radians(v), degrees_from_radians(s), "deg") for n, v, s in angles),
-            *super().parameters(variant, value, covariance),
+            *own,
         )
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         by_name = {p.name: p for p in parameters}
+        if STATED in by_name:
+            return self.reported("absent", vertical=by_name["vertical"].value, stated=by_name[STATED].value)
         at, heading = by_name["latitude"], by_name["north_azimuth"]
         return self.reported(
             "latitude", latitude_deg=at.value, latitude_std_deg=at.std, azimuth_deg=heading.value,

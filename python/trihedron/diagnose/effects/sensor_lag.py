@@ -1,8 +1,9 @@
 """A delay between the sensors, or a low-pass of one of them, to all orders that a recording can determine.
 
 A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass of first order
-x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All begin with τ y'; the next term separates
-them. Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
+x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y'', after a running mean over 2τ, which trails by τ,
+x(t) = y(t + τ) - τ²/6 y''(t + τ). All begin with τ y'; the next term separates them.
+Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
+from trihedron.diagnose.session.solve import Distortion
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
@@ -21,7 +23,8 @@ SIGMAS = 3.0
 """Standard errors by which a lag may be negative: filters are causal."""
 FIRST_ORDER_S = 0.01
 """s: unit of the first-order columns; their parameter is a lag in hundredths of a second."""
-SECOND = "second order"
+SECOND, MEAN = "second order", "running mean"
+"""Shapes whose columns depend on the lag."""
 
 
 def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
@@ -52,32 +55,47 @@ class SensorLag(Effect):
         least_s = LEAST_STEPS / context.obs.recording.rate_hz
         times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
         return out + [
-            _second_order(context, sensor, t, f"{SENSORS[sensor].label}, {SECOND}, {1e3 * t:.0f} ms")
+            _filtered(context, sensor, t, f"{SENSORS[sensor].label}, {kind}, {1e3 * t:.0f} ms")
+            for kind in (SECOND, MEAN)
             for t in times
             for sensor in range(2)
         ]
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
-        if SECOND not in variant.label or not value[0] > 0.0:
+        if not _has_size(variant) or not value[0] > 0.0:
             return None
-        sensor = 1 if variant.distortion.force is None else 0
-        return _second_order(context, sensor, variant.scale * float(value[0]), variant.label)
+        sensor = int(variant.label.startswith(SENSORS[1].label))
+        return _filtered(context, sensor, variant.scale * float(value[0]), variant.label)
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         if (value < -SIGMAS * sigma).any() or not (value > 0.0).any():
             return False
-        return SECOND not in variant.label or is_near_one(value, covariance)
+        return not _has_size(variant) or is_near_one(value, covariance)
 
 
-def _second_order(context: Context, sensor: int, time_s: float, label: str) -> Variant:
-    """What a second-order low-pass of this delay adds to readings: -(τ y' + τ²/2 y'')."""
-    values = context.rate if sensor else context.force
-    step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
-    twice = context.shifted(values, step) - 2.0 * values + context.shifted(values, -step)
-    column = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
-    distortion = acting_on(sensor, column[:, :, None])
-    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=time_s)
+def _has_size(variant: Variant) -> bool:
+    return SECOND in variant.label or MEAN in variant.label
+
+
+def _filtered(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
+    """What a second-order low-pass of this lag, or a running mean over twice the lag, adds to readings.
+
+    That of the gyro on a clock that is late by the lag: the accelerometer is early, and the rate keeps its phase. With
+    the lag in the rate a fit that begins without one ends in another minimum.
+    """
+    values, late_s = (context.rate, lag_s) if sensor else (context.force, 0.0)
+    step = max(0.5 * lag_s, 1.0 / context.obs.recording.rate_hz)
+    at = (lag_s if MEAN in label else 0.0) - late_s
+    here, after, before = (context.shifted(values, t) for t in (at, at + step, at - step))
+    bent = (lag_s / step) ** 2 * (after - 2.0 * here + before)
+    truth = here - bent / 6.0
+    if SECOND in label:
+        truth = here + lag_s * context.shifted(context.derivative(values), at) + 0.5 * bent
+    column = (values - truth)[:, :, None]
+    early = (context.force - context.shifted(context.force, -lag_s))[:, :, None]
+    distortion = Distortion(early, column) if sensor else acting_on(0, column)
+    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=lag_s)
 
 
 class AccelGyroTimeOffset(Effect):

@@ -6,6 +6,7 @@ the effect is the better explanation.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -19,6 +20,9 @@ ALL_AXES = (0, 1, 2)
 WORLD_VECTOR = "vector fixed in the world frame"
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
 """Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
+DIPS_DEG = ((45.0,), (72.0, 84.0))
+"""Dips of a flat and of a steep vector: its vertical part is expected as large as the horizontal ones, three or ten
+times as large. Two variables: beside a g-sensitivity, which has the vertical part, the dip is not determined."""
 ANY_BY_ANY = ("rate", HISTORY, "rate products")
 """Families of vectors: three of their variables together may act on any axis."""
 Column = tuple[str, FloatArray, str]
@@ -60,6 +64,24 @@ class Dependence(Effect):
             units, label = self.units * len(axes), "".join(AXES[a] for a in axes)
             out.append(Variant(whole.of(part), names, units, label=label, part_of=(whole, part)))
         return out
+
+
+class WorldVector(Dependence):
+    """Dependence of the gyros on a vector fixed in the world frame, of any dip: a coupling that is steep explains what
+    would be a g-sensitivity. Columns along the axes of the level frame for each axis of the body, vertical last."""
+
+    def __init__(self, columns: Sequence[Column], dips_deg: tuple[float, ...]) -> None:
+        super().__init__(1, "world", columns, axes=(ALL_AXES,))
+        self.dips_deg, self.id = dips_deg, f"{self.id}, dip {dips_deg}"
+
+    def variants(self, context: Context) -> list[Variant]:
+        (one,) = super().variants(context)
+        return [replace(one, label=f"dip of {dip:.0f}°") for dip in self.dips_deg]
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        dip = next(dip for dip in self.dips_deg if variant.label == f"dip of {dip:.0f}°")
+        steep = np.where(np.arange(variant.distortion.n_parameters) % 3 == 2, np.tan(np.radians(dip)), 1.0)
+        return np.asarray(super().sizes(context, variant) * steep)
 
 
 def dependences(context: Context) -> list[Dependence]:
@@ -135,12 +157,11 @@ def _world_vector(context: Context) -> list[Dependence]:
     """Rates that depend on a vector fixed in the world frame, each gyro separately; none where a chain of moves is
     broken.
 
-    Its vertical part alone is a g-sensitivity, an effect of the catalogue: the horizontal parts must add to it.
+    Its vertical part alone is a g-sensitivity, an effect of the catalogue, which stays beside it where it adds to it.
     """
-    attitude = context.pose_attitude
-    if not np.isfinite(attitude).all():
+    if not np.isfinite(context.attitude).all():
         return []
     # Axes of the level frame in body coordinates: two horizontal ones, then the vertical one.
-    seen = context.between_poses(attitude).reshape(context.n_points, 9).T
+    seen = context.attitude.reshape(context.n_points, 9).T
     columns = [(f"{WORLD_VECTOR} {AXES[j]}{h}", seen[3 * j + h], "1") for j in range(3) for h in range(3)]
-    return [Dependence(1, "world", columns, axes=(ALL_AXES,))]
+    return [WorldVector(columns, dips) for dips in DIPS_DEG]

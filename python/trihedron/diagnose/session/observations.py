@@ -12,6 +12,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
+from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Prior, SessionReadings
@@ -200,6 +201,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         disturbed_s=bumped,
         unresolved=dict(zip(poses, of_moves, strict=True)), averaging=averaging,
+        earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
 
 

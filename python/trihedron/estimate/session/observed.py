@@ -8,6 +8,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
@@ -117,7 +118,7 @@ def arranged(
             *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
         effect_time_s=np.concatenate([pose_time_s, measured.time_s[kept]]), pose_lasts_s=lasts_s,
-        n_hidden=len(coarse),
+        n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
 
 

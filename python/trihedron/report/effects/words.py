@@ -133,7 +133,9 @@ GYROSCOPE = {
         {
             "latitude": "the gyros measure the rotation of the Earth (at its rate that is a latitude of "
             "{latitude_deg:abs .0f}° ± {latitude_std_deg:.1g}°; north lies {azimuth_deg:.0f}° ± "
-            "{azimuth_std_deg:.1g}° from X of the first pose)."
+            "{azimuth_std_deg:.1g}° from X of the first pose).",
+            "absent": "the gyros do not read the rotation of the Earth: at this latitude {stated:.2g °/s} about the "
+            "vertical, and {vertical:.2g °/s} is missing. Simulate it, or leave the latitude out and give gravity.",
         },
     ),
 }
