@@ -49,7 +49,10 @@ impl<'a> CandidateGains<'a> {
             .iter()
             .map(unweighed)
             .collect::<Result<_>>()?;
-        let look = |at: &Strengths| {
+        // Other strengths show what may be hidden by the fit's: no move has little weight there.
+        let gaussian = Hypothesis::of(fit, &[], &[])?.without_tails();
+        let look = |(k, at): (usize, &Strengths)| {
+            let hypothesis = if k == 0 { &hypothesis } else { &gaussian };
             let (chain, side) = hypothesis.system(at)?;
             let white = hypothesis
                 .whitenings(at)
@@ -74,7 +77,11 @@ impl<'a> CandidateGains<'a> {
         };
         Ok(Self {
             fit,
-            each: strengths.iter().map(look).collect::<Result<_>>()?,
+            each: strengths
+                .iter()
+                .enumerate()
+                .map(look)
+                .collect::<Result<_>>()?,
         })
     }
 

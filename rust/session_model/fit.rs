@@ -143,6 +143,8 @@ pub(super) fn fit_from(
     let mut iterations = 0;
     let mut spread = 1.0_f64;
     let mut before: Option<Weights> = None;
+    // Far from the optimum every residual is large.
+    let is_new = known.is_none();
     let mut passed = match known {
         Some(known) if session.compares_in(&known, &state) => known,
         _ => session.pass(&state, distortion, &session.planes(&state)),
@@ -158,6 +160,7 @@ pub(super) fn fit_from(
             Some(before) if renewal > WHOLE_RENEWALS => {
                 Weights::between(&before, &passed, &strengths)?
             }
+            _ if renewal == 0 && is_new => Weights::gaussian(&passed, &strengths)?,
             _ => Weights::of(&passed, &strengths)?,
         };
         let problem = FixedWeights {
@@ -177,7 +180,8 @@ pub(super) fn fit_from(
             .max(1.0);
         passed = local.passed;
         let is_there = ended.stop != Stop::SmallStep || ended.step <= STEP_TOLERANCE * spread;
-        let is_settled = (ended.iterations == 1 && is_there) || session.moves.is_empty();
+        let is_settled = (ended.iterations == 1 && is_there && !(renewal == 0 && is_new))
+            || session.moves.is_empty();
         // Where residuals far exceed their noise a descent ends late, and renewed weights would start it again.
         let is_endless = !is_rough && ended.stop == Stop::TooManyIterations;
         spread = shown;

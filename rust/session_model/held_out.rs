@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::chain::{Chain, Rows};
 use super::ends::Ends;
 use super::fit::{Fit, gradient};
+use super::move_rows::prior_of;
 use super::predict::{N_DOMAINS, domain_of};
 use crate::error::Result;
 
@@ -78,6 +79,10 @@ impl Fit {
     /// Predicts one fold's rows from the others: only its own poses and the border, the rest eliminated from both ends.
     fn predicted(&self, fold: &[usize], side: &DMatrix<f64>, ends: &Ends) -> Result<FoldPart> {
         let mut groups: Vec<Rows> = fold.iter().map(|&g| self.groups[g].rows.clone()).collect();
+        let tails: Vec<f64> = fold
+            .iter()
+            .map(|&g| self.tail_of(&self.groups[g]))
+            .collect();
         let poses = groups.iter().filter_map(|rows| {
             let last = |pose| pose + usize::from(rows.next.ncols() > 0);
             rows.pose.map(|pose| (pose, last(pose)))
@@ -97,23 +102,28 @@ impl Fit {
         let mut jacobian_t = DMatrix::zeros(layout.n(), n);
         let mut residual = DVector::zeros(n);
         let mut at = 0;
-        for rows in &groups {
+        let mut own = DMatrix::zeros(layout.n(), 1);
+        for (rows, tail) in groups.iter().zip(&tails) {
             let r = rows.len();
             let mut part = DMatrix::zeros(layout.n(), r);
             rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
-            jacobian_t.columns_mut(at, r).copy_from(&part);
-            residual.rows_mut(at, r).copy_from(&rows.residual);
+            own += &part * &rows.residual;
+            // Predicted are the readings, without the weight that their residuals gave them.
+            jacobian_t.columns_mut(at, r).copy_from(&(part / *tail));
+            residual
+                .rows_mut(at, r)
+                .copy_from(&(&rows.residual / *tail));
             at += r;
         }
         // The training optimum is one linear step from that of all rows.
-        let others = ends.side_between(side, layout, first, last) - &jacobian_t * &residual;
+        let others = ends.side_between(side, layout, first, last) - own;
         let solved = factor.solve(&jacobian_t);
         let mut spread = DMatrix::zeros(n, n);
         let mut at = 0;
-        for rows in &groups {
+        for (rows, tail) in groups.iter().zip(&tails) {
             spread
                 .rows_mut(at, rows.len())
-                .copy_from(&rows.times(layout, &solved));
+                .copy_from(&(rows.times(layout, &solved) / *tail));
             at += rows.len();
         }
         for i in 0..n {
@@ -127,7 +137,11 @@ impl Fit {
         let mut plain = DVector::zeros(n);
         let mut share = DVector::zeros(n);
         // Rows are whitened by noise that may differ between models: predictions are compared in the rows' own units.
-        let mut log_det = -2.0 * fold.iter().map(|&g| self.groups[g].log_weight).sum::<f64>();
+        let without_tail = |(&g, tail): (&usize, &f64)| {
+            let group = &self.groups[g];
+            group.log_weight - group.rows.len() as f64 * tail.ln() - prior_of(tail * tail)
+        };
+        let mut log_det = -2.0 * fold.iter().zip(&tails).map(without_tail).sum::<f64>();
         for k in 0..n {
             let value = eigen.eigenvalues[k];
             if value < OPEN {

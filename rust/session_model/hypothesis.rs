@@ -7,11 +7,15 @@ use super::Strengths;
 use super::chain::{Chain, Layout};
 use super::elimination::eliminated;
 use super::fit::{Fit, RIDGE, chi2_of, gradient};
-use super::move_rows::{Passed, Whitening};
+use super::move_rows::{MoveResidual, Passed, Whitening, with_tails};
 use super::moves::N_MOVE;
 use super::rows::{Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
 use crate::error::{Error, Result};
+
+/// Most renewals of the weights of moves for a hypothesis, and the change of their logarithm that needs none.
+const RENEWALS: usize = 4;
+const SAME_WEIGHT: f64 = 0.2;
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
 pub(super) struct Part {
@@ -38,6 +42,8 @@ pub(super) struct Open {
     pose: usize,
     columns: DMatrix<f64>,
     passed: Passed,
+    /// The residual about which the tails of its noise are: that of the fit, or of one linear step from it.
+    left: MoveResidual,
 }
 
 impl Open {
@@ -55,16 +61,26 @@ impl Open {
             pose: rows.pose.unwrap_or(group.segment),
             columns: DMatrix::from_column_slice(N_MOVE, white.ncols(), (back * &white).as_slice()),
             passed: passed.clone(),
+            left: passed.carried.residual,
         }
     }
 
-    /// `L⁻¹` of its covariance `L Lᵀ` at some strengths.
-    fn whitening(&self, strengths: &Strengths) -> Option<Whitening> {
-        self.passed
-            .covariance(strengths)
-            .cholesky()?
-            .l()
-            .try_inverse()
+    /// `L⁻¹` of its covariance `L Lᵀ` at some strengths, its weight by heavy tails, and the logarithm of that weight's
+    /// prior.
+    fn whitening(&self, strengths: &Strengths) -> Option<(Whitening, f64, f64)> {
+        with_tails(&self.passed.covariance(strengths), &self.left)
+    }
+
+    /// The residual one linear `step` of all unknowns further.
+    fn moved(&self, layout: Layout, step: &DVector<f64>) -> MoveResidual {
+        let (b, p, at) = (layout.border, layout.pose, layout.at(self.pose));
+        let n = b + 2 * p;
+        let unknown = |c: usize| if c < b { step[c] } else { step[at + c - b] };
+        let columns = (0..n).map(|c| self.columns.fixed_view::<N_MOVE, 1>(0, c) * unknown(c));
+        columns.fold(
+            self.columns.fixed_view::<N_MOVE, 1>(0, n).into_owned(),
+            |sum, column| sum + column,
+        )
     }
 }
 
@@ -151,8 +167,8 @@ impl Hypothesis {
         let mut side = self.fixed.side.clone();
         let mut sum = self.fixed.sum;
         for open in &self.moves {
-            let white = open.whitening(strengths)?;
-            weight += white.diagonal().map(f64::ln).sum();
+            let (white, _, prior) = open.whitening(strengths)?;
+            weight += white.diagonal().map(f64::ln).sum() + prior;
             sum += chain.add_move(open.pose, &open.columns, &white, &mut side);
         }
         chain.mirror();
@@ -172,8 +188,16 @@ impl Hypothesis {
     pub(super) fn whitenings(&self, strengths: &Strengths) -> Option<Vec<Whitening>> {
         self.moves
             .iter()
-            .map(|open| open.whitening(strengths))
+            .map(|open| open.whitening(strengths).map(|(white, ..)| white))
             .collect()
+    }
+
+    /// The hypothesis with Gaussian noise of the moves.
+    pub(super) fn without_tails(mut self) -> Self {
+        for open in &mut self.moves {
+            open.left = MoveResidual::zeros();
+        }
+        self
     }
 
     fn factors(&self, strengths: &Strengths) -> [f64; N_PROCESSES] {
@@ -252,22 +276,23 @@ impl Hypothesis {
         Ok((chain, side))
     }
 
-    /// The most likely strengths, searched from the best of `starts`, with the evidence and the estimate there.
+    /// The most likely strengths, searched from the best of `starts`, with the evidence and the estimate there; the
+    /// weights of moves are renewed by the residuals that the added parameters leave.
     ///
     /// # Errors
     /// When there are no `starts`, or the session is undetermined there.
-    pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
-        let (strengths, _) = self.likeliest(starts, within)?;
-        let log_evidence = self.at_each(&[strengths])[0];
-        let (chain, side) = self.system(&strengths)?;
-        let factor = chain.factor(RIDGE, None)?;
-        let first = self.layout.border - self.n_added;
-        let mut columns = DMatrix::zeros(self.layout.n(), self.n_added + 1);
-        columns.column_mut(0).copy_from(&side.column(0));
-        for c in 0..self.n_added {
-            columns[(first + c, 1 + c)] = 1.0;
+    pub fn tuned(mut self, starts: &[Strengths], within: &Within) -> Result<Found> {
+        let (mut strengths, _) = self.likeliest(starts, within)?;
+        for _ in 0..RENEWALS {
+            let step = -self.solved(&strengths)?.column(0);
+            if !self.renew(&strengths, &step) {
+                break;
+            }
+            (strengths, _) = self.likeliest(&[strengths], within)?;
         }
-        let solved = factor.solve(&columns);
+        let log_evidence = self.at_each(&[strengths])[0];
+        let first = self.layout.border - self.n_added;
+        let solved = self.solved(&strengths)?;
         Ok(Found {
             log_evidence,
             strengths,
@@ -276,6 +301,32 @@ impl Hypothesis {
                 .view((first, 1), (self.n_added, self.n_added))
                 .into_owned(),
         })
+    }
+
+    /// `(unknowns, 1 + added)` the step away from the optimum, and the covariance of all unknowns with those added.
+    fn solved(&self, strengths: &Strengths) -> Result<DMatrix<f64>> {
+        let (chain, side) = self.system(strengths)?;
+        let factor = chain.factor(RIDGE, None)?;
+        let first = self.layout.border - self.n_added;
+        let mut columns = DMatrix::zeros(self.layout.n(), self.n_added + 1);
+        columns.column_mut(0).copy_from(&side.column(0));
+        for c in 0..self.n_added {
+            columns[(first + c, 1 + c)] = 1.0;
+        }
+        Ok(factor.solve(&columns))
+    }
+
+    /// Moves the residuals about which tails are by a `step`; whether the weight of any move changes by it.
+    fn renew(&mut self, strengths: &Strengths, step: &DVector<f64>) -> bool {
+        let layout = self.layout;
+        let mut changed = false;
+        for open in &mut self.moves {
+            let before = open.whitening(strengths).map_or(1.0, |one| one.1);
+            open.left = open.moved(layout, step);
+            let after = open.whitening(strengths).map_or(1.0, |one| one.1);
+            changed |= (after / before).ln().abs() > SAME_WEIGHT;
+        }
+        changed
     }
 }
 

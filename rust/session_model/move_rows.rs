@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
@@ -17,12 +17,36 @@ use crate::error::{Error, Result};
 
 /// `L⁻¹` of a move's covariance `L Lᵀ`.
 pub type Whitening = SMatrix<f64, N_MOVE, N_MOVE>;
+/// Five residuals of a move, SI.
+pub type MoveResidual = SVector<f64, N_MOVE>;
+
+/// Degrees of freedom of the tails of moves: a jolt or lost samples leave a hundred times the noise in one of a hundred.
+const DEGREES: f64 = 4.0;
+
+/// Whitening of a move under Student t noise of covariance `covariance` about its `residual`, the weight of that residual
+/// and the logarithm of the weight's prior, which is 0 at 1 (11.18a): the tightest Gaussian bound of the t density.
+pub(super) fn with_tails(
+    covariance: &MoveCovariance,
+    residual: &MoveResidual,
+) -> Option<(Whitening, f64, f64)> {
+    let white = covariance.cholesky()?.l().try_inverse()?;
+    let chi2 = (white * residual).norm_squared();
+    let weight = ((DEGREES + N_MOVE as f64) / (DEGREES + chi2)).min(1.0);
+    Some((white * weight.sqrt(), weight, prior_of(weight)))
+}
+
+/// Logarithm of the prior of a move's weight.
+pub(super) fn prior_of(weight: f64) -> f64 {
+    0.5 * DEGREES * (weight.ln() - weight + 1.0)
+}
 
 /// Whitening of the moves, fixed while the solver runs and renewed between runs: more noise would lower the cost.
 #[derive(Debug, Clone)]
 pub struct Weights {
     /// Whitening of each move.
     pub white: Vec<Whitening>,
+    /// Weight of each move's residuals under heavy tails, at most 1; contained in `white`.
+    pub tail: Vec<f64>,
     /// Plane in which the vertical after each move is compared.
     pub plane: Vec<Matrix3x2<f64>>,
     /// Covariance of each move.
@@ -30,13 +54,24 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Weights from integrated moves.
+    /// Weights from integrated moves, with heavy tails about their residuals.
     ///
     /// # Errors
     /// When the noise of a move cannot be whitened.
     pub fn of(passed: &[Passed], strengths: &Strengths) -> Result<Self> {
         let covariance = passed.iter().map(|one| one.covariance(strengths));
-        Self::whitening(passed, covariance.collect())
+        let residual = passed.iter().map(|one| one.carried.residual);
+        Self::whitening(passed, covariance.collect(), residual)
+    }
+
+    /// Weights of Gaussian noise.
+    ///
+    /// # Errors
+    /// When the noise of a move cannot be whitened.
+    pub fn gaussian(passed: &[Passed], strengths: &Strengths) -> Result<Self> {
+        let covariance = passed.iter().map(|one| one.covariance(strengths));
+        let nothing = passed.iter().map(|_| MoveResidual::zeros());
+        Self::whitening(passed, covariance.collect(), nothing)
     }
 
     /// Weights from integrated moves half way from `before`: the solution under weights that follow it may alternate
@@ -47,24 +82,30 @@ impl Weights {
     pub fn between(before: &Self, passed: &[Passed], strengths: &Strengths) -> Result<Self> {
         let each = passed.iter().zip(&before.covariance);
         let covariance = each.map(|(one, known)| 0.5 * (one.covariance(strengths) + known));
-        Self::whitening(passed, covariance.collect())
+        let residual = passed.iter().map(|one| one.carried.residual);
+        Self::whitening(passed, covariance.collect(), residual)
     }
 
-    fn whitening(passed: &[Passed], covariance: Vec<MoveCovariance>) -> Result<Self> {
-        let white = covariance
+    fn whitening(
+        passed: &[Passed],
+        covariance: Vec<MoveCovariance>,
+        residual: impl Iterator<Item = MoveResidual>,
+    ) -> Result<Self> {
+        let each = covariance
             .iter()
+            .zip(residual)
             .enumerate()
-            .map(|(m, one)| {
-                let half = one.cholesky().and_then(|half| half.l().try_inverse());
-                half.ok_or_else(|| {
+            .map(|(m, (one, residual))| {
+                with_tails(one, &residual).ok_or_else(|| {
                     Error::not_determined(format!(
                         "move {m} has no noise or turns nothing: its residuals cannot be weighed"
                     ))
                 })
-            })
-            .collect::<Result<_>>()?;
+            });
+        let each: Vec<_> = each.collect::<Result<_>>()?;
         Ok(Self {
-            white,
+            white: each.iter().map(|one| one.0).collect(),
+            tail: each.iter().map(|one| one.1).collect(),
             plane: passed.iter().map(|one| one.plane).collect(),
             covariance,
         })
@@ -253,7 +294,7 @@ impl Session {
             kind: Kind::Reading,
             segment: index,
             // Models with different weights of the moves are compared: a smaller weight lowers the normalisation.
-            log_weight: white.diagonal().map(f64::ln).sum(),
+            log_weight: white.diagonal().map(f64::ln).sum() + prior_of(weights.tail[index]),
         }
     }
 

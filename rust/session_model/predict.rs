@@ -47,6 +47,27 @@ impl Fit {
         self.groups.iter().map(|group| group.rows.len()).sum()
     }
 
+    /// Square root of the weight that a group's rows have by heavy tails.
+    #[must_use]
+    pub fn tail_of(&self, group: &Group) -> f64 {
+        if group.is_move() {
+            self.weights.tail[group.segment].sqrt()
+        } else {
+            1.0
+        }
+    }
+
+    /// `(rows)` residuals in units of their noise, of moves without the weights of heavy tails.
+    #[must_use]
+    pub fn residual(&self) -> Vec<f64> {
+        let of_group = |group: &Group| {
+            (&group.rows.residual / self.tail_of(group))
+                .as_slice()
+                .to_vec()
+        };
+        self.groups.iter().flat_map(of_group).collect()
+    }
+
     /// `(rows)` leverage of every row.
     #[must_use]
     pub fn leverage(&self) -> Vec<f64> {

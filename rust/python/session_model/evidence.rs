@@ -68,7 +68,9 @@ pub(super) fn seen<'py>(
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
     let asked = columns_of(of.0, candidates)?;
     let parts = parts.unwrap_or_else(|| {
-        let whole = asked.iter().map(|(_, sizes)| vec![(0..sizes.len()).collect()]);
+        let whole = asked
+            .iter()
+            .map(|(_, sizes)| vec![(0..sizes.len()).collect()]);
         whole.collect()
     });
     let is_there = |((_, sizes), parts): (&(_, Vec<f64>), &Vec<Vec<usize>>)| {
@@ -82,11 +84,14 @@ pub(super) fn seen<'py>(
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     let found = run_long(py, || {
         let gains = CandidateGains::of(&fit, &at)?;
-        let each = asked.par_iter().zip(&parts).map(|((effects, sizes), parts)| {
-            let columns =
-                session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
-            gains.of_candidates(&columns, sizes, &scales, parts)
-        });
+        let each = asked
+            .par_iter()
+            .zip(&parts)
+            .map(|((effects, sizes), parts)| {
+                let columns =
+                    session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
+                gains.of_candidates(&columns, sizes, &scales, parts)
+            });
         each.collect::<Result<Vec<_>>>()
     })?;
     let lent = found.iter().flatten().map(|one| {
@@ -116,7 +121,7 @@ fn each<T: Send + 'static>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'_>,
     hypotheses: &[Candidate<'_>],
-    ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
+    ask: impl Fn(Hypothesis) -> Result<T> + Send + Sync + 'static,
 ) -> PyResult<Vec<T>> {
     let asked = columns_of(of.0, hypotheses)?;
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
@@ -124,7 +129,7 @@ fn each<T: Send + 'static>(
         let each = asked.par_iter().map(|(effects, sizes)| {
             let columns =
                 session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
-            ask(&Hypothesis::of(&fit, &columns, sizes)?)
+            ask(Hypothesis::of(&fit, &columns, sizes)?)
         });
         each.collect::<Result<Vec<_>>>()
     })

@@ -125,16 +125,10 @@ impl SessionFit {
         self.fit.iterations
     }
 
-    /// `(rows,)` whitened residuals.
+    /// `(rows,)` whitened residuals, of moves without the weights of heavy tails.
     #[getter]
     fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let flat: Vec<f64> = self
-            .fit
-            .groups
-            .iter()
-            .flat_map(|group| group.rows.residual.as_slice().to_vec())
-            .collect();
-        flat.to_pyarray(py)
+        self.fit.residual().to_pyarray(py)
     }
 
     /// `(rows, 4)` domain, segment, channel and process of every row.
@@ -158,14 +152,15 @@ impl SessionFit {
         moves(py, &self.fit)
     }
 
-    /// `(moves, 5, 5)` whitening of the moves' residuals.
+    /// `(moves, 5, 5)` whitening of the moves' residuals, without the weights of heavy tails.
     fn whitening<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let flat: Vec<f64> = self
             .fit
             .weights
             .white
             .iter()
-            .flat_map(|white| white.transpose().as_slice().to_vec())
+            .zip(&self.fit.weights.tail)
+            .flat_map(|(white, tail)| (white.transpose() / tail.sqrt()).as_slice().to_vec())
             .collect();
         flat.to_pyarray(py)
             .reshape([self.fit.weights.white.len(), 5, 5])

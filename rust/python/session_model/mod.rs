@@ -235,7 +235,7 @@ impl SessionModel {
         let (weights, passed) = super::run(py, || {
             let planes = session.planes(&start);
             let passed = session.pass(&start, &Distortion::default(), &planes);
-            Ok((Weights::of(&passed, &Strengths::NONE)?, passed))
+            Ok((Weights::gaussian(&passed, &Strengths::NONE)?, passed))
         })?;
         let flat: Vec<f64> = weights
             .white
