@@ -159,13 +159,10 @@ def style() -> Style:
     """
     from trihedron.report.text import WIDTH, Style
 
-    is_known = sys.stdout.isatty() or _is_width_said()
-    width = shutil.get_terminal_size((WIDTH, 24)).columns if is_known else WIDTH
+    is_terminal = sys.stdout.isatty()
+    is_said = os.environ.get("COLUMNS", "").isdigit()
+    width = shutil.get_terminal_size((WIDTH, 24)).columns if is_terminal or is_said else WIDTH
     return Style(width, has_colour(), not speaks_unicode(sys.stdout))
-
-
-def _is_width_said() -> bool:
-    return os.environ.get("COLUMNS", "").isdigit()
 
 
 def has_colour() -> bool:
@@ -201,7 +198,7 @@ def silence(stream: TextIO) -> None:
 def say(sentence: str) -> None:
     """Print on stderr what was done; results go to stdout."""
     text = escaped(sentence)
-    if (sys.stderr.isatty() or _is_width_said()) and len(text) > (columns := shutil.get_terminal_size().columns):
+    if sys.stderr.isatty() and len(text) > (columns := shutil.get_terminal_size().columns):
         from trihedron.report.text import wrapped
 
         text = "\n".join(wrapped(text, columns))
