@@ -171,7 +171,7 @@ def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
         "reread": action,
     }
     said = fleet_report(summarise([*rows, misread], tmp_path).summary).next_step
-    assert said.startswith("Give each device of logs a folder of its own. For x.csv: read it with --gyro-unit rad/s.")
+    assert said.startswith("Give each device of logs a folder of its own. For x.csv, by `trihedron calibrate`: read it")
     assert "--serial '([^/]+)$' -o NEW_FOLDER" in fleet_report(summarise(rows[:4], tmp_path).summary).next_step
     # One factor for all axes is another unit of measurement or clock, in a fleet as for many recordings.
     common = one + np.repeat([0.0, 0.05, 0.0], [12, 3, 6])

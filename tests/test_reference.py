@@ -12,7 +12,7 @@ from trihedron.api.beside import shared_log
 from trihedron.cli import _a_reference_each
 from trihedron.estimate.reference.fit import fit_reference
 from trihedron.files.diagnosis import diagnosis_document
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Severity
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 from trihedron.simulate import hand_session, scenario_by_name
 
@@ -235,6 +235,23 @@ def test_a_clock_that_jumps_for_some_seconds_leaves_a_deviating_interval_and_the
     noise = trihedron.filter_noise(trial.log, reference=motion, gravity_m_s2=G)
     assert apart.code in {finding.code for finding in noise.findings}
     assert np.abs(z_of(found, trial)).max() < 4.5
+
+
+def test_a_reference_that_slips_on_the_body_is_told_from_a_wobble_with_its_time_and_angle():
+    trial = tracked(3, 60, 0.01, has_path=True)
+    time = trial.motion.time_s
+    axis = np.array([0.6, 0.0, -0.8])
+
+    def turned_by(degrees):
+        by = rotation_from_vector(np.radians(degrees)[:, None] * axis)
+        return fit_reference(trial.log, replace(trial.motion, attitude=trial.motion.attitude @ by), G).findings
+
+    assert all(one.code is not FindingCode.REFERENCE_APART for one in turned_by(np.sin(time / 4.0)))
+    findings = turned_by(np.where(time > 30.0, 2.0, 0.0))
+    (apart,) = (one for one in findings if one.code is FindingCode.REFERENCE_APART)
+    assert apart.severity is Severity.SERIOUS
+    assert apart.numbers["at_s"] == pytest.approx(30.0 - trial.lead_s, abs=1.5)
+    assert abs(apart.numbers["angle_rad"] - np.radians(2.0)) < 4.5 * apart.numbers["sigma_rad"]
 
 
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():

@@ -197,7 +197,7 @@ def of_board(calibration: Calibration, recording: Recording) -> Calibration:
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
     """Findings about the fit, its poses, a gyro scale that contradicts its unit, and lost samples."""
     gyro = calibration.gyroscope
-    fitted = tuple(_of_gap(one, recording, segments) for one in with_shapes(calibration, segments))
+    fitted = tuple(_timed(one, recording, segments) for one in with_shapes(calibration, segments))
     if gyro is None:
         return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
@@ -206,17 +206,19 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     return (*unless_seen(fitted, missing), *of_gyro, *missing)
 
 
-def _of_gap(found: Finding, recording: Recording, segments: Segments) -> Finding:
-    """An outlier move whose samples were lost says so."""
+def _timed(found: Finding, recording: Recording, segments: Segments) -> Finding:
+    """An outlier move with its time; one whose samples were lost says so."""
     if found.code is not FindingCode.OUTLIER_MOVE:
         return found
-    k, size = int(found.numbers["move"]) - 1, found.numbers["residual_deg"]
-    move = segments.moves[k]
+    move = segments.moves[int(found.numbers["move"]) - 1]
     steps = np.diff(recording.time_s[move.start : move.stop + 1])
-    if not (len(steps) and float(steps.max()) > GAP_STEPS / recording.rate_hz):
-        return found
-    before, after = move.pose_before + 1, move.pose_after + 1
-    return Finding.of(FindingCode.OUTLIER_MOVE, "gap", move=k + 1, before=before, after=after, residual_deg=size)
+    return Finding.of(
+        FindingCode.OUTLIER_MOVE,
+        "gap" if steps.max(initial=0.0) > GAP_STEPS / recording.rate_hz else "timed",
+        move=int(found.numbers["move"]), before=move.pose_before + 1, after=move.pose_after + 1,
+        start_s=float(recording.time_s[move.start]),
+        residual_deg=found.numbers["residual_deg"], times=found.numbers["times"],
+    )  # fmt: skip
 
 
 def _as_they_weigh(segments: Segments) -> Found:

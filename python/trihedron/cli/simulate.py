@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -128,11 +128,11 @@ def simulate(
         of_unit = read_calibration(calibration)
         recording, known = twin(repeated, of_unit, seed)
         beside = as_arguments(repeated.source)
-        findings = (*apply(of_unit, repeated).findings, *segment(repeated).findings)
         note_file(calibration)
-        for finding in findings:
-            if finding.severity is Severity.WARNING:
-                say(with_commands(str(finding)))
+        findings = (*apply(of_unit, repeated).findings, *segment(repeated).findings)
+        findings = tuple(replace(one, action=with_commands(one.action)) for one in findings)
+        for finding in (one for one in findings if one.severity is Severity.WARNING):
+            say(str(finding))
         note_file(output)
     else:
         recording, known = run(str(scenario), seed)

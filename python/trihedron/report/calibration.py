@@ -141,13 +141,16 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 
 
 def errors_in_words(calibration: Calibration) -> str:
-    """Cross-validated errors, and how many times the noise they are; empty without any."""
+    """Cross-validated errors, and how many times the noise they are, and what is not tested; empty without any."""
+    errors = [one for one in errors_of(calibration) if one[1] < 1.0 / TINY]
     said = [
         f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
-        for line, times, is_held in errors_of(calibration)
-        if is_held and times < 1.0 / TINY
+        for line, times, is_held in errors
+        if is_held
     ]
-    return f"{listed(said)}, {HELD_OUT}" if said else ""
+    open_ones = [line.what for line, _, is_held in errors if not is_held]
+    untested = f"; untested: {listed(open_ones)}" if open_ones else ""
+    return f"{listed(said)}, {HELD_OUT}{untested}" if said else ""
 
 
 def verdict(calibration: Calibration, errors_beside: str = "") -> str:

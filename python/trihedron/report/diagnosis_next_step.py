@@ -3,8 +3,10 @@
 from pathlib import PurePath
 from shlex import quote
 
+import numpy as np
+
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
@@ -12,13 +14,15 @@ from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, fin
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
-from trihedron.report.numbers import capital, listed
+from trihedron.report.numbers import capital, duration, listed
 from trihedron.report.verification import imprecise
 
 FOUND = ("missing-physics", "unexplained")
 """Verdicts with something to do about the readings."""
 FAR = 2.0
 """Error over noise from which a remedy comes before the use of a calibration."""
+LAST = 0.1
+"""Share of a log, at its end, whose mean is the end of a drift; share of its range that is left of one that ended."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
 
@@ -71,7 +75,9 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         surplus = named_effects(diagnosis, "model")
         said += f", without {listed(surplus)}" if surplus else ""
         by = STORED if is_file and missing else _taken_by(model)
-        steps.append(f"{of_another_device(diagnosis, model)}Take over {said}: {by}.")
+        other = of_another_device(diagnosis, model)
+        # A log made with a calibration of another sensor is made again with the right one.
+        steps.append(other.rstrip() if other and not is_file else f"{other}Take over {said}: {by}.")
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
@@ -79,7 +85,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     first = "" if misread is None else f"{action_in_words(misread)} "
     if is_static and not is_file:
         remedy = _in_the_next_log(diagnosis)
-        return " ".join(filter(None, (f"{first}{record} {noise}", remedy)))
+        return " ".join(filter(None, (f"{first}{remedy}", noise, record)))
     # The fit corrects axes, whose finding has an action of its own.
     of_session = [one for one in of_session if one not in IN_FULL]
     use = f"Keep using {model}: its parameters agree with this log." if is_file else use
@@ -118,8 +124,21 @@ def _in_the_next_log(diagnosis: Diagnosis) -> str:
     own = [one for one in diagnosis.effects if not one.model.get("applies_to_other_recordings")]
     own = [one for one in own if one.id not in IN_FULL]
     shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
-    advice = ((one.id, experiment(one.id)) for one in shown)
-    return next((f"Against {id_in_print(name)}: {said}." for name, said in advice if said), "")
+    advice = ((one, experiment(one.id)) for one in shown)
+    return next((f"Against {id_in_print(one.id)}{_ended(one)}: {said}." for one, said in advice if said), "")
+
+
+def _ended(effect: AcceptedEffect) -> str:
+    """When a bias drift ended that did; empty where the log ends before."""
+    curve = effect.model.get("curve")
+    if curve is None:
+        return ""
+    time_s, value = np.asarray(curve["time_s"]), np.asarray(curve["value"])
+    end = value[:, time_s > time_s[-1] - LAST * (time_s[-1] - time_s[0])].mean(axis=1, keepdims=True)
+    is_moving = (np.abs(value - end) > LAST * np.ptp(value, axis=1, keepdims=True)).any(axis=0)
+    last_s = float(time_s[is_moving].max(initial=0.0))
+    is_over = last_s < 0.5 * (time_s[0] + time_s[-1])
+    return f", nine tenths of which were over after {duration(last_s)}" if is_over else ""
 
 
 def _disagrees(diagnosis: Diagnosis) -> bool:

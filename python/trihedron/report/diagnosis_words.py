@@ -1,7 +1,7 @@
 """A diagnosis in words: the verdict, where it disagrees, and residuals in customary units."""
 
 from trihedron.records import Calibration, Finding, FindingCode, Severity
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
 from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
@@ -67,7 +67,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     ends = {MEANING[d.domain]: follows(diagnosis, d) for d in diagnosis.remaining if d.disagrees}
     left = [name for name, followed in ends.items() if not followed]
     numbers = differing_in_short(diagnosis)
-    missing = [name for name in named_effects(diagnosis, "recording") if name not in map(id_in_print, STATED)]
+    missing = [*dict.fromkeys(_sized(e) for e in diagnosis.effects if e.side == "recording" and e.id not in STATED)]
     if diagnosis.verdict == "consistent":
         beside = " with a reference that is not independent of this gyro" if dependent(diagnosis) else ""
         but = "".join(f"; but {_clause(opening(one.seen))}" for one in imprecise(findings_of(diagnosis))[:1])
@@ -90,6 +90,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
     tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
+    is_other = any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
     said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in STATED]
     if missing:
         said.append(f"the model lacks {listed(missing)}")
@@ -97,9 +98,21 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
         # What the package fixes differs before all else: a calibration of another device has any effect missing.
-        of_package = any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
-        said.insert(0 if of_package else len(said), f"parameters differ ({listed(numbers)})")
-    return f"MISSING PHYSICS: {'; '.join(said)}{tail}."
+        said = [listed(numbers), *said] if is_other else [*said, f"parameters differ ({listed(numbers)})"]
+    return f"{'PARAMETERS DIFFER' if is_other else 'MISSING PHYSICS'}: {'; '.join(said)}{tail}."
+
+
+def _sized(effect: AcceptedEffect) -> str:
+    """An effect by name with its largest parameter."""
+    name = id_in_print(effect.id)
+    alike = [p.value for p in effect.parameters if p.unit == effect.parameters[0].unit]
+    if not alike:
+        return name
+    largest = alike[0] if len(alike) == 1 else max(map(abs, alike))
+    scale, unit = parameter_unit(effect.parameters[0].unit, abs(largest))
+    if unit.startswith("10"):
+        scale, unit = parameter_unit(effect.parameters[0].unit, 1.0)
+    return f"{name} ({'up to ' if len(alike) > 1 else ''}{with_unit(plain_number(scale * largest), unit)})"
 
 
 def _unexplained(diagnosis: Diagnosis, off: list[str], named: list[str]) -> str:

@@ -31,7 +31,7 @@ def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[s
     steps += [f"if {first_of(moved)} contains several units, give each a folder{by_file}"] if moved else []
     for action in dict.fromkeys(log.reread for log in unusable if log.reread):
         names = first_of([_called(log, summary) for log in unusable if log.reread == action])
-        steps += [f"for {names}: {action[:1].lower()}{action[1:].rstrip('.')}"]
+        steps += [f"for {names}, by `trihedron calibrate`: {action[:1].lower()}{action[1:].rstrip('.')}"]
     steps += [f"give --rate for {first_of(rates)}"] if rates else []
     steps += [f"record again, if it was to be a calibration: {first_of(again)}"] if again else []
     odd = [f"{one} ({files_of(one, summary)})" for one in outliers]

@@ -36,6 +36,7 @@ _INNOVATIONS = """Normalised innovations squared (NIS), innovation² / predicted
 their running mean, and where 99 % of such means lie when the noise model is right."""
 _AS_PREDICTED = "the innovations are as large and as white as the noise model predicts"
 _SMALLER = "the innovations are smaller than the noise model predicts, the uncertainties too wide"
+_IN_SAMPLE = ", in sample without redundancy: no test of the fit"
 _CORRECTED = "Corrected minus reference specific force of every pose."
 
 
@@ -65,7 +66,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         headlines=(*consistency, *scale_headlines(calibration)),
-        lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)),
+        lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)) if is_tested else None,
         next_step=_next_step(calibration),
     )
 
@@ -87,14 +88,17 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
     """Normalised innovations, and the residual of the poses."""
     seen = _consistencies(outcome)
     name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))) if one[1].n else np.inf)
-    beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of cases): "
-    beside += _meaning(worst)
+    beside = f"0 of {n} poses judged: the fit has no redundancy"
+    if worst.n:
+        beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of "
+        beside += f"cases): {_meaning(worst)}"
     of = "" if len(seen) == 1 else f", {name.upper()}"
     rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
+    told = f"rms over {how_many(n, 'pose')}, {BY_FILTER}{'' if worst.n else _IN_SAMPLE}"
     return [
         Headline(f"innovation² / predicted variance (NIS){of}", plain_number(worst.nis_mean), "", beside),
-        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, {BY_FILTER}"),
+        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", told),
     ]
 
 
@@ -107,8 +111,6 @@ def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[t
 
 def _meaning(seen: Consistency) -> str:
     """The mean NIS in words: whether the filter's noise is too large or too small."""
-    if not seen.n:
-        return "nothing is tested"
     if seen.nis_mean < seen.nis_low:
         return "the noise given is too large, the uncertainties too wide"
     if seen.nis_mean > seen.nis_high:
@@ -152,7 +154,10 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         ("poses", f"{len(outcome.residual_m_s2)} in unknown attitudes"),
         ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
         ("frame", FRAMES[calibration.frame]),
-        ("gravity error in static poses", _residual_words(outcome.residual_m_s2)),
+        (
+            "gravity error in static poses",
+            _residual_words(outcome.residual_m_s2) + ("" if outcome.consistency.n else _IN_SAMPLE),
+        ),
     )
     convergence = "S and b after every pose, with the 3 σ band around their last values."
     residual = "Gravity error in every static pose: length of the corrected reading minus |g|."

@@ -65,7 +65,7 @@ IN_FULL = (
     *("scale-not-nominal", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""
-PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+)\b", re.IGNORECASE)
+PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+(?: at [\d.]+ s)?)\b", re.IGNORECASE)
 """A sentence about one pose or move begins with its number."""
 SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)
 
@@ -95,7 +95,7 @@ def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str], 
         return sentences[0]
     name = finding_in_print(code)
     named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
-    if named and not SENSOR.search(name):
+    if named and not any(one in name for one in named):
         return f"{name} ({listed(sorted(named))})"
     places = [found for one in seen for found in PLACE.findall(one)]
     if places and name.endswith((" pose", " move")):

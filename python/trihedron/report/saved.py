@@ -69,8 +69,9 @@ def report_of(saved: Any) -> Document:
     """
     held = saved.get(KEY) if isinstance(saved, Mapping) else None
     if not isinstance(held, Mapping) or held.get("version") != VERSION:
-        said = "no report is saved in it: apply and convert make none, another result is written again with --json FILE"
-        raise NotAReportError(f"{said} or --report FILE.json.")
+        if isinstance(saved, Mapping) and "scenario" in saved:
+            raise NotAReportError("it is the truth of a simulation; `trihedron simulate` writes its page by --report.")
+        raise NotAReportError("it has no report: give a file written by --json FILE or --report FILE.json.")
     try:
         return _converter().structure(held.get("document"), Document)
     except (TypeError, ValueError, KeyError, RecursionError) as error:

@@ -38,12 +38,12 @@ def simulation_report(
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
         ("motion", f"{poses}, {moves}"),
     )
-    what = f"{poses} and {moves} of an instrument with {effects}. The truth below is not in the log."
+    what = f"{poses} and {moves} of an instrument with {effects}"
     caption = "The simulated log; shaded where the body was truly static."
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=verdict_of(findings, what, what.rstrip("."), "NOT TO BE TRUSTED"),
+        verdict=verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED"),
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
@@ -63,7 +63,8 @@ def simulation_report(
 def _next_step(truth: Truth, repeated: str) -> str:
     """What the log is for."""
     if repeated:
-        return f"Compare the recording with its digital twin: `trihedron diagnose {repeated} --against LOG`."
+        place = f"--gravity {truth.gravity_m_s2:.7g}"
+        return f"Compare the recording with its digital twin: `trihedron diagnose {repeated} --against LOG {place}`."
     if len(truth.poses) == len(truth.segments):
         return "Identify the noise of the log: `trihedron allan LOG`; compare with the truth (--truth FILE keeps it)."
     asked = f"`trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} -o calibration.json`"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
-from trihedron.report.findings import beyond_headline, likely
+from trihedron.report.findings import STATED, beyond_headline, likely
 from trihedron.report.numbers import BEFORE_UNIT
 from trihedron.sanitise import escaped, one_line
 
@@ -90,7 +90,8 @@ def _block(block: Block, document: Document, style: Style) -> list[str]:
         return _table(block, style)
     if isinstance(block, FindingList):
         said = [beyond_headline(finding, document) for finding in block.findings]
-        return [line for finding in said for line in _finding_lines(finding, style)]
+        new = [finding for finding in said if finding.seen != STATED or finding.cause or finding.action]
+        return [line for finding in new or said for line in _finding_lines(finding, style)]
     return []
 
 

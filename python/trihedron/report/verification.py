@@ -13,7 +13,7 @@ from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, likely, verdict_of
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
@@ -81,7 +81,8 @@ def verified_in_words(v: Verification) -> str:
     verified = f"{word}: errors are within noise and uncertainty"
     usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
     others = [one for one in v.findings if one not in beyond or one.severity is Severity.SERIOUS]
-    return verdict_of(others, f"{usable}.", usable, "NOT VERIFIED")
+    said = verdict_of(others, f"{usable}.", usable, "NOT VERIFIED")
+    return f"{said} {likely(beyond[0].cause)}" if above and said.startswith(usable) else said
 
 
 def _is_untested(v: Verification) -> bool:

@@ -21,6 +21,7 @@ from trihedron.estimate.reference.mismatch import (
     share_left,
 )
 from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
+from trihedron.estimate.reference.slip import slip_of
 from trihedron.estimate.reference.smoothed import (
     bias_over_time,
     error_carried,
@@ -182,7 +183,8 @@ def _answer(
         residual_rate=one.gyro.solution.residual,
         apart=error_over_time(found, k),
     )
-    return replace(result, findings=(*motion.findings, *remarks(result, one.is_turned)))
+    slip = slip_of(found, k, result.error)
+    return replace(result, findings=(*motion.findings, *remarks(result, one.is_turned, slip)))
 
 
 def laid_beside(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Beside:

@@ -8,6 +8,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.likelihood import STRENGTHS
 from trihedron.estimate.reference.motion import MotionFit
+from trihedron.estimate.reference.slip import Slip
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import chdtri
 from trihedron.ranges import edges_of
@@ -130,8 +131,8 @@ COLOURED = 3.0
 LEFT_OUT = 0.05
 
 
-def remarks(result: AgainstReference, is_turned: bool) -> Iterator[Finding]:
-    """Findings of a fit: independence of the reference, direction of up, outliers, deviating intervals, misfit."""
+def remarks(result: AgainstReference, is_turned: bool, slip: Slip | None) -> Iterator[Finding]:
+    """Findings of a fit: independence of the reference, direction of up, outliers, slip or deviations, misfit."""
     error = result.error
     if is_turned:
         yield Finding.of(FindingCode.REFERENCE_TURNED_ROUND)
@@ -145,18 +146,22 @@ def remarks(result: AgainstReference, is_turned: bool) -> Iterator[Finding]:
             is_square="mounted-without-error" in seen,
             angle_rad=seen.get("mounted-without-error", float("nan")),
         )
-    yield from of_error(error)
+    yield from of_error(error, slip)
     force = result.accelerometer
     if force is not None and force.widened > COLOURED:
         yield Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened)
 
 
-def of_error(error: ReferenceError) -> Iterator[Finding]:
-    """Findings of the reference alone: outliers and deviating intervals."""
+def of_error(error: ReferenceError, slip: Slip | None = None) -> Iterator[Finding]:
+    """Findings of the reference alone: outliers, and a slip or deviating intervals."""
     if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
         rows = error.rows + error.rows_left_out
         yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
-    if apart := error.apart_s:
+    if slip is not None:
+        yield Finding.of(
+            FindingCode.REFERENCE_APART, "slipped", at_s=slip.at_s, angle_rad=slip.angle_rad, sigma_rad=slip.sigma_rad
+        )
+    elif apart := error.apart_s:
         yield Finding.of(FindingCode.REFERENCE_APART, start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))
 
 

@@ -40,7 +40,7 @@ def drifts(sensor: str, unit: str, walk: str, static: str = "") -> Mapping[str, 
     whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
     sizes = f"{{range:all .2g {unit}}}"
     cases = {"static": sizes, "static-counts": "{range:all .3g} counts"}
-    return {"walk": whole.format(how=walk, sizes=sizes)} | {
+    return {"walk": f"The {sensor} bias drifts {walk}; no logged channel explains it.{static}"} | {
         case: whole.format(how="smoothly", sizes=own) + static for case, own in cases.items()
     }
 

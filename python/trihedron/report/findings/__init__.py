@@ -10,10 +10,12 @@ from trihedron.report.findings.wording import opening
 from trihedron.report.names import IN_FULL, warnings_in_print
 from trihedron.report.numbers import MINUS, capital, listed
 
+STATED = "Stated above."
+"""A finding whose sentence is in the verdict."""
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 # A number that is a value; a number in a name (pose 3) is recognised by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+−-]?\d+)?")
-_NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
+_NAMED = re.compile(r"^(Move|Pose|Turn) (\d+(?: at [\d.]+ s)?)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
 
@@ -66,7 +68,7 @@ def likely(cause: str) -> str:
     return f"Likely: {cause[:1].lower()}{cause[1:]}" if cause else ""
 
 
-def beyond_headline(finding: Finding, document: Document, above: str = "Stated above. ") -> Finding:
+def beyond_headline(finding: Finding, document: Document, above: str = f"{STATED} ") -> Finding:
     """What verdict and next action of the document have not stated of a finding; unchanged where they do not."""
     if finding is not document.foremost:
         return finding

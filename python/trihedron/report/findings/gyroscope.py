@@ -107,22 +107,26 @@ _MOVES = {
         "order, read it with --columns {mapping}|}; the calibration itself corrects the gyro's.",
         lines={"directions": "{v0:?−|}{v1:axis}"},
     ),
-    (Code.OUTLIER_MOVE, "", WARNING): Words(
-        "move {move} (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, {times:.0f} "
-        "times its noise, and is excluded.",
-        "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
-        "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
-    ),
+    **{
+        (Code.OUTLIER_MOVE, case, WARNING): Words(
+            f"move {{move}}{at} (pose {{before}} to pose {{after}}) has a tilt error of {{residual_deg:.2g}}°, "
+            "{times:.0f} times its noise, and is excluded.",
+            "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
+            "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
+        )
+        for case, at in (("", ""), ("timed", " at {start_s:.1f} s"))
+    },
     (Code.OUTLIER_MOVE, "gap", WARNING): Words(
-        "move {move} (pose {before} to pose {after}) has lost samples and is excluded: its tilt error is "
-        "{residual_deg:.2g}°.",
+        "move {move} at {start_s:.1f} s (pose {before} to pose {after}) has lost samples and is excluded: its tilt "
+        "error is {residual_deg:.2g}°.",
         "the logger lost samples while the sensor moved.",
         "Repeat the moves with lost samples, at a rate that the link sustains.",
+        numbers=("times",),
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
-        "{force_axis:axis}); with it, {scatter_left:.0f %} of the bias changes between poses remain. The moves were "
-        "fitted without it; S and b alone cannot correct it.",
+        "{force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. The "
+        "moves were fitted without it; S and b alone cannot correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
         "See whether it is that or a bias that differs from pose to pose: `trihedron diagnose LOG`; g-sensitivity is "
         "fitted with --extended.",

@@ -18,9 +18,10 @@ ENTRIES = {
         "Split the log there, and calibrate the parts one by one.",
     ),
     (Code.AXES_CHANGED, "leap", SERIOUS): Words(
-        "Gravity leaps from one sample to the next while the gyro reads no rotation (first: {where}; {count} in all).",
-        "The axes of both sensors were turned there, or rows were cut out without a gap in time.",
-        "Split the log there, and calibrate the parts one by one.",
+        "Gravity leaps from one sample to the next without as much rotation of the gyro (first: {where}; {count} in "
+        "all).",
+        "Rows were lost there without a gap in time, or the axes of both sensors were turned.",
+        "Record again; or split the log there, and calibrate each part that has poses enough.",
         numbers=("sample",),
     ),
     (Code.NON_FINITE, "readings", WARNING): Words(

@@ -1,6 +1,6 @@
 """Findings about the comparison of a log with known motion, or with another log."""
 
-from trihedron.report.findings.entry import NOTE, WARNING, Code, Words
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 ENTRIES = {
     (Code.REFERENCE_TURNED_ROUND, "", WARNING): Words(
@@ -17,8 +17,16 @@ ENTRIES = {
     ),
     (Code.REFERENCE_APART, "", WARNING): Words(
         "The reference deviates from the remaining log in {n:# interval} from {start_s:.0f} to {end_s:.0f} s.",
-        "A tracker that lost its markers or was re-initialised, or an interval that was computed otherwise.",
+        "A tracker that lost its markers or was re-initialised, or a reference that turned on the body.",
         "Look at the reference's own quality flags from {start_s:.0f} to {end_s:.0f} s, or leave that part out.",
+    ),
+    (Code.REFERENCE_APART, "slipped", SERIOUS): Words(
+        "The reference turned on the body by {angle_rad:.2g deg} at {at_s:.0f} s: before and after, its mounting is "
+        "constant but not the same.",
+        "It slipped, or its tracked body was defined anew.",
+        "Cut the reference's file there, and give `calibrate` the log twice with `--reference BEFORE --reference "
+        "AFTER`: each part has its mounting then.",
+        numbers=("sigma_rad",),
     ),
     (Code.REFERENCE_MISFIT, "", WARNING): Words(
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "

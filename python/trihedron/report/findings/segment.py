@@ -76,8 +76,8 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     (Code.FEW_POSES, "untested", WARNING): Words(
-        "{poses} poses determine as many parameters and leave none to test the fit.",
+        "{poses} poses determine as many parameters of the accelerometer and leave none to test them.",
         "",
-        "Record 3 more poses or more, in other directions.",
+        "If the fit is to be tested, record 18 poses or more in different orientations (`trihedron plan`).",
     ),
 }
