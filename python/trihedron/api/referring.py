@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_calibration
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.errors import InputError
@@ -112,12 +114,23 @@ def calibration_by(
     if found.accelerometer is not None:
         # An error of the reference's body frame rotates both sensors alike.
         of_force, of_rate = (turns_of_frame(one.S, one.b) for one in (accelerometer, gyroscope))
-        covariance[:12, 12:] = of_force @ found.frame_covariance @ of_rate.T
+        sides = (accelerometer.covariance, of_force), (gyroscope.covariance, of_rate)
+        covariance[:12, 12:] = of_force @ _contained(found.frame_covariance, sides) @ of_rate.T
         covariance[12:, :12] = covariance[:12, 12:].T
     calibration = Calibration(
         accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
     )
     return calibration if wanted == "case" else _without_rounding(in_frame(calibration, wanted))
+
+
+def _contained(frame: FloatArray, sides: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Covariance (3, 3) of a rotation of both sensors, no larger than either's own covariance (12, 12) contains along
+    its change (12, 3) by the rotation: ``T F Tᵀ ≤ C`` where ``F ≤ (Tᵀ C⁻¹ T)⁻¹``, so that all of both is positive."""
+    for own, turns in sides:
+        half = np.linalg.cholesky(np.linalg.inv(turns.T @ np.linalg.pinv(own, hermitian=True) @ turns))
+        values, vectors = np.linalg.eigh(np.linalg.solve(half, np.linalg.solve(half, frame).T))
+        frame = half @ (vectors * np.clip(values, 0.0, 1.0)) @ vectors.T @ half.T
+    return frame
 
 
 def _without_rounding(calibration: Calibration) -> Calibration:
