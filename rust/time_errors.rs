@@ -1,18 +1,22 @@
 //! Sampling instants that scatter about their timestamps, seen by two sensors at once (docs/diagnosis-method.md, 8.3).
 
+use nalgebra::{Matrix4, Vector4};
+
 use crate::chi_square::MEDIAN_SQUARE;
 use crate::order_statistics::median;
 
-/// Weights of the quintic through the six samples around one, at that one: by distance.
-const NEIGHBOURS: [f64; 3] = [0.75, -0.3, 0.05];
-/// Samples on either side whose cubic gives the slope, so that vibration is not taken for motion.
+/// Samples on either side through which the quintic goes, and those beyond whose cubic gives the slope: apart, so that an
+/// outlier among them is not both a slope and a departure from it, in both sensors at once.
+const NEAR: usize = 3;
 const HALF: usize = 6;
+/// Intervals of the window by which it may be longer: one more is a lost sample.
+const LONGER: f64 = 0.5;
 /// Largest noise, in sample intervals; fewest samples: four blocks of twelve give the error.
 const SHARP: f64 = 0.5;
 const FEWEST: usize = 50;
 const OF_A_BLOCK: usize = 12;
-/// Robust standard deviations at which a time error is clipped, so that single losses do not dominate.
-const CLIPPED: f64 = 5.0;
+/// Robust standard deviations beyond which a departure is no jitter: an outlier or a single loss.
+const FARTHEST: f64 = 5.0;
 /// Noise, in sample intervals, below which a sample has no more weight.
 const LEAST_NOISE: f64 = 0.05;
 
@@ -22,7 +26,8 @@ type Readings<'a> = &'a [[f64; 3]];
 /// Variance of the sampling instants about their timestamps [s²], its standard error, and the number of samples; the
 /// error is infinite where too few tell.
 ///
-/// A sample's departure from the quintic through its six neighbours, over the local slope, is a time. Each sensor is
+/// A sample's departure from the quintic through its six neighbours at their timestamps, over the local slope, is a time.
+/// Windows with a gap in the timestamps tell little: across it the quintic is not the motion. Each sensor is
 /// evaluated by itself: noise, curvature and vibration differ, only an error of time is common to both. The curvature of
 /// the motion is common to both too, hence the high order: a step's departure from its neighbours was taken for jitter in
 /// quick motion at 10 to 50 Hz.
@@ -40,8 +45,13 @@ pub fn common_variance(
             .map(|pair| pair[1] - pair[0])
             .collect();
         let own = median(&mut steps);
-        let whole = (a + HALF..b - HALF).filter(|&k| !is_clipped[k]);
-        seen.extend(whole.map(|k| sensors.map(|readings| displaced(readings, k, own))));
+        let longest = (2.0 * HALF as f64 + LONGER) * own;
+        let whole = (a + HALF..b - HALF)
+            .filter(|&k| !is_clipped[k] && time[k + HALF] - time[k - HALF] < longest);
+        seen.extend(whole.filter_map(|k| {
+            let window = Window::around(time, k, own)?;
+            Some(sensors.map(|readings| window.displaced(readings, k)))
+        }));
     }
     seen.retain(|both| both.iter().all(|(_, sigma)| *sigma < SHARP * step));
     let n = seen.len();
@@ -50,12 +60,13 @@ pub fn common_variance(
     }
     let bound: [f64; 2] = std::array::from_fn(|s| {
         let mut squares: Vec<f64> = seen.iter().map(|both| both[s].0 * both[s].0).collect();
-        CLIPPED * (median(&mut squares) / MEDIAN_SQUARE).sqrt()
+        FARTHEST * (median(&mut squares) / MEDIAN_SQUARE).sqrt()
     });
+    seen.retain(|both| (0..2).all(|s| both[s].0.abs() <= bound[s]));
+    let n = seen.len();
     let weighted = |both: &[(f64, f64); 2]| {
-        let times: [f64; 2] = std::array::from_fn(|s| both[s].0.clamp(-bound[s], bound[s]));
         let weight = 1.0 / (both[0].1 * both[1].1 + (LEAST_NOISE * step).powi(2));
-        (weight * times[0] * times[1], weight)
+        (weight * both[0].0 * both[1].0, weight)
     };
     let each: Vec<(f64, f64)> = seen.iter().map(weighted).collect();
     let sum = |part: &[(f64, f64)]| {
@@ -73,32 +84,60 @@ pub fn common_variance(
     let spread = (0..blocks).map(of_block).sum::<f64>().sqrt() / weights;
     // Readings that never change tell nothing.
     let spread = if spread > 0.0 { spread } else { f64::INFINITY };
-    (value / error_factor(), spread / error_factor(), n)
+    (value, spread, n)
 }
 
-/// Variance of a sample's departure from the quintic over the variance of the samples.
-fn error_factor() -> f64 {
-    1.0 + 2.0 * NEIGHBOURS.iter().map(|weight| weight * weight).sum::<f64>()
+/// Weights by which the samples around one give what it should read, and the slope there.
+struct Window {
+    value: [f64; 2 * NEAR],
+    slope: [f64; 2 * (HALF - NEAR)],
 }
 
-/// Time by which a sensor sees a sample displaced, and its noise.
-fn displaced(readings: Readings<'_>, k: usize, step: f64) -> (f64, f64) {
-    let power = |n: i32| 2.0 * (1..=HALF).map(|o| (o as f64).powi(n)).sum::<f64>();
-    let (second, fourth, sixth) = (power(2), power(4), power(6));
-    let (mut squares, mut along) = (0.0, 0.0);
-    for axis in 0..3 {
-        let at = |o: usize| (readings[k - o][axis], readings[k + o][axis]);
-        let slope: f64 = (1..=HALF)
-            .map(|o| {
-                let x = o as f64;
-                let weight = (sixth * x - fourth * x.powi(3)) / (second * sixth - fourth * fourth);
-                weight * (at(o).1 - at(o).0) / step
-            })
-            .sum();
-        let around = (1..=3).map(|o| NEIGHBOURS[o - 1] * (at(o).0 + at(o).1));
-        squares += slope * slope;
-        along += slope * (readings[k][axis] - around.sum::<f64>());
+impl Window {
+    /// The window of sample `k`; none where timestamps coincide.
+    fn around(time: &[f64], k: usize, step: f64) -> Option<Self> {
+        let at = |place: usize| (time[place] - time[k]) / step;
+        let near = nearest(k).map(at);
+        let value = std::array::from_fn(|i| {
+            let others = (0..near.len()).filter(|&j| j != i);
+            others.map(|j| near[j] / (near[j] - near[i])).product()
+        });
+        let powers = beyond(k).map(|place| {
+            let x = at(place);
+            Vector4::new(1.0, x, x * x, x.powi(3))
+        });
+        let normal: Matrix4<f64> = powers.iter().map(|row| row * row.transpose()).sum();
+        let of_slope = normal.cholesky()?.solve(&Vector4::y());
+        let slope = powers.map(|row| row.dot(&of_slope) / step);
+        Some(Self { value, slope })
     }
-    let squares = squares.max(error_factor() * 1e-30);
-    (along / squares, (error_factor() / squares).sqrt())
+
+    /// Time by which a sensor sees sample `k` displaced, and its noise.
+    fn displaced(&self, readings: Readings<'_>, k: usize) -> (f64, f64) {
+        let along = |places: &[usize], weights: &[f64], axis: usize| -> f64 {
+            let each = places.iter().zip(weights);
+            each.map(|(&place, weight)| weight * readings[place][axis])
+                .sum()
+        };
+        let (mut squares, mut product) = (0.0, 0.0);
+        for axis in 0..3 {
+            let slope = along(&beyond(k), &self.slope, axis);
+            squares += slope * slope;
+            product += slope * (readings[k][axis] - along(&nearest(k), &self.value, axis));
+        }
+        // Variance of the departure over that of a sample.
+        let factor = 1.0 + self.value.iter().map(|weight| weight * weight).sum::<f64>();
+        let squares = squares.max(factor * 1e-30);
+        (product / squares / factor.sqrt(), (factor / squares).sqrt())
+    }
+}
+
+/// The samples around `k` without it.
+fn nearest(k: usize) -> [usize; 2 * NEAR] {
+    std::array::from_fn(|i| k + i + usize::from(i >= NEAR) - NEAR)
+}
+
+/// Those beyond them.
+fn beyond(k: usize) -> [usize; 2 * (HALF - NEAR)] {
+    std::array::from_fn(|i| k + i + if i < HALF - NEAR { 0 } else { 2 * NEAR + 1 } - HALF)
 }

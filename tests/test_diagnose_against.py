@@ -216,6 +216,13 @@ def test_gravity_is_that_of_the_scenario_unless_given():
     assert found.gravity_source == "that of the scenario"
     assert not [p for p in found.parameters if p.significant and p.id in ("accel-scale", "gravity")]
     assert gravity_of_scenario(scenario_by_name("hand-session")) is None
+    # A gravity given for the log is another one: so are the readings.
+    elsewhere = replace(at_the_pole, environment=replace(at_the_pole.environment, gravity_m_s2=9.81))
+    log, _ = simulate(elsewhere, 5)
+    differing = trihedron.diagnose(log, against=at_the_pole, gravity_m_s2=9.81).parameters
+    (common,) = (p for p in differing if p.significant)
+    assert common.id == "gravity"
+    assert common.difference == pytest.approx(9.81 / 9.832 - 1.0, abs=4.0 * common.std)
     # Its readings are drawn over those of the log, which a reader looks for first.
     pictures = [b.name for s in diagnosis_report(found).sections for b in s.blocks if isinstance(b, Picture)]
     assert "traces" in pictures

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import trihedron
 from confidence import design
 from confidence.sensor import recorded
 from diagnosed_session import unit_of
+from trihedron.diagnose.effects.timing_jitter import SURE, common_time_variance
+from trihedron.diagnose.session.observations import observe
 from trihedron.simulate import Environment, Temperature, hand_session, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
@@ -153,3 +156,31 @@ def test_the_curvature_of_quick_motion_is_not_jitter():
     recording = recorded(made.force, made.rate, made.rate_hz, made.time_s)
     found = trihedron.diagnose(recording, gravity_m_s2=design.G)
     assert "timing-jitter" not in {effect.id for effect in found.effects}
+
+
+def z_of_jitter(force, rate, made, is_kept=slice(None)):
+    recording = recorded(force[is_kept], rate[is_kept], made.rate_hz, made.time_s[is_kept])
+    value, sigma, _ = common_time_variance(observe(recording, trihedron.segment(recording)))
+    return value / sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lost_rows_and_outliers_are_not_jitter(seed):
+    made, rng = design.session(seed), np.random.default_rng(seed)
+    n = len(made.time_s)
+    assert z_of_jitter(made.force, made.rate, made, rng.random(n) > 0.05) < SURE
+    struck = rng.random((n, 1)) < 0.005
+    force, rate = (
+        np.round(x + struck * 0.2 * np.abs(x).max() * rng.normal(size=(n, 3))) for x in (made.force, made.rate)
+    )
+    assert z_of_jitter(force, rate, made) < SURE
+
+
+def test_jitter_is_seen_beside_lost_rows():
+    made, rng = design.session(0), np.random.default_rng(0)
+    n = len(made.time_s)
+    at = made.time_s + 5e-4 * rng.standard_normal(n)
+    force, rate = (CubicSpline(made.time_s, x)(at) for x in (made.force, made.rate))
+    assert z_of_jitter(force, rate, made, rng.random(n) > 0.03) > SURE
+    # Where the timestamps have it too, samples are at their timestamps.
+    assert z_of_jitter(force, rate, replace(made, time_s=at)) < SURE

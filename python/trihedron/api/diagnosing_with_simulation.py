@@ -138,8 +138,10 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     of_world = rates_of_world(recording, segment(recording))
     if of_world is not None:
         recording = replace(recording, gyroscope=None)
-    # A scenario states its own gravity; a simulated log is taken to be of the recording's place.
-    own = gravity if scenario is None else scenario.environment.gravity
+    # A simulation is taken to be of the recording's place: another gravity that a scenario states is then a common
+    # scale of its accelerometer, as it is in its readings. Standard gravity states no place.
+    is_nowhere = scenario is not None and gravity_of_scenario(scenario) is None
+    own = STANDARD_GRAVITY_M_S2 if is_nowhere else gravity
     try:
         result = calibrate(recording, gravity_m_s2=own)
     except INPUT_ERRORS as error:
