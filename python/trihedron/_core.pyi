@@ -636,6 +636,15 @@ def move_moments(
     moves: npt.NDArray[np.int64],
     bias: FloatArray,
 ) -> list[FloatArray | None]: ...
+def rotated_moments(
+    time_s: FloatArray,
+    rate: FloatArray,
+    moves: npt.NDArray[np.int64],
+    bias: FloatArray,
+    scale: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+) -> list[FloatArray]: ...
 def play(path: FloatArray, half_width: float) -> FloatArray: ...
 def move_derivative(time_s: FloatArray, values: FloatArray, moves: npt.NDArray[np.int64]) -> FloatArray: ...
 def move_shifted(

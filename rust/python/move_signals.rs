@@ -14,6 +14,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(move_derivative, module)?)?;
     module.add_function(wrap_pyfunction!(move_shifted, module)?)?;
     module.add_function(wrap_pyfunction!(move_moments, module)?)?;
+    module.add_function(wrap_pyfunction!(rotated_moments, module)?)?;
     Ok(())
 }
 
@@ -159,4 +160,49 @@ fn move_moments<'py>(
     })?;
     let array = |moment: &Option<_>| moment.as_ref().map(|one| of3(py, one)).transpose();
     found.iter().map(array).collect()
+}
+
+/// `∫ f (w - bias)ᵀ dt` `(m, 3, 3)` over each of the moves, of the force `f` that the rate of `scale` rotates from the
+/// pose `before` `(m, 3)` to the pose `after`.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a sensor, its moves and their ends by name"
+)]
+fn rotated_moments<'py>(
+    py: Python<'py>,
+    time_s: PyReadonlyArray1<'py, f64>,
+    rate: PyReadonlyArray2<'py, f64>,
+    moves: PyReadonlyArray2<'py, i64>,
+    bias: PyReadonlyArray2<'py, f64>,
+    scale: PyReadonlyArray2<'py, f64>,
+    before: PyReadonlyArray2<'py, f64>,
+    after: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Vec<Array2<'py>>> {
+    let (n, m) = (time_s.len(), moves.shape()[0]);
+    if rate.shape()[0] != n
+        || [&bias, &before, &after]
+            .iter()
+            .any(|one| one.shape()[0] != m)
+    {
+        return Err(PyValueError::new_err(
+            "rates (n, 3) belong to times (n,); a bias and two forces to every move",
+        ));
+    }
+    let moves = edges(&moves, n)?;
+    let (time, rate, biases) = (flat1(&time_s), flat3("rate", &rate)?, flat3("bias", &bias)?);
+    let (before, after) = (flat3("before", &before)?, flat3("after", &after)?);
+    let scale = matrix3("scale", &scale)?;
+    let found = super::run(py, || {
+        let ends: Vec<_> = as_vectors(&before)
+            .iter()
+            .zip(as_vectors(&after))
+            .map(|(before, after)| [*before, *after])
+            .collect();
+        let (rate, biases) = (as_vectors(&rate), as_vectors(&biases));
+        Ok(kernel::rotated_moments(
+            &time, rate, &moves, biases, &scale, &ends,
+        ))
+    })?;
+    found.iter().map(|moment| of3(py, moment)).collect()
 }

@@ -24,8 +24,9 @@ TOLERANCE = 1.25
 apart."""
 _MIN_CORRELATION = 0.5
 """Rotation by hand with acceleration gives 0.7 and more; other motion and other quantities give less than 0.4."""
-PARTS, _FEWEST = 4, 50
-"""Parts of the log, each of which must fit with the same axes, and the smallest number of blocks to test one."""
+PARTS, _FEWEST, _FEWEST_CHANGES = 4, 50, 9.0
+"""Parts of the log, each of which must fit with the same axes, the smallest number of blocks to test one, and of those
+that hold its changes of gravity, which are to determine nine elements: with a single one other axes fit as well."""
 _AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
 """A part has other axes if they correlate so well, and the axes of the whole log leave 4 times the unexplained part."""
 _STILL, _ONE_SIDED = 2.0, 4.0
@@ -116,12 +117,19 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
 
 @dataclass(frozen=True)
 class _Sums:
-    """Normal matrix (9, 9), right side (9,) and sum of squares for gravity's change on rates; number of blocks."""
+    """Normal matrix (9, 9), right side (9,), sums of squares and fourth powers for gravity's change on rates; number of
+    blocks."""
 
     normal: FloatArray
     right: FloatArray
     total: float
+    fourth: float
     n: int
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether the changes of gravity are spread over enough blocks to tell axes from one another."""
+        return self.n >= _FEWEST and self.total**2 > _FEWEST_CHANGES * self.fourth
 
     def on(self, axes: FloatArray) -> Turning | None:
         """Scale and correlation for the orientation ``axes`` (3, 3) of the gyro in the accelerometer's frame."""
@@ -145,7 +153,8 @@ def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sum
     cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
     cross -= cross.transpose(0, 2, 1)
     design = (step_s * cross[:, :, :, None] * w[:, None, None, :]).reshape(-1, 9)
-    return _Sums(design.T @ design, design.T @ seen.ravel(), float((seen**2).sum()), len(a))
+    squared = np.sum(seen**2, axis=1)
+    return _Sums(design.T @ design, design.T @ seen.ravel(), float(squared.sum()), float(squared @ squared), len(a))
 
 
 def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray, step_s: float) -> Turning | None:
@@ -157,6 +166,7 @@ def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray,
         sum((p.normal for p in parts), np.zeros((9, 9))),
         sum((p.right for p in parts), np.zeros(9)),
         sum(p.total for p in parts),
+        sum(p.fourth for p in parts),
         len(a),
     )
     if not np.isfinite(whole.normal).all() or not whole.normal.any():
@@ -174,7 +184,7 @@ def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray,
     for k, part in enumerate(parts):
         own, shared = part.best(_SIGNED_AXES), part.on(axes)
         others = shared.correlation if shared is not None else 0.0
-        if part.n < _FEWEST or own is None or own[0].correlation < _AXES_FIT:
+        if not part.is_enough or own is None or own[0].correlation < _AXES_FIT:
             continue
         if 1.0 - others**2 > _MORE_UNEXPLAINED * (1.0 - own[0].correlation ** 2):
             return replace(turning, odd_part=k + 1, odd_correlation=(own[0].correlation, others))

@@ -100,9 +100,6 @@ def _columns(curve: FloatArray, sensor: int) -> tuple[FloatArray | None, FloatAr
 
 NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
-LOOSE = 100.0
-"""Factor on the moves' standard errors, to some degrees, for a start with tilt errors of tens of degrees: the gyro's
-scale then changes, and the poses do not."""
 LEAST_SHRINK = 0.1
 """Lower limit of degrees of freedom per component: with fewer the ratio of residuals to noise is not meaningful."""
 
@@ -208,11 +205,6 @@ def _shared(solution: SessionSolution, steady: Observed, likely: list[list[Likel
             away = other.parameters - solution.parameters
             out = out + one.probability * (other.covariance + np.outer(away, away))
     return out
-
-
-def approached(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> _core.SessionFit:
-    """The fit from an initial scale that may be far off: moves have little weight beside the poses."""
-    return _fitted(observed, (S_a, b_a, S_w), (*START_STRENGTHS[:3], (LOOSE, NO_WEIGHT)), None)
 
 
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:

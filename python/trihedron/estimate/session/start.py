@@ -10,7 +10,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
-from trihedron.estimate.session.fit import approached, are_far, usual_miss
+from trihedron.estimate.session.fit import are_far, usual_miss
 from trihedron.estimate.session.observed import Observed, arranged, with_prior
 from trihedron.quantiles import median
 from trihedron.records import Recording, Segments, SensorCalibration
@@ -25,6 +25,8 @@ CAUCHY = 3.0
 """Distance, in usual ones, at which a move has half the weight in the robust fit (Cauchy)."""
 ROUNDS = 20
 """Iterations of the weights: they converge in ten."""
+USUAL_RAD = 0.03
+"""Tilt error that says nothing of a move yet, while the initial scale is looked for."""
 
 Near = tuple[FloatArray, FloatArray, FloatArray]
 """Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
@@ -106,10 +108,8 @@ def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     if np.all(measured.is_lost):
         raise GyroClippedError(measured)
     S_a, b_a, R = lower(log.accelerometer.S, log.accelerometer.b)
-    near = S_a, b_a, R @ initial_scale(log.recording, measured, log.accelerometer, nominal)
-    observed = arranged(log.recording, log.segments, measured, log.gravity_m_s2, ~measured.is_lost)
-    core = approached(with_prior(observed, *near, is_given=True), *near)
-    return S_a, b_a, np.asarray(core.rate_scale)
+    first = initial_scale(log.recording, measured, log.accelerometer, nominal)
+    return S_a, b_a, R @ along_paths(measured, log.accelerometer, first)
 
 
 def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray, b_a: FloatArray) -> float:
@@ -147,12 +147,11 @@ def integral_start(
     """``S_ω`` (3, 3) from Poisson's equation in integral form, or ``None`` when the moves do not determine it.
 
     ``f_j − f_i = ∫ [f]× S_ω (w' − z) dt`` is linear in ``S_ω`` once ``f(t)`` inside the move is taken from the
-    accelerometer. Accelerations of the hand disturb it, but average out over a move; scale, sign, axis order and
-    handedness are determined without a nominal scale.
+    accelerometer. Scale, sign, axis order and handedness are determined without a nominal scale; but accelerations of
+    the hand, like any errors of a regressor, make the scale too small: by half and more where turns are quick.
     """
     if recording.accelerometer is None:
         return None
-    before, after = np.asarray(measured.links).T
     moments = _core.move_moments(
         measured.time_s,
         recording.accelerometer[measured.rows],
@@ -160,16 +159,13 @@ def integral_start(
         accelerometer.b,
         measured.rate,
         np.asarray(measured.edges, dtype=np.int64),
-        0.5 * (measured.bias[before] + measured.bias[after]),
+        _bias(measured),
     )
-    force = measured.reading @ accelerometer.S.T + accelerometer.b
-    used = [k for k, moment in enumerate(moments) if moment is not None and not measured.is_lost[k]]
-    # ∂([f]× S w)/∂S_ij = f × e_i w_j.
-    rows = [np.moveaxis(_ACROSS @ moments[k], 0, 1).reshape(3, 9) for k in used]
-    sides = [force[after[k]] - force[before[k]] for k in used]
-    if len(rows) < FEWEST_MOVES:
+    used = {k: one for k, one in enumerate(moments) if one is not None and not measured.is_lost[k]}
+    if len(used) < FEWEST_MOVES:
         return None
-    matrix, side = np.concatenate(rows), np.concatenate(sides)
+    before, after = _ends(measured, accelerometer)
+    matrix, side = _equations(list(used.values())).reshape(-1, 9), (after - before)[list(used)].ravel()
     size = np.linalg.norm(matrix, axis=0)
     if np.any(size == 0.0):
         return None
@@ -201,6 +197,49 @@ def initial_scale(
         "the moves do not determine a first guess of the gyro scale and its readings are counts: "
         "give --gyro-nominal in rad/s per count, or add moves about all three axes"
     )
+
+
+def along_paths(measured: MoveMeasurements, accelerometer: SensorCalibration, first: FloatArray) -> FloatArray:
+    """``S_ω`` (3, 3) by the equation of :func:`integral_start`, with ``f(t)`` rotated by the gyro from both poses
+    instead of measured, iterated from ``first``; a move that contradicts the others has little weight (Cauchy).
+
+    Unlike Gauss-Newton on the tilt errors it converges from half the scale, after turns by 180° too.
+    """
+    used = ~measured.is_lost
+    before, after = (np.ascontiguousarray(end[used]) for end in _ends(measured, accelerometer))
+    bias, edges = _bias(measured)[used], np.asarray(measured.edges, dtype=np.int64)[used]
+    g, size, scale = float(np.median(np.linalg.norm(after, axis=1))), float(np.linalg.norm(first, 2)), first
+    for _ in range(ROUNDS):
+        moments = _core.rotated_moments(measured.time_s, measured.rate, edges, bias, scale, before, after)
+        rows = _equations(moments) * (size / g)
+        residual = (after - before) / g - rows @ (scale / size).ravel()
+        squared = np.sum(residual**2, axis=1)
+        usual = max(median(squared), USUAL_RAD**2)
+        weight = (1.0 + squared / usual) ** -0.5 / USUAL_RAD
+        # A scale that the moves do not determine stays near the first.
+        matrix = np.concatenate([(weight[:, None, None] * rows).reshape(-1, 9), np.eye(9)])
+        side = np.concatenate([(weight[:, None] * residual).ravel(), (first - scale).ravel() / size])
+        step = np.linalg.lstsq(matrix, side, rcond=None)[0].reshape(3, 3)
+        scale = scale + size * step
+        if float(np.max(np.abs(step))) < USUAL_RAD**2:
+            break
+    return scale
+
+
+def _bias(measured: MoveMeasurements) -> FloatArray:
+    """Raw bias (m, 3) of the gyro in every move."""
+    return np.asarray(0.5 * (measured.bias[measured.links[:, 0]] + measured.bias[measured.links[:, 1]]))
+
+
+def _ends(measured: MoveMeasurements, accelerometer: SensorCalibration) -> tuple[FloatArray, FloatArray]:
+    """Specific forces (m, 3) in the poses before and after every move."""
+    force = measured.reading @ accelerometer.S.T + accelerometer.b
+    return force[measured.links[:, 0]], force[measured.links[:, 1]]
+
+
+def _equations(moments: list[FloatArray]) -> FloatArray:
+    """(m, 3, 9) matrices of ``∫ [f]× S w dt`` by S row by row: ``∂([f]× S w)/∂S_ij = f × e_i w_j``."""
+    return np.moveaxis(_ACROSS @ np.array(moments)[:, None], 1, 2).reshape(-1, 3, 9)
 
 
 _ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
