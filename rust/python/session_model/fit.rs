@@ -152,6 +152,12 @@ impl SessionFit {
         moves(py, &self.fit)
     }
 
+    /// `(moves,)` weight of every move's residuals by heavy tails, at most 1.
+    #[getter]
+    fn tails<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.fit.weights.tail.as_slice().to_pyarray(py)
+    }
+
     /// `(moves, 5, 5)` whitening of the moves' residuals, without the weights of heavy tails.
     fn whitening<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let flat: Vec<f64> = self

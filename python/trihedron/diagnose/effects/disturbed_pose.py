@@ -30,6 +30,8 @@ FEWEST_BLOCKS = 4
 SHAKES_P = 1e-6
 """p-value of a pose's variance, corrected for the number of poses and channels, below which the pose vibrates: 48
 healthy sessions stay above 0.02, and real noise is not as white."""
+OUTLYING = 0.25
+"""Weight of a move below which its residual is in the tails: χ² above 32 with five degrees of freedom, p = 10⁻⁵."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
 LEAST_DOF = 0.1
@@ -87,10 +89,8 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
-    """(poses,) whether a pose's own readings show a disturbance: in their norm, or between the halves of the pose.
-
-    Misfit of the moves on both sides of a pose is no evidence: any effect missing in moves causes it.
-    """
+    """(poses,) whether a disturbance shows: in the norm of a pose's readings, between the halves of the pose, or in that
+    both moves beside it, unlike the others, are in the tails of their noise."""
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
     poses, free = fitted.system.segment[rows], 1.0 - fitted.leverage[rows]
@@ -101,6 +101,8 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
         if halves is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
             out |= (np.abs(halves[:, 1] - halves[:, 0]) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
+    before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
+    out[np.intersect1d(before, after)] = True
     return out
 
 

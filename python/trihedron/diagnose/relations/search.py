@@ -44,19 +44,19 @@ class Related:
 def related(model: Hypothesis, limit: float, begin: Sequence[Follows] = ()) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``; beside those of another
     hypothesis, ``begin``, one more."""
-    found = [one for one in begin if one.effect.family != TELEGRAPH]
-    most = MOST_RELATIONS + bool(found)
+    found, terms = [one for one in begin if one.effect.family != TELEGRAPH], model.terms
+    known, most = {one.effect.id for one in found}, MOST_RELATIONS + bool(found)
     if found:
-        model = again(model, [*model.terms, *(one.term for one in found)])
-    score = 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
+        model = again(model, [*terms, *(one.term for one in found)])
     while len(found) < most and model.context.moves:
-        best = max(_leading(model, {one.effect.id for one in found}, limit), key=lambda one: one.score, default=None)
+        best = max(_leading(model, known, limit), key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
             break
-        found.append(best)
-        model = again(model, [*model.terms, best.term])
-        score += best.score
-    return Related(model, tuple(found), score)
+        # The same variable under another prior takes the place of what it was.
+        found = [*(one for one in found if one.effect.names != best.effect.names), best]
+        known.add(best.effect.id)
+        model = again(model, [*terms, *(one.term for one in found)])
+    return Related(model, tuple(found), 2.0 * model.log_evidence - sum(term.cost for term in model.terms))
 
 
 def _leading(model: Hypothesis, known: set[str], limit: float) -> list[Follows]:
