@@ -5,7 +5,6 @@
 
 Poses rest on a support; between them a hand carries the sensor along bowed paths. ``pauses``: it stops on the way for
 0.4 to 1 s, nearly still, in the air. ``waits``: for 1 to 2.5 s. ``short``: poses of 1.0 to 1.3 s among longer ones.
-``jolted``: all of 1.0 to 1.2 s, and ringing of up to 30 m/s² when set down and when lifted.
 ``shaken``: a line of 3 mm/s² to 3 m/s² (a motor, a table) through some poses or all, with sidebands, not quite steady;
 in half of the sessions it turns the sensor too. ``plain``: none of these.
 ``all``: together.
@@ -24,7 +23,7 @@ from motion import minimum_jerk
 from trihedron.records import Recording
 from trihedron.segment import segment_recording
 
-KINDS = ("plain", "pauses", "waits", "short", "jolted", "shaken", "all")
+KINDS = ("plain", "pauses", "waits", "short", "shaken", "all")
 DEGREE = np.pi / 180.0
 G = 9.81
 RATES_HZ = (25.0, 50.0, 50.0, 100.0, 100.0, 208.0, 400.0)
@@ -62,9 +61,6 @@ def _timetable(rng, n_poses, kind):
             parts.append(("stroke", rng.uniform(0.7, 2.0)))
             if k < strokes - 1:
                 parts.append(("pause", rng.uniform(1.0, 2.5) if kind == "waits" else rng.uniform(0.4, 1.0)))
-        if kind == "jolted":
-            parts.append(("pose", rng.uniform(1.0, 1.2)))
-            continue
         is_short = kind in ("short", "all") and rng.random() < 0.4
         parts.append(("pose", rng.uniform(1.0, 1.3) if is_short else usual * rng.uniform(0.8, 1.3)))
     return parts
@@ -90,17 +86,6 @@ def _shaking(rng, t, rate, poses):
         about = np.linalg.norm(rng.normal(size=3)) * rng.normal(size=3)
         turning[here] = size / radius / (2 * np.pi * hz) * (edge * beat * np.roll(wave, 1))[:, None] * about / 3.0
     return out, turning
-
-
-def _jolts(rng, t, rate, poses):
-    """(n, 3) m/s² of a shock at the start of each pose and a twentieth of a second before its end, ringing 50 ms."""
-    out, size = np.zeros((len(t), 3)), 10.0 ** rng.uniform(-0.5, 1.5)
-    for since in (t - t0 for first, last in poses for t0 in (t[first], t[last - 1] - 0.05)):
-        here = (since >= 0.0) & (since < 0.6)
-        hz = rng.uniform(0.1, 0.45) * min(rate, 100.0)
-        ring = np.exp(-since[here] / 0.05) * np.sin(2 * np.pi * hz * since[here] + rng.uniform(0, 6))
-        out[here] += size * rng.uniform(0.5, 1.5) * np.outer(ring, rng.normal(size=3) / np.sqrt(3.0))
-    return out
 
 
 def _path(rng, parts, edges, rate):
@@ -139,9 +124,6 @@ def session(seed, kind):
     """One session of this kind: (N, 3) m/s² and rad/s of a part with data-sheet noise and errors of a few per cent."""
     rng = np.random.default_rng(seed)
     rate = float(rng.choice(RATES_HZ))
-    if kind == "jolted":
-        # At 25 Hz the five samples of a block make the shortest window one second.
-        rate = max(rate, 50.0)
     parts = _timetable(rng, int(rng.integers(10, 22)), kind)
     edges = np.round(np.cumsum([0.0, *(s for _, s in parts)]) * rate).astype(int)
     n = int(edges[-1])
@@ -158,8 +140,6 @@ def session(seed, kind):
     if kind in ("shaken", "all"):
         force, turning = _shaking(rng, t, rate, poses)
         accel, rates = accel + force, rates + turning
-    if kind == "jolted":
-        accel = accel + _jolts(rng, t, rate, poses)
     noise_a, noise_w = rng.uniform(80, 300) * 1e-6 * G * np.sqrt(rate / 2), rng.uniform(0.004, 0.02) * DEGREE
     M, zero = np.zeros((6, 6)), np.concatenate([0.3 * rng.normal(size=3), DEGREE * rng.normal(size=3)])
     M[:3, :3], M[3:, 3:] = np.eye(3) + 0.01 * rng.normal(size=(2, 3, 3))

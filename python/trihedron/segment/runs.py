@@ -16,6 +16,8 @@ from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise
 
+SEEN_S = 0.8
+"""Part of the shortest pose that is seen at the noise floor: its ends share their blocks with the moves."""
 SET_DOWN_S = 0.5
 """Longest approach to, and departure from, a short pose: a sensor that is set down takes less, a calming hand more."""
 FAR_SHORTER = 0.1
@@ -140,13 +142,11 @@ def long_enough(channels: Channels, runs: list[Run], shortest_s: float) -> list[
 def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[Run]) -> list[Run]:
     """Short poses between moves on either side, not calm moments of a longer pose or of a hand.
 
-    One window at the noise floor is enough: a motion that it hides is below the error of the pose's mean.
-
     ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` the poses found so far.
     """
     most, found = channels.blocks(SET_DOWN_S), []
     usual = float(np.median([run.last - run.first for run in taken])) if taken else 0.0
-    for run in long_enough(channels, runs, WINDOW_BLOCKS * channels.step_s):
+    for run in long_enough(channels, runs, SEEN_S):
         if run.last - run.first < FAR_SHORTER * usual:
             continue
         first, last = grown(loose, (run.first, run.last))

@@ -13,6 +13,7 @@ from trihedron.segment.floor import Activity, quiet_channels
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
     BUMP_S,
+    SEEN_S,
     SWAY_RAD,
     EdgeNoise,
     Run,
@@ -77,12 +78,12 @@ def find_vibrating(
     calm = np.linalg.norm(rolling_mean(rate, WINDOW_BLOCKS), axis=1) < CALM_RAD_S
     white = (activity.white_variance[~gyro], activity.white_variance[gyro])
     settled = [run for run in taken if not run.is_unsteady]
-    seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled)
+    seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
     seen_calm = [run for run in seen_calm if not _turns(channels, run, settled)]
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
     lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in taken)]
-    still = _poses(channels, seen, quiet & free, [*taken, *lines])
+    still = _poses(channels, seen, quiet & free, [*taken, *lines], SEEN_S)
     shaken = (run for run in still if _shakes(channels, activity, run) and not _turns(channels, run, settled))
     return [*taken, *lines, *shaken]
 
@@ -109,15 +110,16 @@ class _Seen:
     steady: list[Range]
 
 
-def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run]) -> list[Run]:
-    """Calm ranges (m,) that stay in place, last a window of the stillness test, and are no part of a ``taken`` run."""
+def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], shortest_s: float) -> list[Run]:
+    """Calm ranges (m,) that stay in place, last ``shortest_s``, and are no part of a ``taken`` run."""
     calm = calm.copy()
     for run in taken:
         # Calm blocks beside a pose are its settling, not another pose.
         calm[slice(*grown(calm, (run.outer_first, run.outer_last)))] = False
     found: list[Run] = []
+    shortest = max(channels.blocks(shortest_s), WINDOW_BLOCKS)
     for first, last in ranges_of(calm):
-        if last - first < WINDOW_BLOCKS or not _stays(seen, (first, last)):
+        if last - first < shortest or not _stays(seen, (first, last)):
             continue
         run = Run(first, last, (), True)
         if any(_is_one_pose(channels, seen.attitude, run, near) for near in [*taken, *found]):
