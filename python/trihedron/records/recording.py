@@ -164,6 +164,8 @@ class Recording(Presented):
         if number_of("rate_hz", self.rate_hz) <= 0.0:
             raise InputError(f"rate_hz must be a positive number, got {self.rate_hz}")
         number_of("start_epoch_s", self.start_epoch_s)
+        if self.latitude_deg is not None and abs(number_of("latitude_deg", self.latitude_deg)) > 90.0:
+            raise InputError(f"latitude_deg must be between -90 and 90, got {self.latitude_deg}")
         units = (("accelerometer_unit", AccelerationUnit), ("gyroscope_unit", RateUnit))
         for name, kind in units:
             object.__setattr__(self, name, word_of(name, getattr(self, name), kind))

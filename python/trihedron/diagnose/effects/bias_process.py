@@ -108,14 +108,14 @@ class BiasDrift(BiasProcess):
         return True
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
-        return per_axis_parameters("range", size, std, self.unit), self.reported("walk", range=size)
+        return per_axis_parameters("range", size, std, self.unit), self.reported("walk")
 
     def of_curve(
         self, size: FloatArray, std: FloatArray, *, is_counts: bool
     ) -> tuple[tuple[EffectParameter, ...], Words]:
         """The same for a smooth curve in a log of one orientation, whose readings may be counts of unknown scale."""
-        case = "static-counts" if is_counts else "static"
-        return per_axis_parameters("range", size, std, self.unit), self.reported(case, range=size)
+        said = self.reported("static-counts", range=size) if is_counts else self.reported("static", range=size)
+        return per_axis_parameters("range", size, std, self.unit), said
 
 
 class AccelBiasDrift(BiasDrift):

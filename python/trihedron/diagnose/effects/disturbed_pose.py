@@ -89,7 +89,7 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
-    """(poses,) whether a disturbance shows: in the norm of a pose's readings, between the halves of the pose, or in that
+    """(poses,) whether a disturbance shows: in the norm of a pose's readings, between its halves, or in that
     both moves beside it, unlike the others, are in the tails of their noise."""
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
