@@ -136,8 +136,9 @@ fn rows_that_miss_by_a_thousand_errors_end_in_one_place_whatever_the_start() {
     // Steps end at a thousandth of the spread that rows show: two ends differ by less than that in every row together.
     let (one, other) = (chi2_of(&session, &near), chi2_of(&session, &far));
     assert!((one - other).abs() < 1e-4 * one, "{one} {other}");
+    // The weights of moves follow the residuals where these end: a thousandth of their spread, no less.
     let parted = (near.state.rate_scale - far.state.rate_scale).norm();
-    assert!(parted < 1e-4 * truth.rate_scale.norm(), "{parted}");
+    assert!(parted < 1e-3 * truth.rate_scale.norm(), "{parted}");
 }
 
 #[test]
