@@ -96,7 +96,7 @@ def as_row(name, d, why, seconds):
         also = f" (or {', '.join(e.confounded_with)})" if e.confounded_with else ""
         ids.append(e.id + also)
         sized = [p for p in e.parameters if p.std > 0.0] or list(e.parameters)
-        big = max(sized, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
+        big = max(sized, key=lambda p: (round(abs(p.value) / max(p.std, 1e-300), 3), abs(p.value)), default=None)
         codes = "".join(f", {p.name} {p.value:.9g}" for p in e.parameters if p.name.startswith("raw_"))
         sizes.append("–" if big is None else f"{big.name} {big.value:.3g} ± {big.std:.1g} {big.unit}{codes}")
         h = e.held_out[0] if e.held_out else None
