@@ -5,8 +5,8 @@ use nalgebra::{Matrix4, Vector4};
 use crate::chi_square::MEDIAN_SQUARE;
 use crate::order_statistics::median;
 
-/// Samples on either side through which the quintic goes, and those beyond whose cubic gives the slope: apart, so that an
-/// outlier among them is not both a slope and a departure from it, in both sensors at once.
+/// Samples on either side through which the quintic goes, and those beyond whose cubic gives the slope: apart, so that
+/// an outlier among them is not both a slope and a departure from it, in both sensors at once.
 const NEAR: usize = 3;
 const HALF: usize = 6;
 /// Intervals of the window by which it may be longer: one more is a lost sample.
@@ -26,8 +26,8 @@ type Readings<'a> = &'a [[f64; 3]];
 /// Variance of the sampling instants about their timestamps [s²], its standard error, and the number of samples; the
 /// error is infinite where too few tell.
 ///
-/// A sample's departure from the quintic through its six neighbours at their timestamps, over the local slope, is a time.
-/// Windows with a gap in the timestamps tell little: across it the quintic is not the motion. Each sensor is
+/// A sample's departure from the quintic through its six neighbours at their timestamps, over the local slope, is a
+/// time. Windows with a gap in the timestamps tell little: across it the quintic is not the motion. Each sensor is
 /// evaluated by itself: noise, curvature and vibration differ, only an error of time is common to both. The curvature of
 /// the motion is common to both too, hence the high order: a step's departure from its neighbours was taken for jitter in
 /// quick motion at 10 to 50 Hz.

@@ -134,7 +134,7 @@ pub struct Prior {
 pub struct Session {
     /// |g|, m/s².
     pub gravity: f64,
-    /// Rotation of the Earth about the vertical, rad/s, which the gyro reads in static poses; 0 where no latitude is known.
+    /// Rotation of the Earth about the vertical, rad/s, which the gyro reads in static poses; 0 without a latitude.
     pub earth_up: f64,
     /// Middle of each pose, s.
     pub time_s: Vec<f64>,

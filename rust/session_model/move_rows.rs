@@ -20,11 +20,12 @@ pub type Whitening = SMatrix<f64, N_MOVE, N_MOVE>;
 /// Five residuals of a move, SI.
 pub type MoveResidual = SVector<f64, N_MOVE>;
 
-/// Degrees of freedom of the tails of moves: a jolt or lost samples leave a hundred times the noise in one of a hundred.
+/// Degrees of freedom of the tails of moves: a residual of a hundred times the noise, as a jolt or lost samples leave,
+/// costs 70 in twice a log-likelihood and not ten thousand; one of the size of the noise has its full weight.
 const DEGREES: f64 = 4.0;
 
-/// Whitening of a move under Student t noise of covariance `covariance` about its `residual`, the weight of that residual
-/// and the logarithm of the weight's prior, which is 0 at 1 (11.18a): the tightest Gaussian bound of the t density.
+/// Whitening of a move under Student t noise of this `covariance` about its `residual`, the weight of that residual and
+/// the logarithm of the weight's prior, which is 0 at 1 (11.18a): the tightest Gaussian bound of the t density.
 pub(super) fn with_tails(
     covariance: &MoveCovariance,
     residual: &MoveResidual,

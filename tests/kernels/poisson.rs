@@ -1,4 +1,4 @@
-//! Poisson integration: noise and sensitivities of a move in parts. Order, derivatives, input: `tests/test_attitude.py`.
+//! Poisson integration: noise and sensitivities of a move in parts. Order, derivatives: `tests/test_attitude.py`.
 
 use nalgebra::{Matrix3, Vector3};
 use trihedron::poisson::{MoveRange, RateModel, RateNoise, integrate_moves};

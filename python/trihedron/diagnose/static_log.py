@@ -171,7 +171,7 @@ def _of_walk(
     known: Hypothesis, one: BiasStrength, drift: BiasDrift, shown: DomainResiduals, unit: str
 ) -> AcceptedEffect:
     path = known.fitted.bias(GYRO)
-    parameters, statement = drift.of_strength(one.size, one.std)
+    parameters, statement = drift.of_strength(one.size, one.std, is_counts=unit == "counts")
     said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
     curves = bias_curves(known.context, GYRO, path, one.std, [shown])
     return effect_record(drift, *said, held, (), curves, **_series(known.obs, path, one.std, unit))

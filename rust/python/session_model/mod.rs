@@ -130,9 +130,10 @@ fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
 
 #[pymethods]
 impl SessionModel {
-    /// `gravity`: |g| m/s², rotation of the Earth about the vertical rad/s (0 where no latitude is known). `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it
-    /// is weak. `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter
-    /// that is expected from its noise inside poses, 0 where there is none.
+    /// `gravity`: |g| m/s², rotation of the Earth about the vertical rad/s (0 where no latitude is known). `noise`:
+    /// jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is weak.
+    /// `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter that is
+    /// expected from its noise inside poses, 0 where there is none.
     #[new]
     #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter))]
     fn new(

@@ -107,13 +107,18 @@ class BiasDrift(BiasProcess):
                     return False
         return True
 
-    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
-        return per_axis_parameters("range", size, std, self.unit), self.reported("walk")
+    def of_strength(
+        self, size: FloatArray, std: FloatArray, *, is_counts: bool = False
+    ) -> tuple[tuple[EffectParameter, ...], Words]:
+        """Parameters and sentence of a random walk; readings of a log of one orientation may be counts of unknown
+        scale."""
+        said = self.reported("walk-counts", range=size) if is_counts else self.reported("walk", range=size)
+        return per_axis_parameters("range", size, std, self.unit), said
 
     def of_curve(
         self, size: FloatArray, std: FloatArray, *, is_counts: bool
     ) -> tuple[tuple[EffectParameter, ...], Words]:
-        """The same for a smooth curve in a log of one orientation, whose readings may be counts of unknown scale."""
+        """The same of a smooth curve in such a log."""
         said = self.reported("static-counts", range=size) if is_counts else self.reported("static", range=size)
         return per_axis_parameters("range", size, std, self.unit), said
 

@@ -89,8 +89,8 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
 
 
 def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
-    """(poses,) whether a disturbance shows: in the norm of a pose's readings, between its halves, or in that
-    both moves beside it, unlike the others, are in the tails of their noise."""
+    """(poses,) whether a disturbance shows: in the norm of a pose's readings, between its halves, or in both moves
+    beside it, which are in the tails of the noise that fits the others."""
     obs, fitted = context.obs, context.fitted
     rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
     poses, free = fitted.system.segment[rows], 1.0 - fitted.leverage[rows]

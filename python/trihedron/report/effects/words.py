@@ -38,10 +38,11 @@ def drifts(sensor: str, unit: str, walk: str, static: str = "") -> Mapping[str, 
     """Bias drift from pose to pose, by its kind; in a log of one orientation ``static`` is added. There readings of
     unknown scale stay counts."""
     whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
-    sizes = f"{{range:all .2g {unit}}}"
-    cases = {"static": sizes, "static-counts": "{range:all .3g} counts"}
-    return {"walk": f"The {sensor} bias drifts {walk}; no logged channel explains it.{static}"} | {
-        case: whole.format(how="smoothly", sizes=own) + static for case, own in cases.items()
+    sizes = {"": f"{{range:all .2g {unit}}}", "-counts": "{range:all .3g} counts"}
+    return {
+        way + of: whole.format(how=how, sizes=own) + static
+        for way, how in (("walk", walk), ("static", "smoothly"))
+        for of, own in sizes.items()
     }
 
 
@@ -116,7 +117,7 @@ GYROSCOPE = {
     "gyro-bias-drift": EffectWords(
         "the gyro bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
-        drifts("gyro", "°/s", "as a random walk, beyond its noise"),
+        drifts("gyro", "°/s", "as a random walk beyond its noise"),
     ),
     "gyro-bias-repeatability": EffectWords(
         "the gyro bias changes from pose to pose",

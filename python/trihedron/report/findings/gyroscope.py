@@ -128,8 +128,8 @@ _MOVES = {
         "{force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. The "
         "moves were fitted without it; S and b alone cannot correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
-        "See whether it is that or a bias that differs from pose to pose: `trihedron diagnose LOG`; g-sensitivity is "
-        "fitted with --extended.",
+        "Separate g-sensitivity from a bias that differs from pose to pose: `trihedron diagnose LOG`; --extended fits "
+        "g-sensitivity.",
         numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),
