@@ -283,12 +283,12 @@ def settling_of_poses(
     scale: tuple[FloatArray, ...],
     noise: tuple[FloatArray, ...],
     up: FloatArray,
-    spans: npt.NDArray[np.int64],
+    spans: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
     *,
     gravity_m_s2: float,
     step_s: float,
     fewest: int,
-) -> tuple[float, float, float, float] | None: ...
+) -> tuple[float, float, FloatArray, FloatArray, FloatArray] | None: ...
 def common_time_variance(
     time_s: FloatArray,
     step_s: float,
@@ -518,6 +518,7 @@ class SessionMoves:
         ranges: npt.NDArray[np.int64],
         before: npt.NDArray[np.int64],
         unresolved: FloatArray,
+        leans: FloatArray,
     ) -> SessionMoves: ...
 
 @final
@@ -601,6 +602,7 @@ class SessionFit:
     @property
     def tails(self) -> FloatArray: ...
     def whitening(self) -> FloatArray: ...
+    def moves_over_predicted(self) -> FloatArray: ...
     def columns(self, force: FloatArray | None, rate: FloatArray | None) -> FloatArray: ...
     def evidence(
         self, hypotheses: Sequence[_Asked], strengths: Sequence[_Strengths], within: tuple[_Pair, _Pair, _Pair]

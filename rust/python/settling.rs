@@ -1,11 +1,12 @@
 //! Binding of supports that settle.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use nalgebra::Vector3;
+use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3, matrix3};
 use super::ranges::ranges_within;
-use crate::settling::{self, Poses};
+use crate::settling::{self, PoseMotion, Poses};
 use crate::time_errors;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -14,32 +15,38 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 type Matrix<'py> = PyReadonlyArray2<'py, f64>;
+/// Of every pose, at both ends.
+type Ends<'py> = Bound<'py, PyArray3<f64>>;
+type Moving<'py> = (f64, f64, Ends<'py>, Ends<'py>, Bound<'py, PyArray2<f64>>);
 
-/// Score of settling beside scatter, its rate at the start of poses, rad/s, its time constant, s, and the score of a bias
-/// that settles; `None` with fewer poses than `fewest`. Gyro first: `readings` `(n, 3)`, `scale` `(3, 3)`, `noise` `(h, 3)`; `up` `(h, 3)`, `spans`
-/// `(h, 2)`.
+/// Score of settling beside scatter, the score of a bias that settles, and of every pose: mean rate by motion with its
+/// variance `(h, 2, 3)`, change of the vertical from the mean to both edges `(h, 2, 3)`, variance of that rotation
+/// `(h, 2)`. `None` with fewer poses than `fewest`. Gyro first: `readings` `(n, 3)`, `scale` `(3, 3)`, `noise`
+/// `(h, 3)` white; `up` `(h, 3)`; `spans` `(h, 2)` of the poses, then from the end of the move before to the beginning of
+/// the next.
 #[pyfunction]
 #[pyo3(signature = (readings, scale, noise, up, spans, *, gravity_m_s2, step_s, fewest))]
 #[expect(
     clippy::too_many_arguments,
     reason = "two sensors and their poses by name"
 )]
-fn settling_of_poses(
-    py: Python<'_>,
-    readings: [Matrix<'_>; 2],
-    scale: [Matrix<'_>; 2],
-    noise: [Matrix<'_>; 2],
-    up: Matrix<'_>,
-    spans: PyReadonlyArray2<'_, i64>,
+fn settling_of_poses<'py>(
+    py: Python<'py>,
+    readings: [Matrix<'py>; 2],
+    scale: [Matrix<'py>; 2],
+    noise: [Matrix<'py>; 2],
+    up: Matrix<'py>,
+    spans: [PyReadonlyArray2<'_, i64>; 2],
     gravity_m_s2: f64,
     step_s: f64,
     fewest: usize,
-) -> PyResult<Option<(f64, f64, f64, f64)>> {
+) -> PyResult<Option<Moving<'py>>> {
     let [rate, force] = [flat3("rate", &readings[0])?, flat3("force", &readings[1])?];
     let [of_rate, of_force] = [flat3("noise", &noise[0])?, flat3("noise", &noise[1])?];
     let up = flat3("up", &up)?;
     let scale = [matrix3("S", &scale[0])?, matrix3("S", &scale[1])?];
-    let spans = ranges_within(&spans, rate.len().min(force.len()) / 3)?;
+    let n = rate.len().min(force.len()) / 3;
+    let [spans, edges] = [ranges_within(&spans[0], n)?, ranges_within(&spans[1], n)?];
     let found = super::run(py, || {
         let poses = Poses {
             readings: [as_rows(&rate), as_rows(&force)],
@@ -47,12 +54,33 @@ fn settling_of_poses(
             noise: [as_rows(&of_rate), as_rows(&of_force)],
             up: as_rows(&up),
             spans: &spans,
+            edges: &edges,
             gravity: gravity_m_s2,
             step: step_s,
         };
         settling::settling(&poses, fewest)
     })?;
-    Ok(found.map(|one| (one.score, one.rate, one.tau, one.of_bias)))
+    let Some(found) = found else { return Ok(None) };
+    let of_poses = |of: fn(&PoseMotion) -> [Vector3<f64>; 2]| {
+        let flat: Vec<f64> = found
+            .motion
+            .iter()
+            .flat_map(|one| of(one).into_iter().flat_map(<[f64; 3]>::from))
+            .collect();
+        flat.to_pyarray(py).reshape([found.motion.len(), 2, 3])
+    };
+    let variance: Vec<f64> = found
+        .motion
+        .iter()
+        .flat_map(|one| one.edge_variance)
+        .collect();
+    Ok(Some((
+        found.score,
+        found.of_bias,
+        of_poses(|one| one.rate)?,
+        of_poses(|one| one.leans)?,
+        variance.to_pyarray(py).reshape([found.motion.len(), 2])?,
+    )))
 }
 
 /// Variance of the sampling instants about `time_s` `(n,)` [s²], its standard error, and the number of samples that

@@ -168,7 +168,7 @@ impl Session {
             rate_scale: state.rate_scale,
             pose_rate_bias: of_poses(&state.pose_rate_bias, &state.own[1]),
             pose_force_bias: of_poses(&state.pose_force_bias, &state.own[0]),
-            up: [state.up[i], state.up[j]],
+            up: [0, 1].map(|end| (state.up[i + end] + one.leans[end]).normalize()),
             plane,
             force_effect: part(effects.force.as_ref()),
             rate_effect: part(effects.rate.as_ref()),

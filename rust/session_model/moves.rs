@@ -40,6 +40,8 @@ pub struct Move {
     /// Variance of the integrals of force and rate, (raw unit · s)², from motion faster than the samples; then from
     /// rounding, slow noise and poses that turn at their ends.
     pub unresolved: [Vector3<f64>; 4],
+    /// Change of the vertical from the means of the poses before and after to its own ends.
+    pub leans: [Vector3<f64>; 2],
     /// Steps over lost samples.
     pub gaps: Vec<Gap>,
     /// Index of its first sample among the points of all moves.
@@ -94,6 +96,7 @@ impl Move {
             rate,
             force,
             unresolved,
+            leans: [Vector3::zeros(); 2],
             first_point,
         }
     }
@@ -141,7 +144,7 @@ pub struct MoveModel<'a> {
     pub pose_rate_bias: PoseBiases,
     /// Raw biases of the accelerometer there.
     pub pose_force_bias: PoseBiases,
-    /// Verticals there.
+    /// Verticals at both ends of the move.
     pub up: [Vector3<f64>; 2],
     /// Plane in which the vertical after is compared.
     pub plane: Matrix3x2<f64>,

@@ -21,7 +21,6 @@ from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
-from trihedron.diagnose.residuals.settling import settling, with_settling
 from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import search, threshold
@@ -139,7 +138,7 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
     notify(0.05, "fitting the session")
-    predicted, settles = _with_settling(tune_noise(obs, start, prior), start, alpha)
+    predicted, settles = _on_support(tune_noise(obs, start, prior), start, alpha)
     context = Context(predicted)
     notify(0.2, "looking at the samples")
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
@@ -168,17 +167,17 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
 
 
-def _with_settling(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:
-    """The fit, with the noise of static rates and moves widened where poses settle (eq. 8.7f); and the domains in which
-    a bias settles inside the poses, with p-values: the noise of their means had absorbed it."""
-    context = Context(predicted)
-    biases = [one for one in predicted.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
+def _on_support(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:
+    """The fit, with the motion of a support that yields (eq. 8.7f); and the domains in which a bias settles inside the
+    poses, with p-values: the noise of their means had absorbed it."""
+    obs, state = predicted.obs, predicted.state
+    biases = [one for one in obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
     shown: dict[Domain, float] = {"within-static": biases[0].numbers["p_value"]} if biases else {}
-    found, limit = settling(context), threshold(alpha)
-    if found is not None and found.of_bias >= limit:
-        shown["static-gyro"] = math.exp(-0.5 * found.of_bias)
-    elif found is not None and found.score >= limit:
-        predicted = tune_noise(with_settling(context, found), start, predicted.prior)
+    support = obs.support_seen(state)
+    if support is not None and support.of_bias >= threshold(alpha):
+        shown["static-gyro"] = math.exp(-0.5 * support.of_bias)
+    elif support is not None and support.yields:
+        predicted = tune_noise(obs.on(support, state.gyro_S), start, predicted.prior)
     return predicted, shown
 
 

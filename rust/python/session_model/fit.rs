@@ -15,8 +15,9 @@ use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
-use crate::session_model::Session;
 use crate::session_model::fit::Fit;
+use crate::session_model::move_rows::Weights;
+use crate::session_model::{Session, Strengths};
 
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// `S_a`, `b_a`, `S_w`, covariance.
@@ -170,6 +171,21 @@ impl SessionFit {
             .collect();
         flat.to_pyarray(py)
             .reshape([self.fit.weights.white.len(), 5, 5])
+    }
+
+    /// `(moves, 5)` residuals of the moves, whitened by the noise that was predicted for them before it was widened.
+    fn moves_over_predicted<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let strengths = Strengths {
+            excess: [1.0; 2],
+            ..self.fit.strengths
+        };
+        let passed = &self.fit.passed;
+        let weights = run(py, || Weights::gaussian(passed, &strengths))?;
+        let each = passed.iter().zip(&weights.white);
+        let flat: Vec<f64> = each
+            .flat_map(|(one, white)| (white * one.carried.residual).as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py).reshape([passed.len(), 5])
     }
 
     /// `(rows, k)` whitened change of every row per parameter of further effects.

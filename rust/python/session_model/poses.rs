@@ -84,9 +84,11 @@ pub(super) struct SessionMoves {
 impl SessionMoves {
     /// `pose_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges`
     /// `(m, 2)` of samples, the pose `before` `(m,)` each, `unresolved` `(m, 4, 3)` variances of their integrals: of force
-    /// and rate by motion faster than the samples, then by anything else beside white noise.
+    /// and rate by motion faster than the samples, then by anything else beside white noise. `leans` `(h, 2, 3)` are the
+    /// changes of the vertical from the mean of every pose to its beginning and to its end.
     #[new]
-    #[pyo3(signature = (*, pose_time_s, time_s, force, rate, ranges, before, unresolved))]
+    #[pyo3(signature = (*, pose_time_s, time_s, force, rate, ranges, before, unresolved, leans))]
+    #[expect(clippy::too_many_arguments, reason = "a session's moves by name")]
     fn new(
         pose_time_s: Array1<'_>,
         time_s: Array1<'_>,
@@ -95,8 +97,9 @@ impl SessionMoves {
         ranges: PyReadonlyArray2<'_, i64>,
         before: PyReadonlyArray1<'_, i64>,
         unresolved: Array3<'_>,
+        leans: Array3<'_>,
     ) -> PyResult<Self> {
-        let moves = moves_of(
+        let mut moves = moves_of(
             &samples(&time_s),
             &samples(&pose_time_s),
             &force,
@@ -105,6 +108,14 @@ impl SessionMoves {
             &before,
             &unresolved,
         )?;
+        if leans.shape() != [pose_time_s.as_array().len(), 2, 3] {
+            return Err(PyValueError::new_err("every pose leans at both ends"));
+        }
+        let leans = leans.as_array();
+        let leaning = |pose: usize, end: usize| Vector3::from_fn(|i, _| leans[[pose, end, i]]);
+        for one in &mut moves {
+            one.leans = [leaning(one.before, 1), leaning(one.before + 1, 0)];
+        }
         Ok(Self {
             moves: Arc::new(moves),
         })

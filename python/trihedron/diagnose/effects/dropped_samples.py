@@ -55,7 +55,8 @@ def find_losses(obs: Observations) -> tuple[Loss, ...]:
 
 def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
     """Observations of the recording with samples inserted."""
-    return replace(observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging), jitter_s=obs.jitter_s)
+    made = observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging)
+    return replace(made if obs.support is None else made.on(*obs.support), jitter_s=obs.jitter_s)
 
 
 def _same_moves(obs: Observations, losses: dict[int, int]) -> Observations:

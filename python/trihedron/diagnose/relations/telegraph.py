@@ -37,10 +37,10 @@ def _levels(context: Context, sensor: int, axis: int) -> tuple[FloatArray, float
     error, state, obs = _static_errors(context, sensor), context.fitted.state, context.obs
     up = state.up
     if sensor:
-        assert obs.pose_rate_noise is not None
+        assert obs.pose_rate_sigma is not None
         reading, seen = error @ np.linalg.inv(context.gyro_axes)[axis], np.ones(len(error))
         known = np.ones((len(error), 1))
-        noise = np.sqrt(obs.pose_rate_noise**2 @ state.gyro_S[axis] ** 2)
+        noise = np.sqrt(obs.pose_rate_sigma**2 @ state.gyro_S[axis] ** 2)
     else:
         # Gravity shows the component along the vertical only, less what S and b take of it.
         reading, seen = np.einsum("ni,ni->n", up, error), up @ context.accel_axes[:, axis]

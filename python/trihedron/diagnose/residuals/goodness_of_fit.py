@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray, rms_of
@@ -42,27 +41,16 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         dof = float((1.0 - used[rows]).sum())
         if dof < LEAST_DOF:
             continue
-        # The noise of moves was widened to their residuals: the test uses the noise predicted before.
-        excess = dict(zip((MOVES, DYNAMICS), fitted.core.strengths[3], strict=True)).get(label, 1.0)
-        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * excess**2
+        residual = fitted.system.residual[rows]
+        if label in (MOVES, DYNAMICS):
+            # The noise of moves was widened to their residuals: the test uses the noise predicted before.
+            residual = fitted.core.moves_over_predicted()[:, slice(0, 2) if label == MOVES else slice(2, 5)]
+        chi2 = float((residual**2).sum())
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
         limit, where = f_upper(dof, NOISE_DOF, share), locate(fitted, label) if p < share else Where()
         tests.append(DomainTest(name, per_dof, dof, p, p < share, where, physical[label], ROW_UNITS[label], limit))
     return tuple(tests)
-
-
-def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArray:
-    """(rows,) factors that restore residuals of static rates over their own noise, without the settling added to it."""
-    obs, system = fitted.obs, fitted.system
-    noise, spread = obs.pose_rate_noise, obs.pose_rate_sigma
-    out = np.ones(int(np.count_nonzero(rows)))
-    if label != STATIC_GYRO or obs.pose_settling is None or noise is None or spread is None:
-        return out
-    direct = system.walk[rows] == 0
-    ratio = spread / noise
-    out[direct] = ratio[system.segment[rows][direct], system.channel[rows][direct]]
-    return out
 
 
 AT_END = 1.01

@@ -15,9 +15,10 @@ from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
-from trihedron.session.model import Prior, SessionReadings
+from trihedron.session.model import Prior, SessionReadings, SessionState
 from trihedron.session.noise import along_gradient, measure_noise
 from trihedron.session.static_lines import means_beside_lines
+from trihedron.session.support import Support, support_of
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
@@ -38,8 +39,7 @@ class Observations(SessionReadings):
     disturbed intervals of poses, s.
     ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
     rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
-    ``pose_settling`` (h, 3), where detected: error of the mean rate by settling (one sigma, raw units), included in
-    ``pose_rate_sigma``.
+    ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
     ``averaging`` is the share of the sample interval that the sensors average over (0 to 1).
     """
 
@@ -54,7 +54,7 @@ class Observations(SessionReadings):
     jitter_s: float = 0.0
     disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
-    pose_settling: FloatArray | None = None
+    support: tuple[Support, FloatArray] | None = None
     averaging: float = 0.0
 
     @property
@@ -90,12 +90,23 @@ class Observations(SessionReadings):
         root = np.sqrt(self.recording.rate_hz)
         return tuple(raw / (density * root) for raw, density in pairs if raw is not None and density is not None)
 
-    @property
-    def pose_rate_noise(self) -> FloatArray | None:
-        """(h, 3) standard errors of the gyro's means without settling."""
-        if self.pose_rate_sigma is None or self.pose_settling is None:
-            return self.pose_rate_sigma
-        return np.sqrt(self.pose_rate_sigma**2 - self.pose_settling**2)
+    def support_seen(self, state: SessionState) -> Support | None:
+        """Motion of the support inside the poses; ``None`` without a gyro, or with few poses."""
+        moves = [(int(pose), *edges) for pose, edges in zip(self.move_poses[:, 0], self.move_ranges, strict=True)]
+        near = state.gyro_S, state.accel_S, state.up
+        return support_of(self.recording, self.segments.poses, moves, self, near, state.gravity)
+
+    def on(self, support: Support, gyro_S: FloatArray) -> Observations:
+        """The observations with poses that a yielding support rotates."""
+        if self.pose_rate is None or self.pose_rate_sigma is None:
+            return self
+        unresolved = {pair: own.copy() for pair, own in self.unresolved.items()}
+        for (before, _), own in unresolved.items():
+            own[3] += support.turns(before, gyro_S)
+        pose_rate, sigma = support.static_rate(self.pose_rate, self.pose_rate_sigma, gyro_S)
+        return replace(
+            self, unresolved=unresolved, pose_rate=pose_rate, pose_rate_sigma=sigma, support=(support, gyro_S)
+        )
 
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the norm of gravity, SI, whose gradient by the raw means is ``gradient`` (h, 3)."""
@@ -147,6 +158,7 @@ class Observations(SessionReadings):
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
             unresolved=np.array(unresolved).reshape(-1, 4, 3),
+            leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
         )
 
 

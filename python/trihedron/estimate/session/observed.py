@@ -14,9 +14,13 @@ from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
 from trihedron.session.rounding import UNIFORM
+from trihedron.session.support import support_of
+from trihedron.transforms import directions_of
 
 DELAY_S = 0.005
 """Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
+Near = tuple[FloatArray, FloatArray, FloatArray]
+"""Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
 HELD = 1e-10
 """Relative prior σ of a given accelerometer: far below any noise, and above rounding errors in the rows."""
 
@@ -55,10 +59,12 @@ class Observed(SessionReadings):
 
 
 def arranged(
-    recording: Recording, segments: Segments, measured: MoveMeasurements, gravity_m_s2: float, used: BoolArray
-) -> Observed:
+    recording: Recording, segments: Segments, measured: MoveMeasurements, gravity_m_s2: float, used: BoolArray,
+    near: Near,
+) -> Observed:  # fmt: skip
     """Arrange the poses and the moves ``used`` (m,) for the core; one static sample on either side brackets a move."""
     assert recording.accelerometer is not None
+    assert recording.gyroscope is not None
     n = recording.n_samples
     force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
     rows = measured.rows
@@ -99,6 +105,15 @@ def arranged(
     edges, moves_before = np.array(ranges, dtype=np.int64), np.array(before, dtype=np.int64)
     kept = np.concatenate([np.arange(a, b) for a, b in ranges])
     effects = _effects(recording, measured, readings, edges, kept)
+    pose_rate, leans = np.where(is_coarse, measured.bias, measured.bias_read), np.zeros((len(pose_time_s), 2, 3))
+    up = directions_of(measured.reading @ near[0].T + near[1])
+    edges_of = [(pose, int(rows[a]), int(rows[b - 1]) + 1) for pose, (a, b) in zip(before, ranges, strict=True)]
+    support = support_of(recording, segments.poses, edges_of, noise, (near[2], near[0], up), gravity_m_s2)
+    if support is not None and support.yields:
+        pose_rate, own["pose_rate_sigma"] = support.static_rate(pose_rate, own["pose_rate_sigma"], near[2])
+        leans = support.leans
+        for of_move, pose in zip(unresolved, before, strict=True):
+            of_move[3] += support.turns(pose, near[2])
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
@@ -107,11 +122,12 @@ def arranged(
         ranges=edges,
         before=moves_before,
         unresolved=unresolved,
+        leans=leans,
     )
     return Observed(
         **(vars(noise) | own), gravity_m_s2=gravity_m_s2, force_origin=force_origin, rate_origin=rate_origin,
         pose_time_s=pose_time_s, pose_force=measured.reading - force_origin,
-        pose_rate=np.where(is_coarse, measured.bias, measured.bias_read) - rate_origin, moves=moves,
+        pose_rate=pose_rate - rate_origin, moves=moves,
         before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
         force_effect=effects[0], rate_effect=effects[1],
         effect_sigma=np.array([

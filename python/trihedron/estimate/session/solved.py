@@ -20,8 +20,8 @@ from trihedron.estimate.gyroscope.lost_samples import (
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
-from trihedron.estimate.session.observed import with_prior
-from trihedron.estimate.session.start import Log, Near, begun, is_enough, lower, near_one_another, scale_matrix
+from trihedron.estimate.session.observed import Near, with_prior
+from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 

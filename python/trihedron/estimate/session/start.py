@@ -11,7 +11,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
 from trihedron.estimate.session.fit import are_far, usual_miss
-from trihedron.estimate.session.observed import Observed, arranged, with_prior
+from trihedron.estimate.session.observed import Near, Observed, arranged, with_prior
 from trihedron.quantiles import median
 from trihedron.records import Recording, Segments, SensorCalibration
 from trihedron.sensor_model import reframing
@@ -28,9 +28,6 @@ ROUNDS = 20
 USUAL_RAD = 0.03
 """Tilt error that says nothing of a move yet, while the initial scale is looked for."""
 
-Near = tuple[FloatArray, FloatArray, FloatArray]
-"""Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Log:
@@ -44,7 +41,7 @@ class Log:
 
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
         """The session with the moves ``used`` (m,)."""
-        out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, used)
+        out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, used, near)
         return with_prior(out, *near, is_given=self.is_given)
 
     def anchors_s(self, measured: MoveMeasurements) -> FloatArray:

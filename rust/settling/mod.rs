@@ -1,11 +1,15 @@
 //! Static rates caused by motion: a soft support rotates the sensor, and gravity shows it (docs/diagnosis-method.md,
 //! 8.7d).
 
+mod motion;
+
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::order_statistics::median;
+use crate::order_statistics::{median, quantile};
+pub use motion::PoseMotion;
+use motion::{Seen, motions, seen};
 
 /// Parts of a pose whose means separate a rate that decays from a constant one.
 const N_BLOCKS: usize = 6;
@@ -15,6 +19,9 @@ const SETTLES_S: [f64; 4] = [0.7, 1.4, 2.8, 5.6];
 const N_SIZES: usize = 31;
 const SMALLEST: f64 = 0.1;
 const LARGEST: f64 = 1e4;
+/// Quantile over the poses at which they are quiet, and that of the size of a standard normal variable.
+const QUIET: f64 = 0.3;
+const QUIET_NORMAL: f64 = 0.385_320_466;
 /// Variance of a tilt about the vertical, of the largest, that is rounding.
 const LEVEL: f64 = 1e-9;
 
@@ -25,12 +32,14 @@ pub struct Poses<'a> {
     pub readings: [&'a [[f64; 3]]; 2],
     /// SI per raw unit of both.
     pub scale: [Matrix3<f64>; 2],
-    /// Standard errors of the means of every pose, of both.
+    /// Standard errors of the means of every pose by white noise, of both.
     pub noise: [&'a [[f64; 3]]; 2],
     /// Vertical in the body.
     pub up: &'a [[f64; 3]],
     /// Ranges of the samples.
     pub spans: &'a [[usize; 2]],
+    /// Sample at which the move before ends, and that at which the move after begins.
+    pub edges: &'a [[usize; 2]],
     /// Gravity, m/s².
     pub gravity: f64,
     /// Sample interval, s.
@@ -38,16 +47,14 @@ pub struct Poses<'a> {
 }
 
 /// Settling beside scatter.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Settling {
     /// Twice the log-likelihood that it gains over scatter, less the cost of the time constants tried.
     pub score: f64,
-    /// Standard deviation of the settling rate at the start of poses, rad/s.
-    pub rate: f64,
-    /// Time constant, s.
-    pub tau: f64,
-    /// The same score of a bias that settles, which does not tilt the sensor, over scatter and over a support.
+    /// The same score of a bias that settles, or that by which gravity prefers it to a rotation, whichever is less.
     pub of_bias: f64,
+    /// Motion of every pose.
+    pub motion: Vec<PoseMotion>,
 }
 
 /// One pose at one time constant: information on scatter and settling, each a vector `(6)`, what the readings say of
@@ -80,14 +87,12 @@ struct Parts {
 /// `BadInput` when lengths differ.
 pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     let n = poses.spans.len();
-    if poses.up.len() != n || poses.noise.iter().any(|one| one.len() != n) {
+    if poses.up.len() != n || poses.edges.len() != n || poses.noise.iter().any(|one| one.len() != n)
+    {
         return Err(Error::bad_input("every pose has a vertical and noise"));
     }
-    let is_long = |&i: &usize| poses.spans[i][1] - poses.spans[i][0] >= 2 * N_BLOCKS;
-    let all: Vec<Parts> = (0..n)
-        .filter(is_long)
-        .filter_map(|i| parts(poses, i))
-        .collect();
+    let colour = [0, 1].map(|sensor| colour(poses, sensor));
+    let all: Vec<Parts> = (0..n).filter_map(|i| parts(poses, i, &colour)).collect();
     if all.len() < fewest {
         return Ok(None);
     }
@@ -129,17 +134,45 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
         return Ok(None);
     };
     let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
+    let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i, &colour)).collect();
+    let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
         score: score(support.0, scatter),
-        rate: support.1,
-        tau: support.2,
-        of_bias: score(bias.0, scatter.max(support.0)),
+        of_bias: score(bias.0, scatter).min(2.0 * of_bias),
+        motion: motions(poses, seen, support.1, support.2),
     }))
 }
 
+/// Ratio of slow to white noise in the quiet poses of a session, axis by axis: slow noise is in all poses alike, a motion
+/// is larger in some. From the difference between the halves of a pose.
+fn colour(poses: &Poses<'_>, sensor: usize) -> Vector3<f64> {
+    let half = |i: usize, first: usize, last: usize| {
+        let n = (last - first) / 2;
+        let means = [first, last - n].map(|start| mean(&poses.readings[sensor][start..start + n]));
+        let noise = Vector3::from(poses.noise[sensor][i]);
+        (means[1] - means[0]).component_div(&noise).abs() / 2.0
+    };
+    let spans = poses.spans.iter().enumerate();
+    let seen: Vec<Vector3<f64>> = spans
+        .filter(|(_, span)| span[1] >= span[0] + 2 * N_BLOCKS)
+        .map(|(i, span)| half(i, span[0], span[1]))
+        .filter(|change| change.iter().all(|value| value.is_finite()))
+        .collect();
+    Vector3::from_fn(|axis, _| {
+        let mut of_axis: Vec<f64> = seen.iter().map(|change| change[axis]).collect();
+        if of_axis.is_empty() {
+            return 1.0;
+        }
+        (quantile(&mut of_axis, QUIET) / QUIET_NORMAL).max(1.0)
+    })
+}
+
 /// `None` where readings are missing, or have no noise.
-fn parts(poses: &Poses<'_>, i: usize) -> Option<Parts> {
+fn parts(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> Option<Parts> {
     let [first, last] = poses.spans[i];
+    if last < first + 2 * N_BLOCKS {
+        return None;
+    }
     let n = (last - first) / N_BLOCKS;
     let means = |sensor: usize| -> [Vector3<f64>; N_BLOCKS] {
         std::array::from_fn(|block| {
@@ -149,12 +182,12 @@ fn parts(poses: &Poses<'_>, i: usize) -> Option<Parts> {
     };
     // Covariance of the mean of a part.
     let spread = |sensor: usize| {
-        let noise = Vector3::from(poses.noise[sensor][i]);
+        let noise = Vector3::from(poses.noise[sensor][i]).component_mul(&colour[sensor]);
         let own = poses.scale[sensor] * Matrix3::from_diagonal(&noise);
         own * own.transpose() * N_BLOCKS as f64
     };
     let up = Vector3::from(poses.up[i]);
-    // A change of the force turns the vertical across it; its white noise is that of the quiet floor.
+    // A change of the force turns the vertical across it.
     let turning = -up.cross_matrix() / poses.gravity;
     let of_tilt = turning * spread(1) * turning.transpose();
     let (rates, forces) = (means(0), means(1));

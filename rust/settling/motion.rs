@@ -1,0 +1,149 @@
+//! Rotation of the sensor inside its poses: mean rate by gravity, shape by the gyro (docs/diagnosis-method.md, 8.7f).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{N_BLOCKS, Poses, mean};
+
+/// Rotation of the sensor inside one pose.
+#[derive(Debug, Clone, Copy)]
+pub struct PoseMotion {
+    /// Mean rate, rad/s, and its variance.
+    pub rate: [Vector3<f64>; 2],
+    /// Change of the vertical from the mean over the pose to the end of the move before and to the beginning of the next.
+    pub leans: [Vector3<f64>; 2],
+    /// Variance of the rotation from the mean to either, rad².
+    pub edge_variance: [f64; 2],
+}
+
+/// What the readings of one pose say of its motion: mean rate across the vertical by gravity, rad/s; rotation from the
+/// mean to the edges beyond that of an even rate, rad, by the gyro; their error variances.
+pub(super) struct Seen {
+    rate: Vector3<f64>,
+    curve: [Vector3<f64>; 2],
+    variance: [f64; 2],
+    /// Log-likelihood by which gravity prefers changes of the bias to a rotation as the cause of the gyro's curve.
+    pub of_bias: f64,
+}
+
+/// Motion of all poses where the rate at their beginning has a variance and decays with a time constant.
+pub(super) fn motions(
+    poses: &Poses<'_>,
+    seen: Vec<Option<Seen>>,
+    spread: f64,
+    tau: f64,
+) -> Vec<PoseMotion> {
+    // Of a curve across the vertical: whatever its shape.
+    let excess = seen.iter().flatten().map(|one| {
+        let squares: f64 = one.curve.iter().map(Vector3::norm_squared).sum();
+        0.25 * squares - one.variance[1]
+    });
+    let of_curve = (excess.sum::<f64>() / seen.iter().flatten().count().max(1) as f64).max(0.0);
+    let each = seen.into_iter().enumerate();
+    each.map(|(i, seen)| {
+        let [first, last] = poses.spans[i];
+        let lasts = last.saturating_sub(first).max(1) as f64 * poses.step;
+        let of_rate = (spread * tau * (1.0 - (-lasts / tau).exp()) / lasts).powi(2);
+        // A pose without readings has the motion of any.
+        let seen = seen.unwrap_or(Seen {
+            rate: Vector3::zeros(),
+            curve: [Vector3::zeros(); 2],
+            variance: [f64::INFINITY; 2],
+            of_bias: 0.0,
+        });
+        let share = |prior: f64, k: usize| prior / (prior + seen.variance[k]);
+        let (rate, curve) = (share(of_rate, 0), share(of_curve, 1));
+        let left = [of_rate * (1.0 - rate), of_curve * (1.0 - curve)];
+        let turned = seen.rate * rate;
+        // Time from the middle of the pose, s.
+        let at = poses.edges[i].map(|k| {
+            (k.clamp(first, last.max(first)) as f64 - first as f64) * poses.step - 0.5 * lasts
+        });
+        let up = Vector3::from(poses.up[i]);
+        // About the vertical, which gravity does not show, all of it is left.
+        let about = up.component_mul(&up);
+        PoseMotion {
+            rate: [
+                turned,
+                about * of_rate + (Vector3::repeat(1.0) - about) * left[0],
+            ],
+            leans: [0, 1].map(|k| up.cross(&(turned * at[k] + seen.curve[k] * curve))),
+            edge_variance: at.map(|at| left[0] * at * at + left[1]),
+        }
+    })
+    .collect()
+}
+
+/// `None` where readings are missing, or have no noise.
+pub(super) fn seen(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> Option<Seen> {
+    let [first, last] = poses.spans[i];
+    let n = last.checked_sub(first).filter(|n| *n >= 2 * N_BLOCKS)?;
+    let up = Vector3::from(poses.up[i]);
+    let across = Matrix3::identity() - up * up.transpose();
+    let turning = -up.cross_matrix() / poses.gravity * poses.scale[1];
+    let [of_rate, of_tilt] = [0, 1].map(|sensor| {
+        let noise = Vector3::from(poses.noise[sensor][i]).component_mul(&colour[sensor]);
+        let by = if sensor == 0 {
+            across * poses.scale[0]
+        } else {
+            turning
+        };
+        0.5 * (by * Matrix3::from_diagonal(&noise)).norm_squared()
+    });
+    let [rates, forces] = poses.readings.map(|readings| &readings[first..last]);
+    let mean_rate = mean(rates);
+    let (mut turned, mut sum, mut slope) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+    let mut parts = [[Vector3::zeros(); 2]; N_BLOCKS];
+    let edges = poses.edges[i].map(|k| k.clamp(first, last - 1) - first);
+    let mut at_edges = [Vector3::zeros(); 2];
+    for (k, (rate, force)) in rates.iter().zip(forces).enumerate() {
+        // Rotation to the middle of the sample, beyond that at the mean rate.
+        let step = (Vector3::from(*rate) - mean_rate) * poses.step;
+        let here = across * poses.scale[0] * (turned + 0.5 * step);
+        turned += step;
+        sum += here;
+        for (at_edge, edge) in at_edges.iter_mut().zip(edges) {
+            if k == edge {
+                *at_edge = here;
+            }
+        }
+        // Gravity shows the rotation at the mean rate beside it.
+        let at = k as f64 - 0.5 * (n as f64 - 1.0);
+        let tilt = turning * Vector3::from(*force);
+        slope += (tilt - here) * at;
+        let part = &mut parts[(k * N_BLOCKS / n).min(N_BLOCKS - 1)];
+        part[0] += tilt;
+        part[1] += tilt - here;
+    }
+    let [as_bias, as_motion] =
+        [0, 1].map(|of| bends(&parts.map(|part| part[of] * (N_BLOCKS as f64 / n as f64))));
+    let lasts = n as f64 * poses.step;
+    let rate = slope * (12.0 / ((n as f64).powi(3) * poses.step));
+    let curve = at_edges.map(|here| here - sum / n as f64);
+    (rate + curve[0])
+        .iter()
+        .all(|value| value.is_finite())
+        .then_some(Seen {
+            rate,
+            curve,
+            variance: [
+                12.0 * of_tilt / (lasts * lasts) + 0.2 * of_rate,
+                of_rate * lasts * lasts / 12.0,
+            ],
+            of_bias: 0.5 * (as_motion - as_bias) / (N_BLOCKS as f64 * of_tilt),
+        })
+}
+
+/// Sum of squares of the parts of a pose about a straight line.
+fn bends(parts: &[Vector3<f64>; N_BLOCKS]) -> f64 {
+    let at = |k: usize| k as f64 - 0.5 * (N_BLOCKS as f64 - 1.0);
+    let mean = parts.iter().sum::<Vector3<f64>>() / N_BLOCKS as f64;
+    let spread: f64 = (0..N_BLOCKS).map(|k| at(k) * at(k)).sum();
+    let slope: Vector3<f64> = parts
+        .iter()
+        .enumerate()
+        .map(|(k, part)| part * (at(k) / spread))
+        .sum();
+    let each = parts.iter().enumerate();
+    each.map(|(k, part)| (part - mean - slope * at(k)).norm_squared())
+        .sum()
+}
