@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, FloatArray, IntArray
+from trihedron.arrays import AXES, TINY, FloatArray, IntArray, rms_of
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.accepted import effect_record, tried_candidate
 from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths
@@ -256,7 +256,7 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
     chi2 = float(np.mean(z**2))
     p = float(np.exp(-1.5 * max(chi2 - 1.0, 0.0))) if is_named else 1.0
     where = Where(("ag"[sensor] + AXES[int(z.std(axis=0).argmax())],)) if is_named else Where()
-    rms = float(np.sqrt(np.mean(x**2)))
+    rms = rms_of(x)
     disagrees = p < FALSE_ALARM / N_DOMAINS_TESTED
     return DomainTest(DOMAINS[sensor], chi2, float(x.size), p, disagrees, where, rms, unit)
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray, rms_of
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.calibration_charts import (
@@ -56,7 +56,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     before = mm_s2(uncalibrated_error(calibration, means))
     after = mm_s2(_unseen(quality))
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
-    noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
+    noise = rms_of(mm_s2(quality.sigma))
     marks: list[Mark] = [*lines]
     marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     worst = [f.numbers["worst_prediction_g"] for f in calibration.findings if "worst_prediction_g" in f.numbers]

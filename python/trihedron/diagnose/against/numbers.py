@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron.arrays import AXES, TINY, FloatArray, rms_of
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import chdtri, fdtrc
@@ -213,7 +213,7 @@ def _never_added(
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
     is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, NO_BIAS)
-    would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
+    would_show = bool(np.all(sigma < WOULD_SHOW * rms_of(recording)))
     name = "accelerometer" if prefix == "accel" else "gyro"
     return words("biases-never-added", sensor=name) if is_none and would_show else ""
 

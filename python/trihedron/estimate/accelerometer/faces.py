@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import probability
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.estimate.accelerometer import face_poses, verdict
 from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
@@ -196,12 +196,12 @@ def _quality(seen: _Faces, estimate: _Estimate, is_face: BoolArray, apart: Float
         sigma=sigma,
         chi2=estimate.chi2_noise,
         dof=dof,
-        rms=float(np.sqrt(np.mean(in_m_s2**2))),
+        rms=rms_of(in_m_s2),
         rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / dof)) if dof > 0 else float("nan"),
         floor=float(np.sqrt(floor)),
         held_out=apart[:, 0],
         held_out_sigma=apart[:, 1],
-        held_out_rms=float(np.sqrt(np.mean(apart[is_held, 0] ** 2))) if is_held.any() else None,
+        held_out_rms=rms_of(apart[is_held, 0]) if is_held.any() else None,
         stopped_because=words("linear-least-squares"),
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
@@ -140,10 +140,10 @@ def gravity_quality(
         dof=max(dof, 0),
         rms=float(np.sqrt(total / len(residual))),
         rms_dof=float(np.sqrt(total / dof)) if dof > 0 else float("nan"),
-        floor=float(np.sqrt(np.mean(sigma**2))),
+        floor=rms_of(sigma),
         held_out=None if held is None else held[0],
         held_out_sigma=None if held is None else held[1],
-        held_out_rms=float(np.sqrt(np.mean(known**2))) if known is not None and len(known) else None,
+        held_out_rms=rms_of(known) if known is not None and len(known) else None,
     )
 
 

@@ -93,7 +93,7 @@ def between_intervals(
     return IntervalCheck(
         n=len(poses),
         longest_s=float(apart.max()),
-        bias_change=float(np.sqrt(np.mean(np.diff(bias, axis=0) ** 2))),
+        bias_change=rms_of(np.diff(bias, axis=0)),
         predicted=float(np.sqrt(np.mean(predicted))),
         gravity_spread=float(gravity.std() / gravity.mean()),
     )

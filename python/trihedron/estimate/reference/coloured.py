@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 
 ORDERS = (0, 2, 12)
@@ -151,7 +151,7 @@ def _autoregression(r: FloatArray, index: IntArray, used: BoolArray, order: int)
     """Whitening filter (order + 1,): 1, then minus the coefficients of the lags, divided by the innovation's σ."""
     rows = _with_past(index, used, order)
     if order == 0 or len(rows) < 3 * order:
-        return np.array([1.0 / max(float(np.sqrt(np.mean(r[used] ** 2))), 1e-300)])
+        return np.array([1.0 / max(rms_of(r[used]), 1e-300)])
     past = np.column_stack([r[rows - lag] for lag in range(1, order + 1)])
     phi = _least_squares(past, r[rows])
     sigma = float(np.sqrt(np.sum((r[rows] - past @ phi) ** 2) / max(len(rows) - order, 1)))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, rms_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
@@ -206,4 +206,4 @@ def replay(
         errors.append(float(np.arccos(np.clip((np.trace(off) - 1.0) / 2.0, -1.0, 1.0))))
     if not errors:
         return None
-    return ReplayStage(stage, HORIZON_S, float(np.sqrt(np.mean(np.square(errors)))), len(errors))
+    return ReplayStage(stage, HORIZON_S, rms_of(errors), len(errors))
