@@ -35,6 +35,11 @@ def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     return inverse, -inverse @ b
 
 
+def axis_scales(S: FloatArray) -> FloatArray:
+    """(3,) SI per raw unit of each sensor axis: truth along it over the change of its reading."""
+    return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(S), axis=1), dtype=np.float64)
+
+
 def order_and_reversed(S: FloatArray) -> tuple[list[int], list[int]]:
     """The body axis nearest to each sensor axis, and the sensor axes against theirs; as named where two share one."""
     order = np.argmax(np.abs(S), axis=0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
 from trihedron.channel_facts.quiet import Windows, look
@@ -194,7 +194,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     n = len(power)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
-    ratio = power * centre / np.maximum(level, 1e-300)
+    ratio = power * centre / np.maximum(level, TINY)
     limit = chdtri(count, LINE_CHANCE / n) / count
     # The relative error of the neighbourhood's median is 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)

@@ -18,6 +18,7 @@ from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import TimestampKind
+from trihedron.sensor_model import axis_scales
 
 SHARE = 0.125
 """Share of alpha for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is used for
@@ -76,7 +77,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
         readings, fitted = getattr(recording, sensor), getattr(model, sensor)
         if readings is None or fitted is None:
             continue
-        si = readings / np.linalg.norm(np.linalg.inv(fitted.S), axis=1)
+        si = readings * axis_scales(fitted.S)
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except INPUT_ERRORS:

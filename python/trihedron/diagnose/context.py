@@ -13,6 +13,7 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.sensor_model import axis_scales
 
 TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
@@ -208,7 +209,7 @@ class Context:
     def si_per_raw(self, sensor: int) -> FloatArray:
         """(3,) SI size of one raw unit along each axis of sensor 0 (accelerometer) or 1 (gyro)."""
         state = self.fitted.state
-        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(state.gyro_S if sensor else state.accel_S), axis=1))
+        return axis_scales(state.gyro_S if sensor else state.accel_S)
 
     @cached_property
     def vibration_power(self) -> FloatArray:
@@ -330,7 +331,7 @@ def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:
 
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
-    return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
+    return np.asarray(S / axis_scales(S))
 
 
 def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:

@@ -32,6 +32,7 @@ from trihedron.records import Pose, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
+from trihedron.sensor_model import axis_scales
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.session.model import LOWER, Prior
 from trihedron.transforms import directions_of
@@ -238,7 +239,7 @@ def _of_sensor(effect: AcceptedEffect, sensor: int, unit: str, share: float) -> 
 def _sizes(model: LinearModel, sensor: int) -> FloatArray:
     """(3,) size of a raw unit along every axis, in the model's unit."""
     side = (model.accelerometer, model.gyroscope)[sensor]
-    return np.ones(3) if side is None else np.asarray(1.0 / np.linalg.norm(np.linalg.inv(np.array(side["S"])), axis=1))
+    return np.ones(3) if side is None else axis_scales(np.array(side["S"]))
 
 
 def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:

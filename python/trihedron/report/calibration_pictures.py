@@ -22,6 +22,7 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import pose_lines, signals_picture
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 FEWEST_NAMES = 2
@@ -155,7 +156,7 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: Float
         for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
-    return Chart((Sphere(title, force / np.linalg.norm(force, axis=1)[:, None], values, limit, tips),), legend=False)
+    return Chart((Sphere(title, directions_of(force), values, limit, tips),), legend=False)
 
 
 def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:

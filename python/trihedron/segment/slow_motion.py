@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.quantiles import medians
+from trihedron.quantiles import MAD_TO_SIGMA, medians
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
@@ -46,7 +46,7 @@ def turning_blocks(
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(LEAST_POSE_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
-        scatter = np.maximum(scatter, 1.4826 * medians(nearest))
+        scatter = np.maximum(scatter, MAD_TO_SIGMA * medians(nearest))
     # A few short poses have few independent seconds, among which the shortest interval is too short. No window has a
     # smaller error than the white noise of its blocks.
     inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])

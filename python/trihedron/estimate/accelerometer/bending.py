@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import design_rows, wrt_relative_errors
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.probability import fdtrc
@@ -180,7 +180,7 @@ def shape_of(
         if k == 0 or dof < LEAST_REST:
             continue
         drop = float(np.sum((left_over[:, seen].T @ left) ** 2))
-        of_one = fdtrc(k, dof, (drop / k) / max((float(left @ left) - drop) / dof, 1e-300))
+        of_one = fdtrc(k, dof, (drop / k) / max((float(left @ left) - drop) / dof, TINY))
         chances[name] = float(min(len(SHAPES) * of_one, 1.0))
     p = min(chances.values(), default=1.0)
     if not p < CHANCE:

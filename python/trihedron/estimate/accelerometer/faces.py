@@ -18,6 +18,7 @@ from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
 from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
 METHOD = "faces of the case on a level table"
@@ -177,7 +178,7 @@ def _held_out(seen: _Faces, estimate: _Estimate, widened: KnownFit) -> FloatArra
     residual, covariance, _ = widened.left_out()
     S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
     force = seen.values @ S.T + b
-    along = force / np.linalg.norm(force, axis=1, keepdims=True) @ S
+    along = directions_of(force) @ S
     sigma2 = np.einsum("ni,nij,nj->n", along, covariance, along)
     return np.column_stack([np.einsum("ni,ni->n", along, residual), np.sqrt(sigma2)])
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
@@ -273,7 +273,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     share = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / scale
     rate, axis = (int(k) for k in np.unravel_index(np.argmax(share), (3, 3)))
     weakest = words("gyro-scale" if rate == axis else "gyro-share", axis=axis + 1, rate=rate + 1)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    sigma = np.sqrt(np.maximum(np.diag(covariance), TINY))
     correlation = covariance / np.outer(sigma, sigma)
     pairs = tuple(
         (PARAMETER_NAMES[i], PARAMETER_NAMES[j], float(correlation[i, j]))
@@ -282,7 +282,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
         if abs(correlation[i, j]) > 0.9
     )
     size = max(float(np.linalg.norm(S, 2)), np.finfo(float).tiny)
-    singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 1e-300))
+    singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), TINY))
     # The fit has a prior as wide as the scale: below √2 the moves add less information than the prior.
     rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 from trihedron.records.noise import SpectralLine
@@ -172,6 +172,6 @@ def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, high
     upper = spectrum.frequency_hz > highest_hz / 4.0
     key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9).astype(np.int64)
     count, ratio = spectrum.count[upper], (spectrum.without_line(slope) / expected)[upper]
-    n = np.maximum(np.bincount(key, count), 1e-300)
+    n = np.maximum(np.bincount(key, count), TINY)
     mean = np.bincount(key, count * ratio) / n
     return bool(np.any((n >= 8) & (np.abs(mean - 1.0) > np.maximum(TOLERANCE, 4.5 * np.sqrt(2.0 / n)))))

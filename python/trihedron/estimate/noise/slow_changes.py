@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.session.drift import LEAST_SWING_K
 
 MEANS = 64
@@ -115,8 +115,8 @@ def wave(x: FloatArray, rate_hz: float) -> Wave | None:
         parts /= determinant
         k = int(np.argmax((parts * along).sum(0)))
         constant, left = -float(np.sum(np.log(np.diag(factor)))), float((rest**2).sum())
-        least = max(left - float(parts[:, k] @ along[:, k]), 1e-300)
-        without.append(constant - 0.5 * len(t) * float(np.log(max(left, 1e-300))))
+        least = max(left - float(parts[:, k] @ along[:, k]), TINY)
+        without.append(constant - 0.5 * len(t) * float(np.log(max(left, TINY))))
         tried.append((constant - 0.5 * len(t) * float(np.log(least)), float(CYCLES[k]), *map(float, parts[:, k])))
     best, cycles, cosine_part, sine_part = max(tried)
     rise = 2.0 * (best - max(without))
@@ -128,7 +128,7 @@ def _fitted(white: FloatArray) -> tuple[float, float]:
     weight, _, _, _ = np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)
     left = float(np.sum((white[:, 0] - white[:, 1:] @ weight) ** 2))
     k = len(white)
-    return float(-0.5 * k * np.log(max(left, 1e-300) / k)), float(weight[-1])
+    return float(-0.5 * k * np.log(max(left, TINY) / k)), float(weight[-1])
 
 
 def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequence[float] = ()) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, rms_of
+from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
@@ -79,7 +79,7 @@ def fit_gyroscope(
 
 def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
     p = design.shape[2]
-    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + 1e-300
+    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + TINY
     theta: FloatArray = np.linalg.lstsq((design / scale).reshape(-1, p), target.ravel(), rcond=None)[0]
     return np.asarray(theta / scale)
 

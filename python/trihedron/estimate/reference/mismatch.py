@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray, rms_of
+from trihedron.arrays import TINY, XYZ, FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.likelihood import Problem, most_likely, together
@@ -23,7 +23,7 @@ def share_left(gyro: GyroFit) -> float:
     """Median residual over the median reference rate, of rows that rotate; medians are robust to impacts."""
     turns = gyro.size >= TURNING * rms_of(gyro.size)
     left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
-    return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
+    return float(np.median(left) / max(float(np.median(gyro.size[turns])), TINY))
 
 
 def reject_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:

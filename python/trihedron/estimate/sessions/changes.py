@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
 
@@ -80,7 +80,7 @@ MIN_REST_P = 0.01
 
 def _weight(session: Session, picked: list[int], drift: FloatArray) -> FloatArray:
     covariance = session.covariance[np.ix_(picked, picked)] + np.diag(drift)
-    ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), 1e-300)
+    ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), TINY)
     shrunk = (SPREAD_DOF - 2.0) / SPREAD_DOF
     return np.asarray(shrunk * np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
 
@@ -111,7 +111,7 @@ def _solved(values: FloatArray, weights: FloatArray, column: FloatArray | None) 
 
 
 def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
-    return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), 1e-300)
+    return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), TINY)
 
 
 def _candidates(n: int) -> Iterator[Candidate]:
@@ -143,7 +143,7 @@ def _stands_out(values: FloatArray, weights: FloatArray, column: FloatArray) -> 
     if n < 3:
         return False
     before, after = _left(values, weights, None), _left(values, weights, column)
-    ratio = ((before - after) / k) / max(after / dof, 1e-300)
+    ratio = ((before - after) / k) / max(after / dof, TINY)
     return fdtrc(k, dof, ratio) * len(list(_candidates(n))) < MIN_REST_P
 
 

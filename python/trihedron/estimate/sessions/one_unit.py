@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from trihedron.arrays import TINY
 from trihedron.defaults import FALSE_ALARM
 from trihedron.probability import ndtr
 from trihedron.records.sessions import GEOMETRY, ONE_UNIT, PARAMETERS, Change, Session
@@ -28,7 +29,7 @@ def _beyond_one_unit(sessions: Sequence[Session]) -> set[str]:
     for a, b in pairs:
         for k in fixed:
             away = float(abs(a.numbers[k] - b.numbers[k]))
-            sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], 1e-300)))
+            sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], TINY)))
             if ndtr(-(away - ONE_UNIT) / sigma) * len(pairs) * len(fixed) < FALSE_ALARM:
                 found.add(PARAMETERS[k].id)
     return found

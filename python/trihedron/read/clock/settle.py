@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
 from trihedron.read.clock.rate import steps_of, steps_of_counter
 from trihedron.records import Finding, FindingCode
@@ -51,7 +51,7 @@ def _active(triads: list[FloatArray], n: int) -> list[slice]:
     activity = np.zeros(len(parts))
     for x in triads:
         spread = np.array([_spread(x[p][::16]) for p in parts])
-        activity += spread / max(float(np.median(spread)), 1e-300)
+        activity += spread / max(float(np.median(spread)), TINY)
     return [parts[k] for k in sorted(np.argsort(activity)[::-1][:PARTS])]
 
 
