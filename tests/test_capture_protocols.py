@@ -64,9 +64,13 @@ def sequenced(numbers, modulus, rate_hz=0.0, text=str):
 
 def stream(protocol, declaration, n, rate_hz, faults):
     spoken = declaration if protocol == "declared" else protocol
-    sent = Sent()
-    recording = counts_recording(n, rate_hz)
-    return recording, sent, b"".join(data for _, data in Device(recording, spoken, faults, seed=3).pieces(sent))
+    recording, sent = counts_recording(n, rate_hz), Sent()
+    return recording, sent, sent_as(spoken, recording, faults, sent)
+
+
+def sent_as(spoken, recording, faults=None, sent=None):
+    device = Device(recording, spoken, faults or Faults(), seed=3)
+    return b"".join(data for _, data in device.pieces(sent or Sent()))
 
 
 def decoder_of(name, declaration):
@@ -244,10 +248,6 @@ def still(rate_hz=100.0) -> Recording:
     return Recording(np.arange(N) / rate_hz, force, 0.01 * rng.standard_normal((N, 3)), rate_hz, "m/s^2", "rad/s")
 
 
-def sent_as(board: str, recording: Recording, faults: Faults | None = None) -> bytes:
-    return b"".join(data for _, data in Device(recording, board, faults or Faults(), seed=3).pieces(Sent()))
-
-
 @pytest.mark.parametrize(("board", "force", "rate"), [*STEPS, ("sbg", 1e-6, 1e-8)])
 def test_a_stream_of_a_known_maker_is_recognised_and_keeps_every_reading(board, force, rate, tmp_path):
     recording = still()
@@ -296,8 +296,6 @@ def test_the_lines_of_a_vectornav_are_checked_by_either_checksum(check):
 
 @pytest.mark.parametrize(("status", "per_rad_s"), [(0x3FF, 67108864), (0x7FF, 12304174)])
 def test_counts_of_an_sbg_are_as_large_as_its_status_says(status, per_rad_s):
-    from trihedron.capture.protocols.framing import CHECKSUM_OF
-
     counts = [1048576, -2097152, 9 * 1048576, per_rad_s, -per_rad_s // 2, 0, 6400]
     inner = struct.pack("<BBHIH6ih", 44, 0, 32, 5000, status, *counts)
     message = b"\xff\x5a" + inner + struct.pack("<HB", CHECKSUM_OF["crc16-kermit"](inner), 0x33)

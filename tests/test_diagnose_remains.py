@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 import trihedron
-from diagnosed_session import nearest_pose, simulated, unit_of
+from diagnosed_session import simulated, unit_of, with_scatter
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.context import Context
@@ -193,12 +193,8 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     size = np.radians(0.1)
     flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
     recording = simulate(flawed, 11)[0]
-    # Zeros of the gyro that are others in every pose, in its raw unit.
-    rng = np.random.default_rng(3)
-    poses = trihedron.segment(recording).poses
-    bias = 0.03 * 65.5 * rng.standard_normal((len(poses), 3))
-    rates = recording.gyroscope + bias[nearest_pose(poses, recording.n_samples)]
-    found = trihedron.diagnose(replace(recording, gyroscope=rates), gravity_m_s2=9.80665)
+    moved = with_scatter(recording, trihedron.segment(recording).poses, 0.03 * 65.5)
+    found = trihedron.diagnose(moved, gravity_m_s2=9.80665)
     assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
     assert found.verdict == "missing-physics"
 

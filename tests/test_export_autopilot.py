@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from test_export import export_calibration
+from test_export import export_calibration, given
 from trihedron.api.calibrating import of_board
 from trihedron.cli import main
 from trihedron.files.calibration import calibration_document, calibration_from_document, write_calibration
 from trihedron.files.formats import ExportOptions
 from trihedron.files.formats.autopilot import orientation, parameters_in
-from trihedron.records import Calibration, Onboard, SensorCalibration
+from trihedron.records import Onboard
 
 AXES = "XYZ"
 TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
@@ -76,15 +76,6 @@ def px4(p, raw_accel, raw_gyro, T, accel, gyro, R):
         v = v * [p.get(f"CAL_{word}{k}_{a}SCALE", 1.0) for a in AXES]
         out.append(v @ R.T)
     return out
-
-
-def given(accelerometer, gyroscope, gravity=9.81, raw_unit=None):
-    """A calibration of two pairs (S, b), of readings in SI unless a unit is said."""
-    sensors = [
-        SensorCalibration(S, b, np.zeros((12, 12)), raw_unit or unit, unit, "given")
-        for (S, b), unit in ((accelerometer, "m/s^2"), (gyroscope, "rad/s"))
-    ]
-    return Calibration(*sensors, np.zeros((24, 24)), "case", gravity, "given")
 
 
 def diagonal_in(R, recording, gyro_scale=(1.0, 1.0, 1.0)):

@@ -20,6 +20,7 @@ from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_
 from true_segments import codes, segments_from_truth, z_scores
 
 DEG = math.pi / 180.0
+IN_COUNTS = tuple(map(tuple, np.array(SCALE) * 1e-3))
 
 
 def turns_and_zeros(recording, truth):
@@ -31,8 +32,8 @@ def turns_and_zeros(recording, truth):
     return turns, [(pose.start, pose.stop) for pose in segments.poses]
 
 
-def session(seed=0, S=SCALE, b=BIAS, **motion):
-    gyroscope = Gyroscope(S=S, b=b, noise=NoiseTerms(N=(2e-4,) * 3))
+def session(seed=0, S=SCALE, b=BIAS, unit="rad/s", **motion):
+    gyroscope = Gyroscope(S=S, b=b, unit=unit, noise=NoiseTerms(N=(2e-4,) * 3))
     recording, truth = simulate(Scenario(motion=table_turns(**motion), gyroscope=gyroscope), seed)
     return recording, truth, *turns_and_zeros(recording, truth)
 
@@ -61,11 +62,8 @@ def test_error_bars_cover_the_truth_at_their_stated_rate(monkeypatch):
 
 
 def test_the_manuals_eight_half_turns_in_counts_are_recognised_with_a_nominal_scale_three_per_cent_off():
-    S = tuple(map(tuple, np.array(SCALE) * 1e-3))
-    gyroscope = Gyroscope(S=S, b=BIAS, unit="counts", noise=NoiseTerms(N=(2e-4,) * 3))
-    motion = table_turns(turns_deg=(90.0, -90.0, 360.0, -360.0, 1440.0, -1440.0), speed_deg_s=360.0)
-    recording, truth = simulate(Scenario(motion=motion, gyroscope=gyroscope), 1)
-    turns, zeros = turns_and_zeros(recording, truth)
+    turned = {"turns_deg": (90.0, -90.0, 360.0, -360.0, 1440.0, -1440.0), "speed_deg_s": 360.0}
+    recording, truth, turns, zeros = session(1, IN_COUNTS, unit="counts", **turned)
     found, findings = calibrate_turns(recording, turns, zeros, nominal_scale=1.03e-3)
     assert not findings
     assert np.abs(z_scores(found, truth)).max() < 4.0
@@ -80,9 +78,7 @@ def test_the_manuals_eight_half_turns_in_counts_are_recognised_with_a_nominal_sc
 
 @pytest.mark.parametrize("turn_deg", [90.0, 180.0, 360.0])
 def test_turns_of_unknown_size_in_counts_are_a_question_not_a_common_divisor(turn_deg):
-    gyroscope = Gyroscope(S=tuple(map(tuple, np.array(SCALE) * 1e-3)), b=BIAS, unit="counts")
-    recording, truth = simulate(Scenario(motion=table_turns(turns_deg=(turn_deg, -turn_deg)), gyroscope=gyroscope), 3)
-    turns, zeros = turns_and_zeros(recording, truth)
+    recording, _, turns, zeros = session(3, IN_COUNTS, unit="counts", turns_deg=(turn_deg, -turn_deg))
     with pytest.raises(ValueError, match="90, 180 or 360°"):
         calibrate_turns(recording, turns, zeros)
 

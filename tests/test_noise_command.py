@@ -12,9 +12,10 @@ import pytest
 
 import trihedron
 from noise_coverage import in_time
+from test_export import given
 from trihedron.api.identifying import allan as noise_of
 from trihedron.cli import main
-from trihedron.records import Calibration, Recording, SensorCalibration
+from trihedron.records import Recording
 from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import curve_csv
 from trihedron.units import AccelerationUnit, RateUnit
@@ -131,11 +132,7 @@ def test_a_calibration_gives_a_log_in_counts_its_units_axis_by_axis(log):
     counts = replace(whole, **{s: getattr(whole, s)[:20_000] for s in ("time_s", "accelerometer", "gyroscope")})
     readings = {"gyroscope": counts.gyroscope / per_count, "accelerometer": counts.accelerometer / 6e-4}
     raw = replace(counts, **readings, gyroscope_unit=RateUnit.COUNTS, accelerometer_unit=AccelerationUnit.COUNTS)
-    sensors = [
-        SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), "counts", unit, "joint")
-        for S, unit in ((6e-4 * np.eye(3), "m/s^2"), (np.diag(per_count), "rad/s"))
-    ]
-    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.81, "")
+    known = given((6e-4 * np.eye(3), np.zeros(3)), (np.diag(per_count), np.zeros(3)), raw_unit="counts")
     plain, told = noise_of(counts), noise_of(raw, calibration=known)
     for one, other in zip(plain.axes, told.axes, strict=True):
         assert other.unit == one.unit
