@@ -347,8 +347,7 @@ def test_a_log_is_read_alike_on_both_ways(tmp_path, monkeypatch):
     quick = read_recording(path)
     monkeypatch.setattr(TextReader, "_plain", lambda *_: False)
     patient = read_recording(path)
-    np.testing.assert_array_equal(quick.time_s, patient.time_s)
-    np.testing.assert_array_equal(quick.accelerometer, patient.accelerometer)
-    np.testing.assert_array_equal(quick.gyroscope, patient.gyroscope)
+    for name in ("time_s", "accelerometer", "gyroscope"):
+        np.testing.assert_array_equal(getattr(quick, name), getattr(patient, name))
     assert [f.code for f in quick.findings] == [f.code for f in patient.findings]
     assert quick.rows_in_file == patient.rows_in_file
