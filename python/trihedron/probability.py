@@ -12,6 +12,9 @@ NORMAL_95 = 1.96
 
 FALSE_ALARM = 1e-3
 """Probability that any one test of a fit, or of what is held against it, rejects what is sound."""
+RARE_ALARM = 1e-4
+"""The same of a test that is asked at very many places: events and lines of a log, still windows, of which one that
+counts as moving leaves a short gap once in minutes."""
 
 
 def chdtrc(dof: float, value: float) -> float:

@@ -14,7 +14,7 @@ from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.errors import InputError
-from trihedron.probability import chdtri
+from trihedron.probability import RARE_ALARM, chdtri
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import PoseLine
@@ -181,8 +181,6 @@ def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False
 
 # Spectral lines common to the poses of a session, and the poses without them.
 
-LINE_CHANCE = 1e-4
-"""False-alarm probability of a line over the poses of one axis."""
 LONGEST_PIECE = 4096
 """Readings of a piece that a line is subtracted from: the frequency error is a sixteenth of a period in it."""
 FINER = 16
@@ -195,7 +193,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
     ratio = power * centre / np.maximum(level, TINY)
-    limit = chdtri(count, LINE_CHANCE / n) / count
+    limit = chdtri(count, RARE_ALARM / n) / count
     # The relative error of the neighbourhood's median is 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
     out: list[PoseLine] = []

@@ -13,7 +13,7 @@ from trihedron.ranges import Range, ranges_of
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.means import left_by_rounding
-from trihedron.segment.runs import CREEP_PART, SAME_POSE, SWAY_RAD, speed_of_moves
+from trihedron.segment.runs import CREEP_PART, SWAY_RAD, speed_of_moves
 
 TILT_SIGMAS = 6.0
 """Standard errors of gravity by which a rotation that the gyro reads must differ from none to be a bias."""
@@ -100,7 +100,7 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     statistic = float((drift[live] ** 2 / variance[live]).sum())
     # The halves' means differ by half of the whole drift.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
-    return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
+    return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), probability.FALSE_ALARM))
 
 
 def _would_tilt(channels: Channels, first: int, last: int, turned: FloatArray) -> bool:

@@ -22,11 +22,10 @@ from trihedron.ranges import ranges_of
 from trihedron.records import Calibration, Finding, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.checked import number_of
 from trihedron.sensor_model import norms
+from trihedron.session.noise import NOISE_DOF
 from trihedron.session.rounding import undithered_axes
 
 ITERATIONS = 20
-NOISE_DOF = 100.0
-"""Degrees of freedom of the noise that χ² is relative to."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.errors import InputError
+from trihedron.estimate.accelerometer.norm import N_PARAMETERS
 from trihedron.estimate.accelerometer.poses import ENTRIES
 from trihedron.estimate.kalman.per_axis import (
     check_innovations,
@@ -40,7 +41,6 @@ def start_from_range(readings: npt.ArrayLike, gravity_m_s2: float) -> tuple[Floa
 NormFrame = Literal["lower", "symmetric"]
 
 MOST_RUNS = 50
-N_PARAMETERS = 9
 
 
 def calibrate_without_references(

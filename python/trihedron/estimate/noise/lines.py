@@ -10,9 +10,9 @@ from scipy.special import chdtri
 from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
+from trihedron.probability import RARE_ALARM
 from trihedron.records.noise import SpectralLine
 
-FALSE_ALARM = 1e-4
 TOLERANCE = 0.05
 """Least relative deviation of a third of an octave from the fitted terms, if significant, that counts as filtering:
 noise terms are idealisations, and a smaller loss of white noise does not change a printed digit."""
@@ -40,7 +40,7 @@ def find_lines(
         power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
         level = smooth_level(band, power / expected) * expected
         ratio = power / level
-        limit = float(chdtri(band.count[0], FALSE_ALARM / total) / band.count[0])
+        limit = float(chdtri(band.count[0], RARE_ALARM / total) / band.count[0])
         mask = np.zeros(len(ratio), dtype=bool)
         for i in np.argsort(-ratio):
             if ratio[i] < limit or len(lines) >= MOST_LINES:

@@ -14,13 +14,12 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.static_axes import adc_step
+from trihedron.probability import RARE_ALARM
 from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.ranges import edges_of
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.transforms import directions_of
 
-FALSE_ALARM = 1e-4
-"""Probability that a clean log shows an event of one kind."""
 READOUT_SAMPLE = 200_000
 """Readings from which resolution, noise and saturation are measured."""
 MOST_EVENTS = 500
@@ -167,7 +166,7 @@ def _mean(values: FloatArray) -> float:
 
 
 def _limit(n_looks: int, n_independent: float) -> float:
-    gaussian = math.sqrt(float(chdtri(1.0, FALSE_ALARM / n_looks)))
+    gaussian = math.sqrt(float(chdtri(1.0, RARE_ALARM / n_looks)))
     # The robust spread of k values has the relative standard error 1.17/√(2k): three of these are added.
     return gaussian * (1.0 + 3.0 * 1.17 / math.sqrt(2.0 * n_independent))
 
