@@ -11,6 +11,7 @@ from scipy.special import logsumexp, ndtr, ndtri
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, WEIGHTS, Stretch
 from trihedron.estimate.reference.beside import BLOCK_S
+from trihedron.estimate.reference.likelihood import FARTHEST
 from trihedron.probability import NORMAL_95
 from trihedron.records.filter_noise import Bounded
 
@@ -21,8 +22,6 @@ standard normal number whose quantile Φ(x), in right angles, is the angle with 
 half-Cauchy; Φ(x) as the share of the *square* makes a zero body part so unlikely that ``slow`` comes out too small."""
 SLOW_S = COORDINATES.index("slow_s")
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow", "per_kelvin"))
-FARTHEST = 4.0
-"""Limit of the search in prior σ: beyond it a strength is negligible."""
 STEP = 1e-3
 """Step in a coordinate for derivatives of the covariance."""
 SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01

@@ -15,7 +15,6 @@ from scipy.optimize import minimize
 
 from trihedron._core import ReferenceBlocks
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.filter_noise.strengths import FARTHEST
 from trihedron.threads import side_by_side
 
 Height = Callable[[FloatArray], float]
@@ -25,6 +24,8 @@ TYPICAL = np.log([2e-4, 1e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
 """Prior means of the logarithms: consumer gyros and optical trackers; rad/√s, √s, rad/s/√s, rad, rad, s, rad, s."""
 SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
 """Prior σ of the logarithms: a factor of 30 either way, of 4 for time constants."""
+FARTHEST = 4.0
+"""Limit of the search in prior σ: beyond it a strength is negligible."""
 LEAST_SPREAD = 0.01
 """Smallest posterior σ of a strength that is used, relative to the prior's."""
 KINDS = tuple(k for k, name in enumerate(STRENGTHS) if not name.endswith("_s"))

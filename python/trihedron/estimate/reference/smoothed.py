@@ -17,9 +17,9 @@ import numpy as np
 from scipy.linalg import matmul_toeplitz
 
 from trihedron.arrays import TINY, FloatArray, IntArray
-from trihedron.estimate.filter_noise.strengths import FARTHEST
 from trihedron.estimate.reference.accelerometer import ForceFit, turns, turns_of_frame
 from trihedron.estimate.reference.likelihood import (
+    FARTHEST,
     SPREAD,
     STRENGTHS,
     TYPICAL,
