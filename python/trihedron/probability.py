@@ -36,11 +36,6 @@ def fdtrc(top: float, bottom: float, value: float) -> float:
     return _core.f_above(value, top, bottom)
 
 
-def fdtri(top: float, bottom: float, below: float) -> float:
-    """Value that an F variate stays below with probability ``below``."""
-    return _core.f_upper(1.0 - below, top, bottom)
-
-
 def f_upper(top: float, bottom: float, above: float) -> float:
     """Value that an F variate exceeds with probability ``above``, which may be very small."""
     return _core.f_upper(above, top, bottom)
@@ -48,7 +43,7 @@ def f_upper(top: float, bottom: float, above: float) -> float:
 
 def betaincinv(a: float, b: float, below: float) -> float:
     """Value that a beta variate stays below with probability ``below``, from the F distribution."""
-    ratio = a * fdtri(2.0 * a, 2.0 * b, below)
+    ratio = a * f_upper(2.0 * a, 2.0 * b, 1.0 - below)
     return ratio / (b + ratio)
 
 

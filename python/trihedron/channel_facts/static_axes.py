@@ -98,7 +98,8 @@ class StaticAxis:
 
     @classmethod
     def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> StaticAxis:
-        parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
+        inside = [(x[start:stop], ranges_of(np.isfinite(x[start:stop]))) for start, stop in poses]
+        parts = [pose[a:b] for pose, runs in inside for a, b in runs if b - a >= SHORTEST]
         if not parts:
             raise InputError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
         step = adc_step(np.concatenate(parts))
@@ -133,10 +134,6 @@ class StaticAxis:
     def dithers(self, variance: float) -> bool:
         """Whether noise of this variance dithers the LSB."""
         return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
-
-
-def _unbroken(part: FloatArray) -> list[FloatArray]:
-    return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
 
 
 def _power_of(parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:

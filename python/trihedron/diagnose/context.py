@@ -138,13 +138,12 @@ class Context:
         """(points, 3) :attr:`axis_force` of sensor 0, :attr:`axis_rate` of sensor 1."""
         return self.axis_rate if sensor else self.axis_force
 
-    def on_accelerometers(self, values: FloatArray) -> FloatArray:
-        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
-        return _on_axes(self.accel_axes, values)
-
-    def on_gyros(self, values: FloatArray) -> FloatArray:
-        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of gyro j."""
-        return _on_axes(self.gyro_axes, values)
+    def on_axes(self, sensor: int, values: FloatArray) -> FloatArray:
+        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of axis j of a sensor."""
+        # ``axes[i, j] · values[:, j]`` as one matrix product, which is faster than row by row.
+        spread = np.zeros((3, 3, 3))
+        spread[range(3), :, range(3)] = (self.gyro_axes if sensor else self.accel_axes).T
+        return np.asarray((values @ spread.reshape(3, 9)).reshape(-1, 3, 3))
 
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
@@ -332,10 +331,3 @@ def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
     return np.asarray(S / axis_scales(S))
-
-
-def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, 3, 3) ``axes[i, j] · values[:, j]`` as one matrix product, which is faster than row by row."""
-    spread = np.zeros((3, 3, 3))
-    spread[range(3), :, range(3)] = axes.T
-    return (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)

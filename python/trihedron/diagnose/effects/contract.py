@@ -221,9 +221,6 @@ def acting_on(sensor: int, columns: FloatArray) -> Distortion:
 def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
     """Values (points, 3) along the axes of a sensor (0 accelerometer, 1 gyro), or (points, 1) alike on all of them, as
     three parameters each."""
-    columns = [
-        (context.on_gyros if sensor else context.on_accelerometers)(np.broadcast_to(one, (len(one), 3)))
-        for one in values
-    ]
+    columns = [context.on_axes(sensor, np.broadcast_to(one, (len(one), 3))) for one in values]
     whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
     return acting_on(sensor, whole)

@@ -114,8 +114,9 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     """Gradient (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
-    # Second derivative by the logarithm, averaged over the prior.
-    slope = np.where(prior.may_be_nothing[free], _half_slope(far), -far / sigma**2)
+    # Of the log half-Cauchy density by the logarithm of the strength; the second derivative averaged over the prior.
+    half_cauchy = 1.0 - 2.0 / (1.0 + np.exp(-2.0 * far))
+    slope = np.where(prior.may_be_nothing[free], half_cauchy, -far / sigma**2)
     information = np.diag(np.where(prior.may_be_nothing[free], 0.5, 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
@@ -131,11 +132,6 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
             slope[k] += 0.5 * (weighed @ carried[k] - np.sum(inverse * change))
         information += 0.5 * np.array(carried) @ inverse @ np.array(carried).T
     return slope, information
-
-
-def _half_slope(far: FloatArray) -> FloatArray:
-    """Derivative of the log half-Cauchy density by the logarithm of the strength."""
-    return np.asarray(1.0 - 2.0 / (1.0 + np.exp(-2.0 * far)))
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:

@@ -238,11 +238,6 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     ]
 
 
-def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Findings of a fit, without its possible losses where losses were detected in the motion."""
-    return tuple(one for one in of_fit if not (seen and one.code is FindingCode.LOSSES_POSSIBLE))
-
-
 def _positive(sigma: FloatArray) -> FloatArray:
     """Noise (3,) without zeros: a channel without visible noise (coarse LSB) gets that of the noisiest channel."""
     sigma = np.asarray(sigma, dtype=np.float64)

@@ -85,10 +85,6 @@ def _weight(session: Session, picked: list[int], drift: FloatArray) -> FloatArra
     return np.asarray(shrunk * np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
 
 
-def _dof(name: str, n_sessions: int) -> float:
-    return n_sessions * (DRIFT_DOF if name.endswith("bias") else SPREAD_DOF)
-
-
 def _left(values: FloatArray, weights: FloatArray, column: FloatArray | None) -> float:
     """H about a common value, or about a common value and a change along ``column`` (n,)."""
     k = values.shape[1]
@@ -111,7 +107,8 @@ def _solved(values: FloatArray, weights: FloatArray, column: FloatArray | None) 
 
 
 def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
-    return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), TINY)
+    of_weights = n_sessions * (DRIFT_DOF if name.endswith("bias") else SPREAD_DOF)
+    return max(fdtrc(dof, of_weights, statistic / dof), TINY)
 
 
 def _candidates(n: int) -> Iterator[Candidate]:

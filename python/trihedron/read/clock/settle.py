@@ -158,8 +158,7 @@ def settle_clock(
         is_even = not follows and (ignores or by_itself)
     sampling = Sampling(
         clock.kind, clock.period_s, clock.sigma_period_s, clock.timestamp_error_s, is_even, clock.counts_losses,
-        int(lost.sum()) if clock.counts_losses else 0, int(np.count_nonzero(lost)) if clock.counts_losses else 0,
-        share, sigma,
+        int(lost.sum()) if clock.counts_losses else 0, share, sigma,
     )  # fmt: skip
     findings = _findings(sampling, clock, shared)
     told = lost if clock.counts_losses else None
