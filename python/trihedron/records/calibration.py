@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
@@ -145,7 +145,7 @@ class SensorCalibration(Frozen):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Presented):
+class Calibration(Judged, Presented):
     """Both sensors in one body frame (instrument frame), with gravity, source recording and findings.
 
     Attributes
@@ -207,11 +207,6 @@ class Calibration(Presented):
         if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
             raise InputError(f"gravity must be in m/s², got {self.gravity_m_s2}")
         freeze(self)
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """True without a serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     @property
     def sensors(self) -> list[tuple[str, SensorCalibration]]:
