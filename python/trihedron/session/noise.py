@@ -13,7 +13,7 @@ from trihedron.quantiles import medians, quantiles
 from trihedron.records.calibration import Calibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.aliasing import unresolved_variance
+from trihedron.session.averaging import unresolved_variance
 from trihedron.session.rounding import rounding_of_moves
 from trihedron.transforms import directions_of
 
