@@ -23,3 +23,8 @@ def rms_of(values: npt.ArrayLike) -> float:
     """Root mean square of all values; NaN of none."""
     squares = np.square(values)
     return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
+
+
+def sigmas_of(covariance: FloatArray) -> FloatArray:
+    """(n,) standard errors of a covariance (n, n); 0 where rounding made a variance negative."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.one_unit import of_another_unit
@@ -94,7 +94,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
     numbers = None if row.get("parameters") is None else np.array(row["parameters"], dtype=np.float64)
     std = None
     if row.get("covariance") is not None:
-        std = np.sqrt(np.maximum(np.diag(np.array(row["covariance"], dtype=np.float64)), 0.0))
+        std = sigmas_of(np.array(row["covariance"], dtype=np.float64))
     return FleetLog(
         row["name"],
         row["serial"],

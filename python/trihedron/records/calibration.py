@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Judged
@@ -126,12 +126,12 @@ class SensorCalibration(Frozen):
     @property
     def sigma_S(self) -> FloatArray:
         """(3, 3) standard errors of S."""
-        return np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3)
+        return sigmas_of(self.covariance)[:9].reshape(3, 3)
 
     @property
     def sigma_b(self) -> FloatArray:
         """(3,) standard errors of b."""
-        return np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
+        return sigmas_of(self.covariance)[9:]
 
     @property
     def bias(self) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.errors import InputError
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, Judged
@@ -162,7 +162,7 @@ class AxisKalmanResult:
     @property
     def sigma(self) -> FloatArray:
         """(4,) standard errors of the constants."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return sigmas_of(self.covariance)
 
     @property
     def nis(self) -> FloatArray:
