@@ -10,8 +10,7 @@ import numpy as np
 
 from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.defaults import FALSE_ALARM
-from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import of_another_unit
+from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc
