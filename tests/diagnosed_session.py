@@ -35,3 +35,9 @@ def diagnosed(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
 def nearest_pose(poses, n):
     """(n,) number of the pose nearest to each sample: what is drawn per pose changes in the middle of a move."""
     return np.searchsorted([(a.stop + b.start) / 2 for a, b in pairwise(poses)], np.arange(n))
+
+
+def with_scatter(recording, poses, sigma):
+    """The gyro's bias is another in every pose, by ``sigma`` in its raw unit."""
+    bias = sigma * np.random.default_rng(3).normal(size=(len(poses), 3))
+    return replace(recording, gyroscope=recording.gyroscope + bias[nearest_pose(poses, recording.n_samples)])

@@ -167,7 +167,7 @@ def drawn(rng, n):
 
 
 def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
-    monkeypatch.setattr(bending, "CHANCE", 0.05)
+    monkeypatch.setattr(bending, "FALSE_ALARM", 0.05)
     monkeypatch.setattr(bending, "MATTERS", 0.0)
     rng, said, n_trials = np.random.default_rng(3), 0, 600
     for _ in range(n_trials):

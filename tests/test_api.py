@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 
 import trihedron
 from small_session import usual
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
+from test_export import given
+from trihedron.records import Finding, FindingCode, Severity
 
 # A device, several recordings or minutes: the tutorials run these.
 SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
@@ -52,13 +53,8 @@ def test_apply_and_export_refuse_what_cannot_be_a_calibration():
 
 
 def test_a_gyro_that_maps_degrees_as_radians_is_refused():
-    sensors = [
-        SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), u, u, "given")
-        for S, u in ((np.eye(3), "m/s^2"), (np.eye(3) * np.pi / 180.0, "rad/s"))
-    ]
-    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.81, "given")
     with pytest.raises(ValueError, match="unit of the readings"):
-        trihedron.export(known, "c")
+        trihedron.export(given((np.eye(3), np.zeros(3)), (np.eye(3) * np.pi / 180.0, np.zeros(3))), "c")
 
 
 def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted():

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from diagnosed_session import diagnosed, unit_of
-from small_session import SCENARIO, G, made_once
+from small_session import SCENARIO, G, made_once, rejected
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.comparison.model import _with_shared_effects
@@ -170,29 +170,20 @@ def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no
 def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve(tmp_path, capsys):
     given = tmp_path / "student.toml"
     given.write_text(SCENARIO)
-    assert main(["diagnose", "log.csv", "--against", str(given), "--improved", str(given)]) == 1
-    assert "overwrite" in capsys.readouterr().err
-    assert main(["diagnose", "log.csv", "--against", "sim.csv", "--improved", str(given)]) == 1
-    assert ".toml" in capsys.readouterr().err
-
-
-def rejected(given, capsys):
-    """The one sentence on stderr."""
-    log = made_once() / "log.csv"
-    assert main(["diagnose", str(log), "--gravity", G, "--against", str(given)]) == 1
-    said = capsys.readouterr().err.strip()
-    assert "Traceback" not in said
-    return " ".join(said.split())
+    asked = capsys, "diagnose", "log.csv", "--improved", given, "--against"
+    assert "overwrite" in rejected(*asked, given)
+    assert ".toml" in rejected(*asked, "sim.csv")
 
 
 def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):
-    assert "no such file" in rejected(tmp_path / "absent.csv", capsys)
+    asked = capsys, "diagnose", made_once() / "log.csv", "--gravity", G, "--against"
+    assert "no such file" in rejected(*asked, tmp_path / "absent.csv")
     belongs = "this is a trihedron calibration, no log; name it with --calibration"
-    assert belongs in rejected(made_once() / "c.json", capsys)
+    assert belongs in rejected(*asked, made_once() / "c.json")
     empty = tmp_path / "words.csv"
     empty.write_text("nothing,here\n")
-    assert "words.csv" in rejected(empty, capsys)
-    said = rejected(made_once() / "static.csv", capsys)
+    assert "words.csv" in rejected(*asked, empty)
+    said = rejected(*asked, made_once() / "static.csv")
     assert "the simulated recording cannot be calibrated" in said
     assert "pose" in said
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -9,8 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from diagnosed_session import simulated
+from diagnosed_session import simulated, unit_of, with_scatter
 from nuisance_trial.draw import G, draw
+from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.table import _error_of_mean
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
@@ -18,7 +20,11 @@ from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
+from trihedron.records.domains import HeldOut
 from trihedron.segment import resegment, segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.effects import with_effect
 
 NAMED = threshold(0.01)
 
@@ -179,3 +185,37 @@ def test_poses_that_lean_are_taken_off_static_rates_and_moves():
         assert not after[domain].disagrees
         # 0.06 and 0.05 deg/s about the vertical, which gravity does not show; 0.055 and 0.02 deg.
         assert after[domain].rms < {"static-gyro": 0.7, "moves": 0.5}[domain] * before[domain].rms
+
+
+def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share=0.9, variant="linear"):
+    parameter = EffectParameter("bias_per_kelvin_x", 0.01, 3e-4, "m/s^2/K")
+    held = (HeldOut(domain, 50.0, 1.0, before, after, "m/s^2"),)
+    return AcceptedEffect(effect_id, "Said.", (parameter,), 0.0, 99.0, held, model={"variant": variant}, share=share)
+
+
+def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
+    plain = unit_of(hand_session(20, pose_s=4.0, layout=5), 7, is_wide=True)
+    # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
+    size = np.radians(0.1)
+    flawed = with_effect(plain, "gyro-bias-drift", amplitude=(size, -size, size), tau_s=80.0)
+    recording = simulate(flawed, 11)[0]
+    moved = with_scatter(recording, trihedron.segment(recording).poses, 0.03 * 65.5)
+    found = trihedron.diagnose(moved, gravity_m_s2=9.80665)
+    assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
+    assert found.verdict == "missing-physics"
+
+
+def found(*effects, candidates=()):
+    return SimpleNamespace(effects=effects, candidates=candidates, domains=(), remaining=())
+
+
+def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
+    pushed = effect("disturbed-pose", share=0.7, variant="")
+    faint = effect("periodic-interference", share=0.05, variant="")
+    strong = effect("periodic-interference", share=0.25, variant="")
+    assert not compare_effects([], found(pushed, faint), alpha=0.01).differ
+    assert compare_effects([], found(pushed, strong), alpha=0.01).differ
+    assert compare_effects([], found(pushed, effect("accel-cubic")), alpha=0.01).differ
+    # What only the model has is no footnote of the recording.
+    tried = [Candidate("periodic-interference", 0.4, True)]
+    assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ

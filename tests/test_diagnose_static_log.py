@@ -8,9 +8,9 @@ import pytest
 
 import trihedron
 from diagnosed_session import simulated
+from trihedron.diagnose.session.observations import means_beside_lines
 from trihedron.records import Pose, Recording, Segments
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.session.static_lines import means_beside_lines
 
 DEG = np.pi / 180.0
 RATE_HZ = 100.0

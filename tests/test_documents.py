@@ -16,9 +16,9 @@ except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
 import trihedron
-from documented import DOCS
 
-ROOT = DOCS.parent
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 PACKAGE = ROOT / "python" / "trihedron"
 ROOTS = [ROOT, PACKAGE, ROOT / "rust", ROOT / "python", PACKAGE / "diagnose", DOCS]
 PAGES = sorted(DOCS.rglob("*.md"))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from small_session import rejected
 from trihedron.cli import main
 from trihedron.files.calibration import write_calibration
 from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, export_files, targets
@@ -35,21 +36,22 @@ def export_calibration(known, target, options=None):
     return "\n".join(export_files(known, target, options).values())
 
 
+def given(accelerometer, gyroscope, gravity=9.81, raw_unit=None, frame="case"):
+    """A calibration of two pairs (S, b), of readings in SI unless a unit is said."""
+    sensors = [
+        SensorCalibration(S, b, np.zeros((12, 12)), raw_unit or unit, unit, "given")
+        for (S, b), unit in ((accelerometer, "m/s^2"), (gyroscope, "rad/s"))
+    ]
+    return Calibration(*sensors, np.zeros((24, 24)), frame, gravity, "given", "log.csv", "")
+
+
 def calibration(unit="si", handed=1.0):
     """Both sensors, lower frame, with a gyro that is neither triangular nor aligned."""
     scale = 1.0 if unit == "si" else 1e-3
     S_f = scale * np.array([[1.01 * handed, 0, 0], [0.004, 0.99, 0], [-0.006, 0.003, 1.02]])
     S_w = scale * np.array([[1.02 * handed, 0.01, -0.02], [-0.015, 0.98, 0.005], [0.01, -0.02, 1.01]])
-    units = ("m/s^2", "rad/s") if unit == "si" else ("counts", "counts")
-    covariance = np.zeros((24, 24))
-    sensors = [
-        SensorCalibration(S, b, np.zeros((12, 12)), raw, si, "given")
-        for S, b, raw, si in (
-            (S_f, np.array([0.3, -0.2, 0.1]), units[0], "m/s^2"),
-            (S_w, np.array([0.01, -0.02, 0.03]), units[1], "rad/s"),
-        )
-    ]
-    return Calibration(*sensors, covariance, "lower", 9.81, "given", "log.csv", "")
+    pairs = (S_f, np.array([0.3, -0.2, 0.1])), (S_w, np.array([0.01, -0.02, 0.03]))
+    return given(*pairs, raw_unit=None if unit == "si" else "counts", frame="lower")
 
 
 def corrected(sensor):
@@ -58,6 +60,13 @@ def corrected(sensor):
 
 def numbers(text):
     return [float(word) for word in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", text)]
+
+
+def printed(program, readings):
+    """Numbers (n, m) that a program prints of readings (n, 3) on its input."""
+    rows = "\n".join(" ".join(repr(float(v)) for v in row) for row in readings)
+    done = subprocess.run([program], input=rows, capture_output=True, text=True, check=True)
+    return np.array([numbers(line) for line in done.stdout.splitlines()])
 
 
 @pytest.mark.parametrize(("handed", "frame"), [(1.0, "lower"), (-1.0, "lower"), (1.0, "symmetric")])
@@ -96,9 +105,7 @@ def test_c_header_compiles_without_warnings_and_agrees(tmp_path, suffix, real, t
     source.write_text(main_c)
     flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     subprocess.run(["cc", *flags, str(source), "-o", str(tmp_path / "main")], check=True, capture_output=True)
-    rows = "\n".join(" ".join(repr(float(v)) for v in row) for row in READINGS)
-    done = subprocess.run([tmp_path / "main"], input=rows, capture_output=True, text=True, check=True)
-    out = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    out = printed(tmp_path / "main", READINGS)
     # Single precision: 6e-8 of numbers below 30, a few of them summed.
     np.testing.assert_allclose(out[:, :3], corrected(known.accelerometer), **tolerance)
     np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope), **tolerance)
@@ -123,9 +130,7 @@ def test_rust_module_compiles_without_warnings_and_agrees(tmp_path):
     build = ["rustc", "--edition", "2021", "--out-dir", str(tmp_path)]
     subprocess.run([*build, "--crate-type", "lib", str(tmp_path / "bare.rs")], check=True, capture_output=True)
     subprocess.run([*build, str(tmp_path / "main.rs")], check=True, capture_output=True)
-    rows = "\n".join(" ".join(repr(float(v)) for v in row) for row in READINGS[:5])
-    done = subprocess.run([tmp_path / "main"], input=rows, capture_output=True, text=True, check=True)
-    out = np.array([numbers(line) for line in done.stdout.splitlines()])
+    out = printed(tmp_path / "main", READINGS[:5])
     np.testing.assert_allclose(out[:, :3], corrected(known.accelerometer)[:5], **ROUNDING)
     np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope)[:5], **ROUNDING)
 
@@ -301,16 +306,14 @@ def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path
     write_calibration(calibration("counts"), file)
     assert main(["export", str(file), "--to", "imu_tk", "-o", str(tmp_path / "unit.calib")]) == 0
     assert {p.name for p in tmp_path.glob("*.calib")} == {"unit_acc.calib", "unit_gyro.calib"}
-    assert main(["export", str(file), "--to", "imu_tk", "-o", str(tmp_path / "unit.calib")]) == 1
-    assert "unit_acc.calib" in capsys.readouterr().err
+    assert "unit_acc.calib" in rejected(capsys, "export", file, "--to", "imu_tk", "-o", tmp_path / "unit.calib")
     # Several that are called alike take the names of their folders.
     (tmp_path / "b").mkdir()
     other = tmp_path / "b" / "c.json"
     write_calibration(calibration("si"), other)
     assert main(["export", str(file), str(other), "--to", "c", "-o", str(tmp_path / "out")]) == 0
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["b_c.c", f"{tmp_path.name}_c.c"]
-    assert main(["export", str(file), str(file), "--to", "c", "-o", str(tmp_path / "same")]) == 1
-    assert "names that differ" in capsys.readouterr().err
+    assert "names that differ" in rejected(capsys, "export", file, file, "--to", "c", "-o", tmp_path / "same")
     counted = ["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb"]
     assert main([*counted, "0.0573 deg/s"]) == 0
     assert "is lost" in capsys.readouterr().err

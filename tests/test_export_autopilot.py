@@ -7,13 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from test_export import export_calibration
+from small_session import rejected
+from test_export import export_calibration, given
 from trihedron.api.calibrating import of_board
 from trihedron.cli import main
 from trihedron.files.calibration import calibration_document, calibration_from_document, write_calibration
 from trihedron.files.formats import ExportOptions
 from trihedron.files.formats.autopilot import orientation, parameters_in
-from trihedron.records import Calibration, Onboard, SensorCalibration
+from trihedron.records import Onboard
 
 AXES = "XYZ"
 TCAL = {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_TMIN": 10.0, "INS_TCAL1_TMAX": 60.0, "INS_ACC1_CALTEMP": 40.0,
@@ -76,15 +77,6 @@ def px4(p, raw_accel, raw_gyro, T, accel, gyro, R):
         v = v * [p.get(f"CAL_{word}{k}_{a}SCALE", 1.0) for a in AXES]
         out.append(v @ R.T)
     return out
-
-
-def given(accelerometer, gyroscope, gravity=9.81, raw_unit=None):
-    """A calibration of two pairs (S, b), of readings in SI unless a unit is said."""
-    sensors = [
-        SensorCalibration(S, b, np.zeros((12, 12)), raw_unit or unit, unit, "given")
-        for (S, b), unit in ((accelerometer, "m/s^2"), (gyroscope, "rad/s"))
-    ]
-    return Calibration(*sensors, np.zeros((24, 24)), "case", gravity, "given")
 
 
 def diagonal_in(R, recording, gyro_scale=(1.0, 1.0, 1.0)):
@@ -225,8 +217,7 @@ def test_a_target_of_constants_says_what_the_temperature_is_worth(target):
 def test_a_log_that_does_not_say_makes_the_export_ask_for_the_parameters(tmp_path, capsys):
     file = tmp_path / "unit.json"
     write_calibration(given(*[(1.01 * np.eye(3), np.full(3, 0.1))] * 2), file)
-    assert main(["export", str(file), "--to", "ardupilot"]) == 1
-    assert "--current-parameters" in capsys.readouterr().err
+    assert "--current-parameters" in rejected(capsys, "export", file, "--to", "ardupilot")
     lines = [f"INS_ACCOFFS_{a} {0.5}" for a in AXES] + [f"INS_ACCSCAL_{a} {1.02}" for a in AXES]
     (tmp_path / "board.param").write_text("\n".join([*lines, "AHRS_ORIENTATION,0", ""]))
     ask = ["export", str(file), "--to", "ardupilot", "--current-parameters"]

@@ -32,14 +32,9 @@ def scenario(motion: Motion, gyro_noise=2e-4, accel_noise=1e-3, S=SCALE, b=BIAS,
 def calibrated(recording, segments, truth, nominal=None, error=None, covariance=None):
     """The gyro beside an accelerometer that is known, or off by ``error`` of a stated covariance."""
     error = np.zeros(12) if error is None else error
-    given = SensorCalibration(
-        truth.accelerometer_S + error[:9].reshape(3, 3),
-        truth.accelerometer_b + error[9:],
-        np.zeros((12, 12)) if covariance is None else covariance,
-        "m/s^2",
-        "m/s^2",
-        "given",
-    )
+    S, b = truth.accelerometer_S + error[:9].reshape(3, 3), truth.accelerometer_b + error[9:]
+    stated = np.zeros((12, 12)) if covariance is None else covariance
+    given = SensorCalibration(S, b, stated, "m/s^2", "m/s^2", "given")
     return calibrate_moves(recording, segments, given, truth.gravity_m_s2, nominal)
 
 

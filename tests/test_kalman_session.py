@@ -183,14 +183,19 @@ def test_errors_are_as_large_as_stated():
     assert low < np.sum(nees) < high
 
 
+def written(path, scenario, seed):
+    log = simulate(scenario, seed)[0]
+    rows = np.column_stack([log.time_s, log.accelerometer])
+    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
+    return path
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("head")
     accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
     scenario = Scenario(motion=dividing_head(), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    recording = simulate(scenario, seed=1)[0]
-    rows = np.column_stack([recording.time_s, recording.accelerometer])
-    np.savetxt(folder / "log.csv", rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
+    written(folder / "log.csv", scenario, 1)
     np.savetxt(folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, "%g", ",", header="pitch,roll", comments="")
     (folder / "noise.json").write_text('{"white": 0.01, "walk": [0.001, 0.001, 0.001]}')
     return folder
@@ -241,10 +246,7 @@ def test_noise_of_a_log_with_both_sensors_in_counts_is_that_of_the_accelerometer
 def rest_log(path, seconds, **noise):
     accelerometer = Accelerometer(noise=NoiseTerms(**noise))
     scenario = Scenario(motion=long_static(seconds), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    rest = simulate(scenario, seed=2)[0]
-    rows = np.column_stack([rest.time_s, rest.accelerometer])
-    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
-    return path
+    return written(path, scenario, 2)
 
 
 def test_a_log_of_rest_in_counts_of_another_range_is_refused(files, tmp_path, capsys):

@@ -40,27 +40,26 @@ def lossy(seed, time_of=None):
     f, w, rate, truth, _ = hand(seed, move_s=10.0)
     kept = np.random.default_rng([14, seed]).random(len(f)) >= 1e-3
     t = time_of(np.flatnonzero(kept) / rate) if time_of else None
-    return calibrate(recorded(f[kept], w[kept], rate, t), gravity_m_s2=G), lower(truth)
+    result = calibrate(recorded(f[kept], w[kept], rate, t), gravity_m_s2=G)
+    return result, (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
 
 
 @pytest.mark.parametrize("seed", [30000, 20018])
 def test_losses_are_possible_wherever_moves_are_missed(seed):
     """All moves missed more than noise does, or those that missed most were excluded: losses were not requested."""
-    result, truth = lossy(seed)
+    result, z = lossy(seed)
     codes = {finding.code for finding in result.findings}
     assert codes & {FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.OUTLIER_MOVE}
     assert FindingCode.LOSSES_POSSIBLE in codes
     assert not result.is_trustworthy
-    z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
     # Nine parameters, each within four standard errors; in the second session one was 22 away.
     assert np.abs(z).max() < 4.0
 
 
 def test_a_clock_of_its_own_rules_losses_out():
     """The same session with a clock's timestamps: what was lost is a gap in them, and no share of the scale."""
-    result, truth = lossy(20018, lambda t: t * (1.0 + 20e-6 * t / t[-1]))
+    result, z = lossy(20018, lambda t: t * (1.0 + 20e-6 * t / t[-1]))
     assert not {FindingCode.SAMPLES_LOST, FindingCode.LOSSES_POSSIBLE} & {finding.code for finding in result.findings}
-    z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
     assert np.abs(z).max() < 4.0
 
 

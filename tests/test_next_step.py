@@ -15,6 +15,7 @@ from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document, FindingList, Section
 
 MY_LOG = "'my log.csv' --rate 50"
+DISAGREES = SimpleNamespace(domain="moves", disagrees=True)
 
 
 @pytest.fixture(autouse=True)
@@ -25,6 +26,14 @@ def run():
     now.note_place(GravitySource(latitude=59.9))
     yield
     now.begin(())
+
+
+def found_with(effect_id, *, is_of_unit, **more):
+    """A diagnosis of one effect, which belongs to the unit or to this session alone, and its effect."""
+    model = {"applies_to_other_recordings": is_of_unit}
+    effect = SimpleNamespace(id=effect_id, confounded_with=(), held_out=(), model=model)
+    known = {"verdict": "missing-physics", "parameters": (), "effects": (effect,), "domains": (), "remaining": ()}
+    return SimpleNamespace(**known | more), effect
 
 
 def filled(step):
@@ -104,10 +113,7 @@ def test_several_logs_are_all_named_in_a_command_of_another_verb():
 
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
     weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
-    effect = SimpleNamespace(
-        id="disturbed-pose", confounded_with=(), held_out=(), model={"applies_to_other_recordings": False}
-    )
-    found = SimpleNamespace(verdict="missing-physics", parameters=(), effects=(effect,), domains=(), remaining=())
+    found, effect = found_with("disturbed-pose", is_of_unit=False)
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
     assert "--extended" in next_step_in_words(found)
@@ -117,7 +123,7 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
     above = Finding(FindingCode.RESIDUAL_ABOVE_NOISE, Severity.SERIOUS, "Seen.", "", "See `trihedron diagnose LOG`.")
     found.calibration = SimpleNamespace(findings=(above,))
     assert "--extended" in next_step_in_words(found)
-    found.remaining = (SimpleNamespace(domain="moves", disagrees=True),)
+    found.remaining = (DISAGREES,)
     assert "--extended" not in next_step_in_words(found)
     found.findings = (Finding(FindingCode.NOT_FIT, Severity.WARNING, "Two orientations.", "", ""),)
     assert "trihedron calibrate" not in next_step_in_words(found)
@@ -128,14 +134,11 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
 
 def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
     lost = Finding(FindingCode.LOSSES_POSSIBLE, Severity.SERIOUS, "Seen.", "", "Record again.")
-    effect = SimpleNamespace(
-        id="gyro-g-sensitivity", confounded_with=(), held_out=(), model={"applies_to_other_recordings": True}
-    )
     moves = SimpleNamespace(domain="moves", disagrees=False)
-    found = SimpleNamespace(
-        verdict="missing-physics", parameters=(), effects=(effect,), remaining=(moves,),
-        domains=(SimpleNamespace(domain="moves", disagrees=True),), calibration=SimpleNamespace(findings=(lost,)),
-    )  # fmt: skip
+    own = SimpleNamespace(findings=(lost,))
+    found, _ = found_with(
+        "gyro-g-sensitivity", is_of_unit=True, domains=(DISAGREES,), remaining=(moves,), calibration=own
+    )
     assert "--extended" in next_step_in_words(found)
     assert "without effects are not to be trusted" in next_step_in_words(found)
     moves.disagrees = True
@@ -153,14 +156,8 @@ def test_a_log_that_was_excluded_is_not_in_the_next_command():
 
 
 def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
-    effect = SimpleNamespace(
-        id="timing-jitter", confounded_with=(), held_out=(), model={"applies_to_other_recordings": False}
-    )
     own = SimpleNamespace(findings=(), gyroscope=None, accelerometer=SimpleNamespace(quality=None))
-    domain = SimpleNamespace(domain="moves", disagrees=True)
-    found = SimpleNamespace(
-        verdict="missing-physics", parameters=(), effects=(effect,), remaining=(), domains=(domain,), calibration=own
-    )
+    found, _ = found_with("timing-jitter", is_of_unit=False, domains=(DISAGREES,), calibration=own)
     for rms, is_first in ((1.2e-3, False), (5e-3, True)):
         own.accelerometer.quality = SimpleNamespace(rms=1e-3, floor=1e-3, held_out_rms=rms)
         said = next_step_in_words(found)

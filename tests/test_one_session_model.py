@@ -19,7 +19,7 @@ from trihedron.records.published import published_figures
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.machine import calibration_record
 from trihedron.segment import segment_recording
-from trihedron.session.aliasing import unresolved_variance
+from trihedron.session.averaging import unresolved_variance
 from trihedron.session.model import MOVES
 from trihedron.simulate import hand_session
 

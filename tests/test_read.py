@@ -11,6 +11,7 @@ import pytest
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
+from true_segments import codes
 
 # By name: the package also exports a function called `read`.
 text_module = importlib.import_module("trihedron.read.text.blocks")
@@ -46,10 +47,6 @@ def write(path, table, header=HEADER, separator=",", decimal=".", lead="", end="
     lines = [lead + separator.join(repr(float(v)).replace(".", decimal) for v in row) + end for row in table]
     path.write_bytes((header + "\n".join(lines) + "\n").replace("\n", line_end).encode())
     return path
-
-
-def codes(recording: Recording) -> set[FindingCode]:
-    return {finding.code for finding in recording.findings}
 
 
 def finding(recording: Recording, code: FindingCode):

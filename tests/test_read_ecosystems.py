@@ -249,22 +249,30 @@ def test_hdf5_groups_are_told_apart(tmp_path):
     assert_same(read_recording(path, topic="Sensors/XI-1"))
 
 
-def test_matlab_files_of_both_generations_are_read(tmp_path):
-    h5py = pytest.importorskip("h5py", reason="h5py (trihedron[hdf5]) is not installed")
+def write_matlab(folder, table):
+    """Columns of a table, by name, as files of both generations, ``old.mat`` and ``new.mat``."""
+    import h5py
     from scipy.io import savemat
 
-    columns = {"t": TABLE[:, 0], "acc": TABLE[:, 1:4], "gyro": TABLE[:, 4:], "fs": 100.0}
-    savemat(tmp_path / "old.mat", columns)
+    columns = {"t": table[:, 0], "acc": table[:, 1:4], "gyro": table[:, 4:], "fs": 100.0}
+    savemat(folder / "old.mat", columns)
+    # MATLAB 7.3 puts 512 bytes of its own before HDF5 and stores columns as rows.
+    with h5py.File(folder / "new.mat", "w", userblock_size=512) as file:
+        for name, values in columns.items():
+            file[name] = np.atleast_2d(np.asarray(values).T)
+    content = (folder / "new.mat").read_bytes()
+    (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file" + content[19:])
+    return columns
+
+
+def test_matlab_files_of_both_generations_are_read(tmp_path):
+    pytest.importorskip("h5py", reason="h5py (trihedron[hdf5]) is not installed")
+    from scipy.io import savemat
+
+    columns = write_matlab(tmp_path, TABLE)
     assert_same(read_recording(tmp_path / "old.mat"))
     savemat(tmp_path / "struct.mat", {"imu": columns, "note": "x"})
     assert_same(read_recording(tmp_path / "struct.mat"))
-    # MATLAB 7.3 puts 512 bytes of its own before HDF5 and stores columns as rows.
-    with h5py.File(tmp_path / "new.mat", "w", userblock_size=512) as file:
-        for name, values in columns.items():
-            file[name] = np.atleast_2d(np.asarray(values).T)
-    content = bytearray((tmp_path / "new.mat").read_bytes())
-    content[:19] = b"MATLAB 7.3 MAT-file"
-    (tmp_path / "new.mat").write_bytes(bytes(content))
     assert_same(read_recording(tmp_path / "new.mat"))
     savemat(tmp_path / "empty.mat", {"note": "nothing"})
     with pytest.raises(ReadError, match="no arrays of numbers"):

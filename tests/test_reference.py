@@ -11,7 +11,7 @@ from trihedron._core import rotation_from_vector
 from trihedron.api.beside import shared_log
 from trihedron.cli import _a_reference_each
 from trihedron.estimate.reference.fit import fit_reference
-from trihedron.files.diagnosis import diagnosis_document
+from trihedron.files.calibration import diagnosis_document
 from trihedron.records import FindingCode, Severity
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 from trihedron.simulate import hand_session, scenario_by_name

@@ -9,7 +9,7 @@ import polars
 import pytest
 
 import trihedron
-from diagnosed_session import diagnosed, nearest_pose, simulated
+from diagnosed_session import diagnosed, simulated, with_scatter
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.accepted import Answer
 from trihedron.diagnose.effects import by_id, catalogue
@@ -144,10 +144,7 @@ def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
 
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
     recording, truth = simulated("gyro-scale-nonlinearity", 3, 16, c3=(3e-3, -3e-3, 3e-3))
-    # The gyro's bias is another in every pose.
-    poses = [part for part in truth.segments if part.kind == "pose"]
-    bias = 0.07 * 131.0 * np.random.default_rng(3).normal(size=(len(poses), 3))
-    moved = replace(recording, gyroscope=recording.gyroscope + bias[nearest_pose(poses, recording.n_samples)])
+    moved = with_scatter(recording, truth.poses, 0.07 * 131.0)
     names = [effect.id for effect in trihedron.diagnose(moved, gravity_m_s2=truth.gravity_m_s2).effects]
     # The scatter may stray between poses as far as moves show: without its cost it explained the moves alone.
     assert names[0] == "gyro-scale-nonlinearity"

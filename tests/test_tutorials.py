@@ -15,7 +15,6 @@ import pytest
 
 import trihedron
 from board import counts_recording
-from documented import DOCS, blocks
 from test_read_ecosystems import write_bag
 from trihedron.capture import open_source
 from trihedron.cli import main
@@ -25,8 +24,17 @@ from trihedron.simulate.device.faults import Sent
 from trihedron.simulate.device.serving import Device
 
 mpl.use("Agg")
+DOCS = Path(__file__).parents[1] / "docs"
+# What follows the language of a fence is shown to the reader as text by the site's Markdown: hence a comment above it,
+# such as ``not-run``, ``exit=2`` or the name of a file.
+BLOCK = re.compile(r"^(?:<!-- ([^\n]*) -->\n)?```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 PAGE = DOCS / "worked-example.md"
+
+
+def blocks(page, language):
+    """Fenced blocks of a language, each with the comment above it."""
+    return [(said, text) for said, of, text in BLOCK.findall(page.read_text(encoding="utf-8")) if of == language]
 
 
 def commands(body):
@@ -42,7 +50,7 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     names = {}
     n_run = 0
-    for said_of_it, language, body in blocks(path):
+    for said_of_it, language, body in BLOCK.findall(path.read_text(encoding="utf-8")):
         if language not in ("sh", "python") or said_of_it == "not-run":
             continue  # a block of a real board or a real log
         if language == "python":
@@ -108,14 +116,14 @@ def test_the_python_of_a_page_runs_on_logs_of_its_names(page, tmp_path, monkeypa
     static = np.column_stack([np.arange(6000) / 100.0, force, rate])
     header = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     np.savetxt("static.csv", static, delimiter=",", header=header, comments="")
-    shown = [block.text for block in blocks(DOCS.parent / page) if block.language == "python"]
+    shown = blocks(DOCS.parent / page, "python")
     assert shown
-    for text in shown:
+    for _, text in shown:
         exec(compile(text, page, "exec"), {})
 
 
 def python_of(page):
-    (text,) = (block.text for block in blocks(DOCS / page) if block.language == "python")
+    ((_, text),) = blocks(DOCS / page, "python")
     return compile(text, page, "exec")
 
 
@@ -145,27 +153,23 @@ def test_capture_in_python_runs_as_shown(tmp_path, monkeypatch, capsys):
     assert trihedron.read("log.csv").n_samples == 300
 
 
-def shown(language):
-    return [block for block in blocks(PAGE) if block.language == language]
-
-
 @pytest.mark.slow
 def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")  # as the page shows it
-    for block in shown("toml"):
-        Path(block.said).write_text(block.text, encoding="utf-8")
+    for name, text in blocks(PAGE, "toml"):
+        Path(name).write_text(text, encoding="utf-8")
     said = []
-    for block in shown("sh"):
-        words = shlex.split(block.text)
+    for _, text in blocks(PAGE, "sh"):
+        words = shlex.split(text)
         assert words[0] == "trihedron"
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
             status = main(words[1:])
-        assert not status, block.text
+        assert not status, text
         said.append(out.getvalue())
     assert len(said) == 6  # one that represents the recording, and five
-    promised = shown("text")[0].text
+    promised = blocks(PAGE, "text")[0][1]
     assert "MISSING PHYSICS: gyro g-sensitivity is missing" in said[2]
     assert "gyro bias X −7.86" in said[2]
     assert promised in said[3]

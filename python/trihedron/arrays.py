@@ -19,6 +19,12 @@ XYZ = ("X", "Y", "Z")
 """The axes as printed in reports and on a silkscreen."""
 
 
-def rms_of(values: FloatArray) -> float:
-    """Root mean square of all values."""
-    return float(np.sqrt(np.mean(values**2)))
+def rms_of(values: npt.ArrayLike) -> float:
+    """Root mean square of all values; NaN of none."""
+    squares = np.square(values)
+    return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
+
+
+def sigmas_of(covariance: FloatArray) -> FloatArray:
+    """(n,) standard errors of a covariance (n, n); 0 where rounding made a variance negative."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))

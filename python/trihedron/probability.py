@@ -12,6 +12,9 @@ NORMAL_95 = 1.96
 
 FALSE_ALARM = 1e-3
 """Probability that any one test of a fit, or of what is held against it, rejects what is sound."""
+RARE_ALARM = 1e-4
+"""The same of a test that is asked at very many places: events and lines of a log, still windows, of which one that
+counts as moving leaves a short gap once in minutes."""
 
 
 def chdtrc(dof: float, value: float) -> float:
@@ -33,11 +36,6 @@ def fdtrc(top: float, bottom: float, value: float) -> float:
     return _core.f_above(value, top, bottom)
 
 
-def fdtri(top: float, bottom: float, below: float) -> float:
-    """Value that an F variate stays below with probability ``below``."""
-    return _core.f_upper(1.0 - below, top, bottom)
-
-
 def f_upper(top: float, bottom: float, above: float) -> float:
     """Value that an F variate exceeds with probability ``above``, which may be very small."""
     return _core.f_upper(above, top, bottom)
@@ -45,7 +43,7 @@ def f_upper(top: float, bottom: float, above: float) -> float:
 
 def betaincinv(a: float, b: float, below: float) -> float:
     """Value that a beta variate stays below with probability ``below``, from the F distribution."""
-    ratio = a * fdtri(2.0 * a, 2.0 * b, below)
+    ratio = a * f_upper(2.0 * a, 2.0 * b, 1.0 - below)
     return ratio / (b + ratio)
 
 

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from trihedron import _core
 from trihedron.arrays import FloatArray
 
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal variate over its median absolute deviation."""
+
 
 def median(values: FloatArray) -> float:
     """Median of ``values`` (n,); NaN for an empty array or one with a NaN."""

@@ -35,6 +35,11 @@ def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     return inverse, -inverse @ b
 
 
+def axis_scales(S: FloatArray) -> FloatArray:
+    """(3,) SI per raw unit of each sensor axis: truth along it over the change of its reading."""
+    return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(S), axis=1), dtype=np.float64)
+
+
 def order_and_reversed(S: FloatArray) -> tuple[list[int], list[int]]:
     """The body axis nearest to each sensor axis, and the sensor axes against theirs; as named where two share one."""
     order = np.argmax(np.abs(S), axis=0)
@@ -78,12 +83,14 @@ class Reframing:
 
     def follow(self, S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives of another sensor's ``R S``, ``R b`` (12, 12): by its own and by this triad's parameters."""
-        order = _columns_first()
+        # The place of each parameter, S row by row and b, in the stacked columns of S and b.
+        order = [*(3 * j + i for i in range(3) for j in range(3)), 9, 10, 11]
         own = np.asarray(np.kron(np.eye(4), self.rotation)[np.ix_(order, order)], dtype=np.float64)
         moved = np.column_stack([self.rotation @ S, self.rotation @ b])
         through = np.zeros((12, 12))
         for k in range(12):
-            through[:, k] = _flatten(cross_matrix(self.tilt[:, k]) @ moved)
+            turned = cross_matrix(self.tilt[:, k]) @ moved
+            through[:, k] = np.concatenate([turned[:, :3].ravel(), turned[:, 3]])
         return own, through
 
 
@@ -185,13 +192,3 @@ def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
         return np.tril(S)
     signs = np.sign(np.diag(S))
     return 0.5 * (S * signs + (S * signs).T) * signs
-
-
-def _flatten(S_and_b: FloatArray) -> FloatArray:
-    """(3, 4) matrix [S b] → (12,) parameters: S row by row, then b."""
-    return np.concatenate([S_and_b[:, :3].ravel(), S_and_b[:, 3]])
-
-
-def _columns_first() -> list[int]:
-    """Index of each of the 12 parameters in the stacked columns of S, then b."""
-    return [3 * j + i for i in range(3) for j in range(3)] + [9, 10, 11]

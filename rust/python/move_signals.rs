@@ -62,18 +62,23 @@ fn edges(moves: &PyReadonlyArray2<'_, i64>, n: usize) -> PyResult<Vec<[usize; 2]
         .collect()
 }
 
-fn same_length(
-    time: &PyReadonlyArray1<'_, f64>,
-    values: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<usize> {
-    let n = values.shape()[0];
-    if time.shape()[0] != n {
+/// A kernel's answer `(n, 3)` to values inside moves.
+fn inside_moves<'py>(
+    py: Python<'py>,
+    (time_s, values): (&PyReadonlyArray1<'py, f64>, &PyReadonlyArray2<'py, f64>),
+    moves: &PyReadonlyArray2<'py, i64>,
+    kernel: impl FnOnce(&[f64], &[[f64; 3]], &[[usize; 2]]) -> Vec<[f64; 3]> + Send,
+) -> PyResult<Array2<'py>> {
+    let (n, times) = (values.shape()[0], time_s.len());
+    if times != n {
         return Err(PyValueError::new_err(format!(
-            "{n} values need as many times, got {}",
-            time.shape()[0]
+            "{n} values need as many times, got {times}"
         )));
     }
-    Ok(n)
+    let ranges = edges(moves, n)?;
+    let (time, flat) = (flat1(time_s), flat3("values", values)?);
+    let out = super::run(py, || Ok(kernel(&time, as_rows(&flat), &ranges)))?;
+    out.as_flattened().to_pyarray(py).reshape([n, 3])
 }
 
 /// Time derivative `(n, 3)` of values inside moves, zero outside.
@@ -84,13 +89,7 @@ fn move_derivative<'py>(
     values: PyReadonlyArray2<'py, f64>,
     moves: PyReadonlyArray2<'py, i64>,
 ) -> PyResult<Array2<'py>> {
-    let n = same_length(&time_s, &values)?;
-    let ranges = edges(&moves, n)?;
-    let (time, flat) = (flat1(&time_s), flat3("values", &values)?);
-    let out = super::run(py, || {
-        Ok(move_signals::derivative(&time, as_rows(&flat), &ranges))
-    })?;
-    out.as_flattened().to_pyarray(py).reshape([n, 3])
+    inside_moves(py, (&time_s, &values), &moves, move_signals::derivative)
 }
 
 /// Values `(n, 3)` at a time `ahead_s` later inside moves, by the spline of every move with zero slope at its ends.
@@ -102,18 +101,9 @@ fn move_shifted<'py>(
     moves: PyReadonlyArray2<'py, i64>,
     ahead_s: f64,
 ) -> PyResult<Array2<'py>> {
-    let n = same_length(&time_s, &values)?;
-    let ranges = edges(&moves, n)?;
-    let (time, flat) = (flat1(&time_s), flat3("values", &values)?);
-    let out = super::run(py, || {
-        Ok(move_signals::shifted(
-            &time,
-            as_rows(&flat),
-            &ranges,
-            ahead_s,
-        ))
-    })?;
-    out.as_flattened().to_pyarray(py).reshape([n, 3])
+    inside_moves(py, (&time_s, &values), &moves, |time, rows, ranges| {
+        move_signals::shifted(time, rows, ranges, ahead_s)
+    })
 }
 
 /// `∫ (S a + b) (w - bias)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a

@@ -120,8 +120,7 @@ def _of_makers() -> Iterator[tuple[str, Log]]:
 def _matlab(folder: Path) -> None:
     from scipy.io import savemat
 
-    columns = {"t": TABLE[:, 0], "acc": TABLE[:, 1:4], "gyro": TABLE[:, 4:], "fs": 100.0}
-    savemat(folder / "old.mat", columns)
+    columns = ecosystems.write_matlab(folder, TABLE)
     savemat(folder / "packed.mat", {"imu": columns, "note": "x"}, do_compression=True)
     savemat(folder / "unnamed.mat", {"data": TABLE})
 
@@ -133,11 +132,6 @@ def _hdf5(folder: Path) -> None:
         with h5py.File(folder / name, "w") as file:
             for key, values in (("t", TABLE[:, 0]), ("accelerometer", TABLE[:, 1:4]), ("gyroscope", TABLE[:, 4:])):
                 file.create_dataset(f"imu/{key}", data=values, **options)
-    with h5py.File(folder / "new.mat", "w", userblock_size=512) as file:
-        for key, values in (("t", TABLE[:, :1]), ("acc", TABLE[:, 1:4]), ("gyro", TABLE[:, 4:])):
-            file[key] = values.T
-    content = (folder / "new.mat").read_bytes()
-    (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file" + content[19:])
 
 
 def _parquet(folder: Path) -> None:

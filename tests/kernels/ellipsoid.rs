@@ -11,18 +11,10 @@ const G: f64 = 9.81;
 
 /// Six faces and twelve edges of a cube.
 pub fn cube_poses() -> Vec<Vector3<f64>> {
-    let mut poses = Vec::new();
-    for x in -1..=1 {
-        for y in -1..=1 {
-            for z in -1..=1 {
-                let v = Vector3::new(f64::from(x), f64::from(y), f64::from(z));
-                if v.norm() > 0.5 && v.norm() < 1.6 {
-                    poses.push(v.normalize());
-                }
-            }
-        }
-    }
-    poses
+    let corners =
+        (0..27).map(|k| Vector3::new(k / 9, k / 3 % 3, k % 3).map(|x| f64::from(x) - 1.0));
+    let is_pose = |v: &Vector3<f64>| v.norm() > 0.5 && v.norm() < 1.6;
+    corners.filter(is_pose).map(|v| v.normalize()).collect()
 }
 
 /// Readings of a lower-triangular triad in these poses.
@@ -33,22 +25,9 @@ pub fn readings(model: &Model, up: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 
 /// A triad in counts: zero near mid-range, axes a few per cent and degrees off.
 pub fn triad(e: [f64; 9]) -> Model {
-    let s = Matrix3::new(
-        1.0 + 0.1 * e[0],
-        0.0,
-        0.0,
-        0.1 * e[1],
-        1.0 + 0.1 * e[2],
-        0.0,
-        0.1 * e[3],
-        0.1 * e[4],
-        1.0 + 0.1 * e[5],
-    ) * 2.4e-3;
-    let zero = Vector3::new(
-        32768.0 + 800.0 * e[6],
-        32768.0 + 800.0 * e[7],
-        32768.0 + 800.0 * e[8],
-    );
+    let off = Matrix3::new(e[0], 0.0, 0.0, e[1], e[2], 0.0, e[3], e[4], e[5]);
+    let s = (Matrix3::identity() + off * 0.1) * 2.4e-3;
+    let zero = Vector3::new(e[6], e[7], e[8]) * 800.0 + Vector3::repeat(32768.0);
     Model { s, b: -s * zero }
 }
 

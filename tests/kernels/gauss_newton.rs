@@ -18,13 +18,8 @@ fn solve(
     start: Vec<f64>,
     options: &Options,
 ) -> Solution {
-    minimise(
-        &model,
-        |x| model(x).map(|(r, _)| r),
-        DVector::from_vec(start),
-        options,
-    )
-    .expect("solvable")
+    let residuals = |x: &DVector<f64>| model(x).map(|(r, _)| r);
+    minimise(&model, residuals, DVector::from_vec(start), options).expect("solvable")
 }
 
 #[test]

@@ -35,15 +35,8 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
     let rate_scale = Matrix3::new(0.01, 1e-4, -2e-4, 0.0, 0.011, 1e-4, 2e-4, 0.0, 0.009);
     let force_bias = Vector3::new(0.1, -0.2, 0.05);
     let zeros: Vec<Vector3<f64>> = (0..n_poses).map(|_| random.vector() * 3.0).collect();
-    let slow: Vec<Vector3<f64>> = (0..n_poses)
-        .map(|i| {
-            if i == 0 {
-                Vector3::zeros()
-            } else {
-                random.vector() * 0.01
-            }
-        })
-        .collect();
+    let mut slow = vec![Vector3::zeros()];
+    slow.extend((1..n_poses).map(|_| random.vector() * 0.01));
     let mut up = vec![Vector3::new(0.3, -0.5, 0.8).normalize()];
     let mut moves = Vec::new();
     let mut first_point = 0;
@@ -73,13 +66,14 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
             force.push(inverse_force * (here - force_bias) + offset);
         }
         up.push(exp(&(-axis * 1.8)) * up[m]);
+        let (ends, unresolved) = ([pose_time[m], pose_time[m + 1]], [Vector3::zeros(); 4]);
         moves.push(Move::new(
             m,
             &time,
             rate,
             force,
-            [pose_time[m], pose_time[m + 1]],
-            [Vector3::zeros(); 4],
+            ends,
+            unresolved,
             first_point,
         ));
         first_point += n;
@@ -117,10 +111,7 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
         up,
         pose_rate_bias: zeros,
         pose_force_bias: slow,
-        own: [
-            vec![Vector3::zeros(); n_poses],
-            vec![Vector3::zeros(); n_poses],
-        ],
+        own: [(); 2].map(|()| vec![Vector3::zeros(); n_poses]),
         effect: DVector::zeros(0),
     };
     (session, state)

@@ -17,11 +17,8 @@ fn timestamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
 
 /// A rate whose direction wanders, so that the commutator matters.
 fn wandering(t: f64) -> Vector3<f64> {
-    Vector3::new(
-        (2.0 * t).sin(),
-        1.5 * (1.3 * t + 0.4).cos(),
-        0.7 * (2.9 * t).sin(),
-    )
+    let (turning, leaning) = ((2.0 * t).sin(), 1.5 * (1.3 * t + 0.4).cos());
+    Vector3::new(turning, leaning, 0.7 * (2.9 * t).sin())
 }
 
 fn scale() -> Matrix3<f64> {
@@ -48,18 +45,10 @@ fn a_move_is_its_two_parts_one_after_the_other() {
                 anchor_before_s: -1.5,
                 anchor_after_s: 3.1,
             };
-            let model = RateModel::Linear;
-            let found = integrate_moves(
-                &time,
-                &raw,
-                &[range],
-                model,
-                &scale(),
-                &before,
-                &after,
-                &noise,
-            );
-            found.expect("a valid move").remove(0)
+            let (model, s) = (RateModel::Linear, scale());
+            integrate_moves(&time, &raw, &[range], model, &s, &before, &after, &noise)
+                .expect("a valid move")
+                .remove(0)
         };
         let (whole, first, second) = (of(0, 61), of(0, 25), of(24, 61));
         let back = first.rotation.transpose();

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use trihedron::session_model::chain::Layout;
 use trihedron::session_model::fit::{Fit, fit};
 use trihedron::session_model::move_rows::Weights;
+use trihedron::session_model::rows::Group;
 use trihedron::session_model::strength_search::Within;
 use trihedron::session_model::strengths::tune;
 use trihedron::session_model::{Distortion, Session, State, Strengths};
@@ -23,32 +24,34 @@ const STRENGTHS: Strengths = Strengths {
     excess: [1.0, 1.0],
 };
 
+/// Groups of rows at a state, the moves with the weights that another one gives them.
+fn groups(
+    session: &Session,
+    state: &State,
+    weighed_at: &State,
+    effects: &Distortion,
+) -> Vec<Group> {
+    let planes = session.planes(weighed_at);
+    let before = session.pass(weighed_at, effects, &planes);
+    let weights = Weights::of(&before, &STRENGTHS).expect("weights");
+    let passed = session.pass(state, effects, &planes);
+    let found = session.groups(state, &STRENGTHS, effects, &weights, &passed);
+    found.expect("rows")
+}
+
 fn residuals(
     session: &Session,
     state: &State,
     weighed_at: &State,
     effects: &Distortion,
 ) -> DVector<f64> {
-    let planes = session.planes(weighed_at);
-    let weights =
-        Weights::of(&session.pass(weighed_at, effects, &planes), &STRENGTHS).expect("weights");
-    let passed = session.pass(state, effects, &planes);
-    let groups = session
-        .groups(state, &STRENGTHS, effects, &weights, &passed)
-        .expect("rows");
-    let flat: Vec<f64> = groups
-        .iter()
-        .flat_map(|group| group.rows.residual.as_slice().to_vec())
-        .collect();
-    DVector::from_vec(flat)
+    let rows = |group: &Group| group.rows.residual.as_slice().to_vec();
+    let groups = groups(session, state, weighed_at, effects);
+    DVector::from_vec(groups.iter().flat_map(rows).collect())
 }
 
 fn jacobian(session: &Session, state: &State, effects: &Distortion) -> DMatrix<f64> {
-    let passed = session.pass(state, effects, &session.planes(state));
-    let weights = Weights::of(&passed, &STRENGTHS).expect("weights");
-    let groups = session
-        .groups(state, &STRENGTHS, effects, &weights, &passed)
-        .expect("rows");
+    let groups = groups(session, state, state, effects);
     let layout = session.layout(effects.k);
     let n: usize = groups.iter().map(|group| group.rows.len()).sum();
     let mut out = DMatrix::zeros(n, layout.n());

@@ -19,7 +19,7 @@ from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gravity_circle import opposite_headings
 from trihedron.estimate.gyroscope.findings import scale_findings
-from trihedron.estimate.gyroscope.lost_samples import missing_samples, unless_seen
+from trihedron.estimate.gyroscope.lost_samples import missing_samples
 from trihedron.estimate.gyroscope.measurements import GAP_STEPS
 from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
 from trihedron.estimate.gyroscope.turn_angles import (
@@ -203,7 +203,10 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
     missing = tuple(missing_samples(recording, segments, median(relative)))
     of_gyro = (*scale_findings(gyro.S, recording.gyroscope_unit), *sense_findings(calibration, recording, segments))
-    return (*unless_seen(fitted, missing), *of_gyro, *missing)
+    if missing:
+        # Losses detected in the motion are not also possible ones of the fit.
+        fitted = tuple(one for one in fitted if one.code is not FindingCode.LOSSES_POSSIBLE)
+    return (*fitted, *of_gyro, *missing)
 
 
 def _timed(found: Finding, recording: Recording, segments: Segments) -> Finding:

@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
 from trihedron.api.verifying import verify
-from trihedron.arrays import FloatArray, rms_of
+from trihedron.arrays import FloatArray, rms_of, sigmas_of
 from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
@@ -142,7 +142,7 @@ def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
         [part for _, _, S, b in sensors for part in ((change.rotation @ S).ravel(), change.rotation @ b)]
     )
     estimate = np.concatenate([part for _, sensor, _, _ in sensors for part in (sensor.S.ravel(), sensor.b)])
-    sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
+    sigma = sigmas_of(calibration.covariance)
     free = np.flatnonzero(sigma > 0.0)
     return Comparison(
         tuple(names[k] for k in free),

@@ -13,6 +13,7 @@ from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
+from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
@@ -44,7 +45,7 @@ def is_static_log(recording: Recording, segments: Segments, calibrated: Calibrat
     mean = segments.accelerometer_mean
     if mean is None or segments.n_poses < FEWEST_POSES:
         return True
-    up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    up = directions_of(mean)
     lasts = np.array([pose.stop - pose.start for pose in segments.poses], dtype=np.float64)
     of_orientations = []
     free = np.ones(len(up), dtype=bool)

@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.log import write_recording
@@ -195,7 +195,7 @@ def _matched(
         # A larger scatter with a smaller error is chance: continue with the expected slope.
         step = (seen - y1) / rising if rising > 0.0 else (seen - y1) * slope
         square = max(min(x1 + step, LARGEST_STEP * max(x1, x0)), 0.0)
-    best = min(tried, key=lambda one: abs(math.log(max(one[1], 1e-300) / max(seen, 1e-300))))[0]
+    best = min(tried, key=lambda one: abs(math.log(max(one[1], TINY) / max(seen, TINY))))[0]
     return None if best == before else (math.sqrt(best),) * 3
 
 

@@ -21,7 +21,7 @@ from trihedron.api.planning_poses import (
 )
 from trihedron.api.reading import segment
 from trihedron.api.verifying import own_calibration, verify
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
@@ -232,7 +232,7 @@ def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, F
     if calibration is None or not _is_determined(calibration):
         return nan, nan
     sensor = calibration.accelerometer
-    sigma = np.sqrt(np.maximum(np.diag(sensor.covariance), 0.0))
+    sigma = sigmas_of(sensor.covariance)
     scale = np.linalg.norm(sensor.S, axis=0)
     matrix = sigma[:9].reshape(3, 3) / scale
     accelerometer = np.array([*(matrix[j, k] for j, k in ENTRIES), *(sigma[9:] / gravity)])
@@ -240,7 +240,7 @@ def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, F
     if gyroscope is None or (gyroscope.observability is not None and gyroscope.observability.rank < 9):
         return accelerometer, nan
     size = np.linalg.norm(gyroscope.S, axis=0)
-    errors = np.sqrt(np.maximum(np.diag(gyroscope.covariance)[:9], 0.0)).reshape(3, 3) / size
+    errors = sigmas_of(gyroscope.covariance)[:9].reshape(3, 3) / size
     return accelerometer, errors.ravel()
 
 

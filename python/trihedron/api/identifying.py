@@ -23,6 +23,7 @@ from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.records import Calibration, Finding, Noise, Recording, TermName
+from trihedron.sensor_model import axis_scales
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -110,7 +111,7 @@ def _in_si(recording: Recording, known: Calibration) -> Recording:
     """Every axis divided by its sensitivity; axes are not rotated, so that every axis keeps the steps of its ADC."""
     check_units(known, recording)
     accelerometer, gyroscope = (
-        readings if sensor is None or readings is None else readings / np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+        readings if sensor is None or readings is None else readings * axis_scales(sensor.S)
         for readings, sensor in (
             (recording.accelerometer, known.accelerometer),
             (recording.gyroscope, known.gyroscope),

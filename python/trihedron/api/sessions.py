@@ -16,8 +16,7 @@ from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import of_another_unit
+from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity

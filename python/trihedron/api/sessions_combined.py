@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import TINY
 from trihedron.defaults import FALSE_ALARM
 from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_of_next
@@ -72,7 +73,7 @@ def _common(
             error[picked] = np.sqrt(term.covariance[:, 0, 0])
             spread[picked] = [spread_of_next(one) for one in term.remaining]
     total = sum(session.covariance for session in sessions) + len(sessions) * np.diag(spread**2)
-    root = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    root = np.sqrt(np.maximum(np.diag(total), TINY))
     covariance = total / np.outer(root, root) * np.outer(error, error) + np.diag(spread**2)
     parameters = model_vector(value, anchor)
     J = model_jacobian(value, anchor)

@@ -10,9 +10,10 @@ from itertools import product
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 from trihedron.records.segments import LEAST_POSE_S
+from trihedron.transforms import directions_of
 
 Examine = Callable[[], Examination]
 
@@ -191,7 +192,7 @@ class Guide:
     def _far_from_all(self) -> FloatArray:
         """The face, edge or corner direction farthest from every pose: the strictest verification of a calibration."""
         grid = np.array([direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)])
-        unit: FloatArray = grid / np.linalg.norm(grid, axis=1)[:, None]
+        unit: FloatArray = directions_of(grid)
         known = [] if self.examination is None else list(self.examination.poses_up)
         seen = [*known, *self._checks] or [np.array([0.0, 0.0, 1.0])]
         out: FloatArray = unit[int(np.argmin((unit @ np.array(seen).T).max(axis=1)))]
@@ -315,7 +316,7 @@ class Orientation:
         if stillness.still_for_s <= 0.0 or stillness.mean is None or self._mean is None:
             return False
         a, b = self._mean[:3], stillness.mean[:3]
-        cosine = float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+        cosine = float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), TINY)
         return cosine < math.cos(math.radians(MOVED_DEG))
 
     def add(self, stillness: Stillness) -> None:

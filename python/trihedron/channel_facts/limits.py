@@ -15,7 +15,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.probability import chdtrc
-from trihedron.quantiles import median
+from trihedron.quantiles import MAD_TO_SIGMA, median
 from trihedron.records.channel_facts import Limit
 
 FLAT = 1.5
@@ -29,8 +29,6 @@ WHITE = 0.2
 PROBED = 1 << 14
 """Readings, in ``STRETCHES`` parts evenly spread over the log, that give its scatter and its median."""
 STRETCHES = 16
-TO_SIGMA = 1.4826
-"""Standard deviation of a Gaussian over its median absolute deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +90,7 @@ class End:
         """Noise of one sample that dithers the LSB, 0 where it may be motion."""
         rough = np.abs(np.concatenate([np.diff(part, ORDER) for part in self.stretches]))
         rough = rough[np.isfinite(rough)]
-        seen = TO_SIGMA * median(rough) / GAIN if len(rough) else 0.0
+        seen = MAD_TO_SIGMA * median(rough) / GAIN if len(rough) else 0.0
         return min(seen, self.noise) if seen > WHITE * self.noise else 0.0
 
     @property
@@ -328,7 +326,7 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
     runs = end.runs if is_word else end.moving_runs
     runs = runs[np.diff(runs, axis=1)[:, 0] > 1]
     steps = np.abs(np.concatenate([np.diff(part[np.isfinite(part)]) for part in end.stretches]))
-    noise = TO_SIGMA * median(steps) / np.sqrt(2.0) if len(steps) else 0.0
+    noise = MAD_TO_SIGMA * median(steps) / np.sqrt(2.0) if len(steps) else 0.0
     pairs = 0
     for first, stop in runs[:: max(1, -(-len(runs) // MOST_RUNS))].tolist():
         if _falls_on_both_sides(column, first, stop, end.step, noise):

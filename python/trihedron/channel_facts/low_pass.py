@@ -17,7 +17,8 @@ from trihedron.records.pose_noise import Measured
 EARNED = 16.0
 """Decrease of the deviance that a corner requires: it is searched over a grid and five shapes."""
 RISE = 4.6
-"""Rise at the ends of its 95 % interval, where other terms are at a bound (docs/noise.md, 3)."""
+"""Rise of the deviance at the ends of a 95 % interval. For χ² with one degree of freedom it is 3.84, which covers only
+92 to 94 % with other terms at their bound 0 (docs/noise.md, 3)."""
 TOLERANCE = 0.03
 """Relative error of every band of the spectrum, at least: noise is not exactly flat, nor a filter exactly a shape."""
 SHAPE = 0.05

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.probability import fdtrc, stdtrit
+from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.records.pose_noise import Measured, Ratio
 
 MOST_LEFT_OUT = 0.25
@@ -33,9 +34,9 @@ def robust_poses(variance: FloatArray, dof: FloatArray) -> BoolArray:
     keep = np.asarray(variance > 0.0)
     if np.count_nonzero(keep) < 4:
         return keep if keep.any() else np.ones(len(variance), dtype=bool)
-    logs = np.log(np.maximum(variance, 1e-300))
+    logs = np.log(np.maximum(variance, TINY))
     centre = float(np.median(logs[keep]))
-    spread = 1.4826 * float(np.median(np.abs(logs[keep] - centre)))
+    spread = MAD_TO_SIGMA * float(np.median(np.abs(logs[keep] - centre)))
     score = (logs - centre) / np.sqrt(np.maximum(spread**2, 2.0 / dof))
     worst = np.argsort(-score)[: int(MOST_LEFT_OUT * len(variance))]
     keep[worst[score[worst] > FAR]] = False

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.ranges import edges_of
 from trihedron.records.channel_facts import Limit, RecordingFacts
 
@@ -158,6 +158,6 @@ def _shared(limit: Limit, all_limits: list[Limit]) -> Limit:
     exact = [abs(other.value) for other in alike if other.sigma == 0.0]
     if exact:
         return replace(limit, value=float(np.copysign(exact[0], limit.value)), sigma=0.0)
-    weights = np.array([1.0 / max(other.sigma, 1e-300) ** 2 for other in alike])
+    weights = np.array([1.0 / max(other.sigma, TINY) ** 2 for other in alike])
     mean = float(np.average([abs(other.value) for other in alike], weights=weights))
     return replace(limit, value=float(np.copysign(mean, limit.value)), sigma=float(1.0 / np.sqrt(weights.sum())))

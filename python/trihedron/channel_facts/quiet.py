@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.quantiles import median, medians, quantile
 
 WINDOW_S = 0.5
@@ -73,7 +73,7 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
         # The quietest tenth has the sensor's own noise; up to three times that is no hand motion.
         quiet &= value <= 3.0 * quantile(value, 0.1)
     if not quiet.any():
-        total = np.sum([v / max(median(v), 1e-300) for v in spread.values()], axis=0)
+        total = np.sum([v / max(median(v), TINY) for v in spread.values()], axis=0)
         quiet = np.asarray(total <= quantile(total, 0.1))
     if not quiet.any():
         quiet[:] = True

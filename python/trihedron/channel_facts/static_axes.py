@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.errors import InputError
-from trihedron.probability import chdtri
+from trihedron.probability import RARE_ALARM, chdtri
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
 from trihedron.records.pose_noise import PoseLine
@@ -98,7 +98,8 @@ class StaticAxis:
 
     @classmethod
     def of(cls, x: FloatArray, rate_hz: float, poses: Sequence[tuple[int, int]], name: str) -> StaticAxis:
-        parts = [run for start, stop in poses for run in _unbroken(x[start:stop])]
+        inside = [(x[start:stop], ranges_of(np.isfinite(x[start:stop]))) for start, stop in poses]
+        parts = [pose[a:b] for pose, runs in inside for a, b in runs if b - a >= SHORTEST]
         if not parts:
             raise InputError(f"{name}: no pose has {SHORTEST} readings in a row; keep the sensor still for longer")
         step = adc_step(np.concatenate(parts))
@@ -133,10 +134,6 @@ class StaticAxis:
     def dithers(self, variance: float) -> bool:
         """Whether noise of this variance dithers the LSB."""
         return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
-
-
-def _unbroken(part: FloatArray) -> list[FloatArray]:
-    return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
 
 
 def _power_of(parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -181,8 +178,6 @@ def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False
 
 # Spectral lines common to the poses of a session, and the poses without them.
 
-LINE_CHANCE = 1e-4
-"""False-alarm probability of a line over the poses of one axis."""
 LONGEST_PIECE = 4096
 """Readings of a piece that a line is subtracted from: the frequency error is a sixteenth of a period in it."""
 FINER = 16
@@ -194,8 +189,8 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     n = len(power)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
-    ratio = power * centre / np.maximum(level, 1e-300)
-    limit = chdtri(count, LINE_CHANCE / n) / count
+    ratio = power * centre / np.maximum(level, TINY)
+    limit = chdtri(count, RARE_ALARM / n) / count
     # The relative error of the neighbourhood's median is 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
     out: list[PoseLine] = []

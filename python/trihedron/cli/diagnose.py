@@ -67,7 +67,7 @@ def diagnose(
     known = None if calibration is None else read_calibration(calibration)
     recording = sources.one().read()
     from trihedron.api import diagnosing
-    from trihedron.files.diagnosis import diagnosis_document
+    from trihedron.files.calibration import diagnosis_document
     from trihedron.report.diagnosis import diagnosis_report, first_screen
 
     with progress("diagnosing") as notify:

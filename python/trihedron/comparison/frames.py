@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.comparison.rows import Sensor, difference
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import fdtrc, stdtrit
@@ -210,4 +210,4 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
         to_body = to_body @ world_back
         carried.append(to_body[:, 2])
     _, missed = Rotation.align_vectors(up, np.array(carried))
-    return CarriedGravity(float(np.sqrt(np.mean(np.square(misses)))), float(missed) / float(np.sqrt(len(up))))
+    return CarriedGravity(rms_of(misses), float(missed) / float(np.sqrt(len(up))))

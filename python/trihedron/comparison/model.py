@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.rows import SENSORS, difference
 from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration, model_of_diagnosis
@@ -215,7 +215,7 @@ def _as_given(checked: Verification) -> Stage:
         if not len(error):
             return []
         chi2 = None if noise is None else float(np.mean((error / noise) ** 2))
-        return [StageDomain(domain, float(np.sqrt(np.mean(error**2))), chi2, unit)]
+        return [StageDomain(domain, rms_of(error), chi2, unit)]
 
     return Stage(
         "as-given",

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
-from trihedron.comparison.draws import Draws, compare_draws
 from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, difference, measured_row
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import INPUT_ERRORS
@@ -18,6 +17,55 @@ from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import TimestampKind
+from trihedron.sensor_model import axis_scales
+
+NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
+"""Excess kurtosis of differences of two normal and of two uniform numbers."""
+ONE_DRAW, OWN_DRAWS = 0.75, 0.5
+"""Smallest correlation of axes with one noise common to all (an LSB of twice the noise leaves as much), and the largest
+of axes with noise of their own. Independent noise reaches neither; with ``FEWEST`` differences it reaches 0.2."""
+FEWEST = 256
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Distribution of the ``n`` static differences of one sensor: their mean excess kurtosis, and ``likeness``, the
+    smallest absolute correlation of any two axes."""
+
+    n: int
+    excess: float
+    likeness: float
+
+    @classmethod
+    def of(cls, differences: FloatArray) -> "Draws":
+        """Those of ``differences`` (n, 3) of neighbouring readings."""
+        centred = differences - differences.mean(axis=0)
+        power = np.maximum((centred**2).mean(axis=0), 1e-150)
+        excess = (centred**4).mean(axis=0) / power**2 - 3.0
+        products = np.abs(centred.T @ centred / len(centred)) / np.sqrt(np.outer(power, power))
+        return cls(len(differences), float(excess.mean()), float(products.min()))
+
+
+def compare_draws(
+    sensor: Sensor, model: Draws, recording: Draws, noise: Sequence[PoseNoise]
+) -> Iterator[NoiseDifference]:
+    """Uniform noise in place of normal where the LSB is finer; the same random numbers on all three axes, where the
+    recording's axes are independent."""
+    n, middle = min(model.n, recording.n), 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)
+    is_fine = all(axis.reading_sigma > axis.step for axis in noise)
+    # Four standard errors of a kurtosis of n correlated differences must fit between the two values.
+    is_measured = is_fine and 4.0 * math.sqrt(48.0 / max(n, 1)) <= -middle
+    if is_measured and model.excess < middle < recording.excess:
+        remark = f"The noise of the model's {NAMES[sensor]} is uniformly distributed; the recording's is normal."
+        yield difference(sensor, "distribution", (model.excess, recording.excess), "excess kurtosis", remark)
+    if n >= FEWEST and model.likeness > ONE_DRAW and recording.likeness < OWN_DRAWS:
+        remark = (
+            f"The noise of the model's {NAMES[sensor]} is one and the same on all three axes (they correlate by "
+            f"{model.likeness:.2f}, the recording's by {recording.likeness:.2f}): it was drawn once instead of three "
+            "times."
+        )
+        yield difference(sensor, "distribution", (model.likeness, recording.likeness), "correlation of axes", remark)
+
 
 SHARE = 0.125
 """Share of alpha for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is used for
@@ -76,7 +124,7 @@ def sampled(recording: Recording, poses: Sequence[Pose], model: FittedModel) -> 
         readings, fitted = getattr(recording, sensor), getattr(model, sensor)
         if readings is None or fitted is None:
             continue
-        si = readings / np.linalg.norm(np.linalg.inv(fitted.S), axis=1)
+        si = readings * axis_scales(fitted.S)
         try:
             noise[sensor] = noise_of_poses(si, recording.rate_hz, ranges)
         except INPUT_ERRORS:

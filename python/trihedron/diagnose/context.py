@@ -13,6 +13,7 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.sensor_model import axis_scales
 
 TEMPERATURE_WINDOW_S = 10.0
 """Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
@@ -137,13 +138,12 @@ class Context:
         """(points, 3) :attr:`axis_force` of sensor 0, :attr:`axis_rate` of sensor 1."""
         return self.axis_rate if sensor else self.axis_force
 
-    def on_accelerometers(self, values: FloatArray) -> FloatArray:
-        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
-        return _on_axes(self.accel_axes, values)
-
-    def on_gyros(self, values: FloatArray) -> FloatArray:
-        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of gyro j."""
-        return _on_axes(self.gyro_axes, values)
+    def on_axes(self, sensor: int, values: FloatArray) -> FloatArray:
+        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of axis j of a sensor."""
+        # ``axes[i, j] · values[:, j]`` as one matrix product, which is faster than row by row.
+        spread = np.zeros((3, 3, 3))
+        spread[range(3), :, range(3)] = (self.gyro_axes if sensor else self.accel_axes).T
+        return np.asarray((values @ spread.reshape(3, 9)).reshape(-1, 3, 3))
 
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
@@ -208,7 +208,7 @@ class Context:
     def si_per_raw(self, sensor: int) -> FloatArray:
         """(3,) SI size of one raw unit along each axis of sensor 0 (accelerometer) or 1 (gyro)."""
         state = self.fitted.state
-        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(state.gyro_S if sensor else state.accel_S), axis=1))
+        return axis_scales(state.gyro_S if sensor else state.accel_S)
 
     @cached_property
     def vibration_power(self) -> FloatArray:
@@ -330,11 +330,4 @@ def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:
 
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""
-    return np.asarray(S * np.linalg.norm(np.linalg.inv(S), axis=1))
-
-
-def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, 3, 3) ``axes[i, j] · values[:, j]`` as one matrix product, which is faster than row by row."""
-    spread = np.zeros((3, 3, 3))
-    spread[range(3), :, range(3)] = axes.T
-    return (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)
+    return np.asarray(S / axis_scales(S))

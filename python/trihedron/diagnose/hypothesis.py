@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
@@ -159,7 +159,7 @@ class Hypothesis:
     def is_shown(self, without: Hypothesis, k: int) -> bool:
         """Whether a parameter of term ``k`` exceeds its own σ and the held-out rms [SI] falls in one of its domains."""
         value, covariance = self.value(k)
-        if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
+        if not (np.abs(value) > sigmas_of(covariance)).any():
             return False
         before = physical_rms(without.fitted, without.prediction.innovation)
         after = physical_rms(self.fitted, self.prediction.innovation)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, FloatArray, IntArray
+from trihedron.arrays import AXES, TINY, FloatArray, IntArray, rms_of
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.accepted import effect_record, tried_candidate
 from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths
@@ -32,6 +32,7 @@ from trihedron.records import Pose, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
+from trihedron.sensor_model import axis_scales
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.session.model import LOWER, Prior
 from trihedron.transforms import directions_of
@@ -238,7 +239,7 @@ def _of_sensor(effect: AcceptedEffect, sensor: int, unit: str, share: float) -> 
 def _sizes(model: LinearModel, sensor: int) -> FloatArray:
     """(3,) size of a raw unit along every axis, in the model's unit."""
     side = (model.accelerometer, model.gyroscope)[sensor]
-    return np.ones(3) if side is None else np.asarray(1.0 / np.linalg.norm(np.linalg.inv(np.array(side["S"])), axis=1))
+    return np.ones(3) if side is None else axis_scales(np.array(side["S"]))
 
 
 def _unit(recording: Recording, model: LinearModel, sensor: int) -> str:
@@ -256,7 +257,7 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
     chi2 = float(np.mean(z**2))
     p = float(np.exp(-1.5 * max(chi2 - 1.0, 0.0))) if is_named else 1.0
     where = Where(("ag"[sensor] + AXES[int(z.std(axis=0).argmax())],)) if is_named else Where()
-    rms = float(np.sqrt(np.mean(x**2)))
+    rms = rms_of(x)
     disagrees = p < FALSE_ALARM / N_DOMAINS_TESTED
     return DomainTest(DOMAINS[sensor], chi2, float(x.size), p, disagrees, where, rms, unit)
 

@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.limits import TO_SIGMA
-from trihedron.quantiles import median
+from trihedron.quantiles import MAD_TO_SIGMA, median
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.sensor_model import correct, norms, other_form
 
@@ -40,7 +39,7 @@ def static_force(calibration: Calibration, norm_m_s2: float, force: FloatArray) 
     sensor, gravity = calibration.accelerometer, calibration.gravity_m_s2
     readings = correct(force, *other_form(sensor.S, sensor.b))
     errors, _, model = norm_error(sensor, readings, np.zeros_like(force), gravity)
-    scatter = TO_SIGMA * median(np.abs(errors - median(errors)))
+    scatter = MAD_TO_SIGMA * median(np.abs(errors - median(errors)))
     sigma = math.hypot(median(model), scatter)
     share = norm_m_s2 / gravity - 1.0
     case = "scatter" if scatter > OFF_GRAVITY * gravity else ""

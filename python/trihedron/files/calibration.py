@@ -29,6 +29,7 @@ from trihedron.records import (
     Observability,
     SensorCalibration,
 )
+from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.plain import as_plain, from_plain
 from trihedron.sanitise import escaped_json
 
@@ -271,3 +272,15 @@ def _folded(value: Any, indent: str = "") -> str:
     if isinstance(value, list) and any(isinstance(item, list | dict) for item in value):
         return "[\n" + ",\n".join(inner + _folded(item, inner) for item in value) + f"\n{indent}]"
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """A diagnosis as plain JSON types, valid against the schema; a number that is not finite is ``null``.
+
+    Raises ``InputError`` when it does not follow the schema: a defect of this program.
+    """
+    document: dict[str, Any] = plain(diagnosis.to_dict())
+    complaint = violation(document, "diagnosis")
+    if complaint:
+        raise InputError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
+    return document

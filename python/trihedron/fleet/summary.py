@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.defaults import FALSE_ALARM
-from trihedron.estimate.sessions.changes import changes_among
-from trihedron.estimate.sessions.one_unit import of_another_unit
+from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.estimate.sessions.spread import repeated_parameters
 from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc
@@ -94,7 +93,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
     numbers = None if row.get("parameters") is None else np.array(row["parameters"], dtype=np.float64)
     std = None
     if row.get("covariance") is not None:
-        std = np.sqrt(np.maximum(np.diag(np.array(row["covariance"], dtype=np.float64)), 0.0))
+        std = sigmas_of(np.array(row["covariance"], dtype=np.float64))
     return FleetLog(
         row["name"],
         row["serial"],
@@ -179,7 +178,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...],
             # Allow for a device that was measured less accurately than the others.
             worse = max(own[kept[worst], k] - float(np.delete(own[kept, k], worst).mean()), 0.0)
             spread = float(np.sqrt(variance * (1.0 + 1.0 / len(others)) + worse))
-            sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
+            sigmas = float(column[worst] - others.mean()) / max(spread, TINY)
             p = min(1.0, fdtrc(1, prior_dof + dof, sigmas**2) * n_tests)
             away = float(column[worst] - np.median(others))
             one = Outlier(names[kept[worst]], PARAMETERS[k], float(column[worst]), away, sigmas, p)
@@ -199,7 +198,7 @@ def _spread_of_axes(means: FloatArray) -> tuple[FloatArray, float]:
     estimated from the differences of their variances over all kinds of parameters (after Smyth 2004, moderated t).
     """
     n, k = means.shape
-    log = (np.log(np.maximum(means.var(axis=0, ddof=1), 1e-300)) + _log_bias(n - 1)).reshape(-1, 3)
+    log = (np.log(np.maximum(means.var(axis=0, ddof=1), TINY)) + _log_bias(n - 1)).reshape(-1, 3)
     # The median is robust against an outlying device; for χ² with two degrees of freedom it is ln 2 times the mean.
     of_axes = float(np.median(log.var(axis=1, ddof=1))) / np.log(2.0)
     apart = max(of_axes - _log_variance(n - 1), 0.0)

@@ -53,7 +53,8 @@ def read_allan_table(path: Path) -> AllanTable:
     if not values:
         raise ReadError(f"{path}: no column of Allan deviations among {', '.join(names)}; name it adev or avar.")
     deviation = np.stack([_deviation(table, i, keys[i]) for i in values], axis=1)
-    titles = [_title(keys[i], k) for k, i in enumerate(values)]
+    stems = [keys[i].removesuffix(_ending(keys[i])).strip("_") for i in values]
+    titles = [stem.replace("_", " ") or f"channel {k + 1}" for k, stem in enumerate(stems)]
     units = [_unit(names[i]) for i in values]
     rate, length = (
         None if (i := _one_of(keys, wanted)) is None else float(table.columns[i][0]) for wanted in (_RATE, _LENGTH)
@@ -88,10 +89,6 @@ def _one_of(keys: list[str], wanted: Iterable[str]) -> int | None:
 def _ending(key: str) -> str:
     """The word for a deviation or a variance with which a name ends; "" for other names."""
     return next((word for word in (*_DEVIATION, *_VARIANCE) if key == word or key.endswith("_" + word)), "")
-
-
-def _title(key: str, place: int) -> str:
-    return key.removesuffix(_ending(key)).strip("_").replace("_", " ") or f"channel {place + 1}"
 
 
 def _deviation(table: Table, column: int, key: str) -> FloatArray:

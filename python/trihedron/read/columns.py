@@ -213,10 +213,7 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
 
 def _named(table: Table, sensor: Sensor | None) -> Columns:
     assert table.names is not None
-    parsed = [
-        ColumnName() if not len(values) else _WARMTH if _is_warmth(name, values) else parse_name(name)
-        for name, values in zip(table.names, table.columns, strict=True)
-    ]
+    parsed = [_column_name(name, values) for name, values in zip(table.names, table.columns, strict=True)]
     notes: list[Finding] = []
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
@@ -265,12 +262,11 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
     )
 
 
-_WARMTH = ColumnName("temperature")
-
-
-def _is_warmth(name: str, values: FloatArray) -> bool:
-    """Whether a column named T without a unit decreases in too many rows for a clock, so that it is a temperature."""
-    return name.strip() == "T" and bool(np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values))
+def _column_name(name: str, values: FloatArray) -> ColumnName:
+    """What a name says; a column T without a unit that decreases in too many rows for a clock is a temperature."""
+    if name.strip() == "T" and np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values):
+        return ColumnName("temperature")
+    return parse_name(name) if len(values) else ColumnName()
 
 
 _FALLS = 0.05

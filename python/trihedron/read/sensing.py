@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
@@ -219,7 +219,7 @@ def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tu
     for name in ("first", "second"):
         noise = float(np.linalg.norm(windows.quiet_noise(name)))
         means = windows.quiet_mean(name)
-        scale = max(noise, 1e-12 * float(np.abs(means).max(initial=0.0)), 1e-300)
+        scale = max(noise, 1e-12 * float(np.abs(means).max(initial=0.0)), TINY)
         change.append(float(np.linalg.norm(means.std(axis=0))) / scale)
         level.append(float(np.median(np.linalg.norm(means, axis=1))) / scale)
     if max(change) > 5.0 and max(change) > 5.0 * min(change):

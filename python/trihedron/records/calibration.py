@@ -6,10 +6,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.errors import InputError
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
@@ -126,12 +126,12 @@ class SensorCalibration(Frozen):
     @property
     def sigma_S(self) -> FloatArray:
         """(3, 3) standard errors of S."""
-        return np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3)
+        return sigmas_of(self.covariance)[:9].reshape(3, 3)
 
     @property
     def sigma_b(self) -> FloatArray:
         """(3,) standard errors of b."""
-        return np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
+        return sigmas_of(self.covariance)[9:]
 
     @property
     def bias(self) -> FloatArray:
@@ -145,7 +145,7 @@ class SensorCalibration(Frozen):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Presented):
+class Calibration(Judged, Presented):
     """Both sensors in one body frame (instrument frame), with gravity, source recording and findings.
 
     Attributes
@@ -207,11 +207,6 @@ class Calibration(Presented):
         if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
             raise InputError(f"gravity must be in m/s², got {self.gravity_m_s2}")
         freeze(self)
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """True without a serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     @property
     def sensors(self) -> list[tuple[str, SensorCalibration]]:

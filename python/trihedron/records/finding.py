@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from numbers import Real
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol
 
 from trihedron.answers import ask
 from trihedron.records.checked import kind_of, word_of
@@ -234,3 +234,17 @@ class Finding(Frozen, Plain):
 
     def __str__(self) -> str:
         return f"{self.severity.value}: {self.seen}" + (f" {self.action}" if self.action else "")
+
+
+class HasFindings(Protocol):
+    @property
+    def findings(self) -> tuple[Finding, ...]: ...
+
+
+class Judged:
+    """A record whose findings decide whether it is to be trusted."""
+
+    @property
+    def is_trustworthy(self: HasFindings) -> bool:
+        """True without a serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.errors import InputError
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.frozen import Frozen
 from trihedron.units import radians_from_degrees
 
@@ -162,7 +162,7 @@ class AxisKalmanResult:
     @property
     def sigma(self) -> FloatArray:
         """(4,) standard errors of the constants."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return sigmas_of(self.covariance)
 
     @property
     def nis(self) -> FloatArray:
@@ -194,7 +194,7 @@ class Consistency:
 
 
 @dataclass(frozen=True, eq=False)
-class KalmanCalibration(Frozen):
+class KalmanCalibration(Judged, Frozen):
     """Calibration of a triad by Kalman filter.
 
     ``axes`` are ``raw = U f + U0`` of every axis; ``accelerometer`` is the direct form ``f = S raw + b`` with its
@@ -220,11 +220,6 @@ class KalmanCalibration(Frozen):
     def n_poses(self) -> int:
         """Number of poses used."""
         return len(self.references)
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """True without a serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
 
 @dataclass(frozen=True, eq=False)

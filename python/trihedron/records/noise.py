@@ -11,7 +11,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode, Judged, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
@@ -111,7 +111,7 @@ def allan_of_unit_terms(tau_s: FloatArray) -> dict[TermName, FloatArray]:
 
 
 @dataclass(frozen=True)
-class NoiseAxis(Frozen):
+class NoiseAxis(Judged, Frozen):
     """The noise of one axis.
 
     All values are in ``unit`` (the SI unit, or the raw unit where the scale is unknown) and seconds: Q [unit·s],
@@ -220,11 +220,6 @@ class NoiseAxis(Frozen):
         if place == len(tau) - 1 or variance[-1] < 1.02 * variance[place]:
             return None
         return float(tau[place]), float(np.sqrt(variance[place]))
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """True without a serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
 
 def _gauss_markov_mean(process: GaussMarkov, window_s: float) -> float:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import rms_of
 from trihedron.records.calibration import Calibration, FitQuality
 
 AT_REST = "one bias for the session"
@@ -52,4 +53,4 @@ def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
 
 
 def _rms(values: np.ndarray[Any, np.dtype[np.float64]]) -> float | None:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+    return rms_of(values) if len(values) else None

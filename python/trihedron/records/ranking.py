@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import rms_of
 from trihedron.records.presented import Printed
 from trihedron.records.verification import Verification
 
@@ -56,7 +57,7 @@ class Ranked:
     def static_rate_rms(self) -> float:
         """Calibrated rate in static poses [rad/s]: rms over the axes of the mean over poses; NaN without a gyro."""
         rest = self.verification.static_rate
-        return float(np.sqrt(np.mean(np.mean(rest, axis=0) ** 2))) if len(rest) else float("nan")
+        return rms_of(np.mean(rest, axis=0)) if len(rest) else float("nan")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.errors import InputError
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
@@ -84,7 +84,7 @@ class Estimate(Plain):
     @property
     def std(self) -> FloatArray:
         """(n,) standard errors."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)), dtype=np.float64)
+        return sigmas_of(self.covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class FitToReference(Plain):
 
     def sigmas(self) -> dict[str, Any]:
         """Standard errors of S (3, 3) and b (3,), as plain lists."""
-        sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        sigma = sigmas_of(self.covariance)
         return {"sigma_S": sigma[:9].reshape(3, 3).tolist(), "sigma_b": sigma[9:].tolist()}
 
 

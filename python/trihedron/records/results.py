@@ -6,6 +6,7 @@ from typing import Any
 from trihedron.answers import ask
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.finding import Judged
 from trihedron.records.kalman import KalmanCalibration, NormKalmanCalibration
 from trihedron.records.presented import Presented, Printed
 from trihedron.records.published import published_figures
@@ -15,7 +16,7 @@ from trihedron.sanitise import one_line
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationResult(Printed):
+class CalibrationResult(Judged, Printed):
     """A calibration with the segments and the recording that it was made from. ``print`` gives the report.
 
     Attributes
@@ -59,11 +60,6 @@ class CalibrationResult(Printed):
     def findings(self) -> tuple[Finding, ...]:
         """Findings of every stage."""
         return self.calibration.findings
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return self.calibration.is_trustworthy
 
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
@@ -211,7 +207,7 @@ class DiagnosisResult(Diagnosis, Presented):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult(Printed):
+class KalmanResult(Judged, Printed):
     """Result of the Kalman filter, with the segments and the recording that it is from. ``print`` gives the report.
 
     Attributes
@@ -239,11 +235,6 @@ class KalmanResult(Printed):
     def findings(self) -> tuple[Finding, ...]:
         """Findings of every stage."""
         return self.calibration.findings
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:
         return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"

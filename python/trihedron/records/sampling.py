@@ -25,8 +25,8 @@ class Sampling:
     """The clock of a recording.
 
     ``period_s`` with standard error ``sigma_period_s``; ``timestamp_error_s`` rms about the even clock;
-    ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples at ``n_losses`` places, valid
-    where ``counts_losses``; ``followed`` is the part of the timestamps' scatter that the sampling instants share (1:
+    ``is_even``: ``time_s`` is that even clock and not the timestamps; ``n_lost`` samples, valid where
+    ``counts_losses``; ``followed`` is the part of the timestamps' scatter that the sampling instants share (1:
     samples were taken when timestamped, 0: evenly) with ``sigma_followed`` (infinite without motion).
     """
 
@@ -37,7 +37,6 @@ class Sampling:
     is_even: bool = False
     counts_losses: bool = False
     n_lost: int = 0
-    n_losses: int = 0
     followed: float = 0.0
     sigma_followed: float = float("inf")
 

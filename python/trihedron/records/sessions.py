@@ -5,7 +5,7 @@ from typing import Literal
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.records.calibration import Calibration
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.frozen import Frozen
 
 By = Literal["session", "date", "device", "temperature"]
@@ -153,7 +153,7 @@ class ThermalModel:
 
 
 @dataclass(frozen=True, eq=False)
-class SessionsModel(Frozen):
+class SessionsModel(Judged, Frozen):
     """Many recordings of one unit as one model: ``calibration`` is common to them, its covariance that of the *next*
     session (error of the common parameters plus the spread between sessions)."""
 
@@ -165,8 +165,3 @@ class SessionsModel(Frozen):
     calibration: Calibration
     left_out: tuple[tuple[str, str], ...] = ()
     findings: tuple[Finding, ...] = ()
-
-    @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
@@ -88,17 +88,17 @@ class Verification(Presented):
     @property
     def norm_rms(self) -> float:
         """Root mean square of the norm error [m/s²]."""
-        return float(np.sqrt(np.mean(self.norm_error**2)))
+        return rms_of(self.norm_error)
 
     @property
     def angle_rms_deg(self) -> float:
         """Root mean square of the tilt error after rotations [deg]; NaN without moves."""
-        return float(np.sqrt(np.mean(self.angle_deg**2))) if len(self.angle_deg) else float("nan")
+        return rms_of(self.angle_deg)
 
     @property
     def angle_expected_deg(self) -> float:
         """Expected rms of the tilt error, by noise and the calibration's uncertainty [deg]; NaN without moves."""
-        return float(np.sqrt(np.mean(self.angle_sigma_deg**2))) if len(self.angle_deg) else float("nan")
+        return rms_of(self.angle_sigma_deg) if len(self.angle_deg) else float("nan")
 
     @property
     def is_passed(self) -> bool:

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.records import SensorCalibration
 from trihedron.sensor_model import other_form, other_form_jacobian
 
@@ -62,6 +62,6 @@ def axes_of(sensor: SensorCalibration) -> Axes:
         slope = -1.0 / np.sqrt(max(1.0 - cosine**2, 1e-12))
         wrt[3 + k, 3 * i : 3 * i + 3] = slope * (unit[j] - cosine * unit[i]) / sensitivity[i]
         wrt[3 + k, 3 * j : 3 * j + 3] = slope * (unit[i] - cosine * unit[j]) / sensitivity[j]
-    sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
-    sigma_at_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
+    sigma = sigmas_of(wrt @ covariance @ wrt.T)
+    sigma_at_zero = sigmas_of(covariance)[9:]
     return Axes(sensitivity, sigma[:3], at_zero, sigma_at_zero, at_zero / sensitivity, sigma[6:], skew, sigma[3:6])

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from trihedron.arrays import XYZ, BoolArray, FloatArray
+from trihedron.arrays import XYZ, BoolArray, FloatArray, sigmas_of
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
@@ -161,7 +161,7 @@ def correlations(calibration: Calibration) -> tuple[list[str], FloatArray]:
     """Names (k,) and correlations (k, k) of all free parameters of both sensors."""
     prefixes = {"accelerometer": "accel", "gyroscope": "gyro"}
     names = [f"{prefixes[sensor]} {name}" for sensor, _ in calibration.sensors for name in PARAMETER_NAMES]
-    sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
+    sigma = sigmas_of(calibration.covariance)
     free = np.flatnonzero(sigma > 0.0)
     r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
     return [names[k] for k in free], r

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray, rms_of
 from trihedron.records import Calibration, Finding, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE, counted_moves
 from trihedron.report.axes import BIAS, axes_of
@@ -81,7 +81,7 @@ def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
     for label, angles in pairs:
         known = angles[counted & np.isfinite(angles)]
         if len(known):
-            out.append((label, float(np.sqrt(np.mean(known**2))), float(known.max())))
+            out.append((label, rms_of(known), float(known.max())))
     return out
 
 
@@ -107,7 +107,7 @@ def _angle_words(quality: FitQuality) -> str:
 def move_floor(quality: FitQuality) -> float:
     """Tilt error by noise alone, rms over the moves that are not excluded, degrees."""
     noise = move_noise_deg(quality)[counted_moves(quality)]
-    return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
+    return rms_of(noise)
 
 
 def figures_table(calibration: Calibration, session_fit: Mapping[str, str]) -> Table | None:

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray, rms_of
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.calibration_charts import (
@@ -22,6 +22,7 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import pose_lines, signals_picture
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 FEWEST_NAMES = 2
@@ -56,7 +57,7 @@ def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level,
     before = mm_s2(uncalibrated_error(calibration, means))
     after = mm_s2(_unseen(quality))
     pose = np.arange(1, len(before) + 1, dtype=np.float64)
-    noise = float(np.sqrt(np.mean(mm_s2(quality.sigma) ** 2)))
+    noise = rms_of(mm_s2(quality.sigma))
     marks: list[Mark] = [*lines]
     marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
     worst = [f.numbers["worst_prediction_g"] for f in calibration.findings if "worst_prediction_g" in f.numbers]
@@ -155,7 +156,7 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: Float
         for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
-    return Chart((Sphere(title, force / np.linalg.norm(force, axis=1)[:, None], values, limit, tips),), legend=False)
+    return Chart((Sphere(title, directions_of(force), values, limit, tips),), legend=False)
 
 
 def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:

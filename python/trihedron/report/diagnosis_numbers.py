@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 
+from trihedron.arrays import TINY
 from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
 from trihedron.records.sessions import GEOMETRY, ONE_UNIT
 from trihedron.report.axes import BIAS, TRIAD
@@ -125,7 +126,7 @@ def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
 
 
 def _in_sigmas(p: ParameterDifference) -> float:
-    return abs(p.difference) / max(p.std, 1e-300)
+    return abs(p.difference) / max(p.std, TINY)
 
 
 def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:

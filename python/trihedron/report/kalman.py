@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ, FloatArray
+from trihedron.arrays import AXES, XYZ, FloatArray, rms_of
 from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
@@ -93,7 +93,7 @@ def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headl
         beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of "
         beside += f"cases): {_meaning(worst)}"
     of = "" if len(seen) == 1 else f", {name.upper()}"
-    rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
+    rms = rms_of(outcome.residual_m_s2)
     what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
     told = f"rms over {how_many(n, 'pose')}, {BY_FILTER}{'' if worst.n else _IN_SAMPLE}"
     return [
@@ -172,7 +172,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
 
 
 def _residual_words(residual: FloatArray) -> str:
-    rms, worst = float(np.sqrt(np.mean(residual**2))), float(np.max(np.abs(residual)))
+    rms, worst = rms_of(residual), float(np.max(np.abs(residual)))
     return f"{in_mm_s2(rms)} rms, {in_mm_s2(worst)} at worst, {BY_FILTER}"
 
 

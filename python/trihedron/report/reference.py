@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, XYZ
+from trihedron.arrays import AXES, TINY, XYZ, sigmas_of
 from trihedron.records import Calibration
 from trihedron.records.published import HELD_OUT
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
@@ -234,7 +234,7 @@ def _left(fit: FitToReference, scale: float, unit: str) -> str:
 
 def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
     scale, times = shared_power(fit.S)
-    sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    sigma = sigmas_of(fit.covariance)
     raw = "w" if symbol == "ω" else "a"
     rows = tuple(
         (

@@ -105,7 +105,7 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
     """Gravity error in static poses, tilt error after rotations, change of the static rate: name, rms, its unit, over
     how many, the expected rms with χ²/dof, the worst."""
     k, of = int(np.argmax(np.abs(v.norm_error))), how_many(len(v.norm_error), "pose")
-    expected, worst = float(np.sqrt(np.mean(v.norm_sigma**2))), f"{in_mm_s2(float(v.norm_error[k]))} in pose {k + 1}"
+    expected, worst = rms_of(v.norm_sigma), f"{in_mm_s2(float(v.norm_error[k]))} in pose {k + 1}"
     allowed = f"{in_mm_s2(expected)}, χ²/dof {plain_number(v.norm_chi2_per_dof, 2)}"
     rms = plain_number(mm_s2_from_m_s2(v.norm_rms))
     out = [("gravity error in static poses", rms, "mm/s²", of, allowed, worst)]

@@ -101,9 +101,7 @@ SEED_S = 1.0
 """The quietest 2 % of a log, and at least one second of it, count as still at first."""
 ROUNDING = 1e-7
 """Least noise over a channel's rms: running sums round at a tenth of this; no sensor's noise is so small."""
-FALSE_ALARM = 1e-4
-"""Probability that a still window counts as moving: once in minutes of windows, and so short a gap is closed again."""
-TAILS = (probability.ndtr(-1.0), -probability.ndtri(FALSE_ALARM))
+TAILS = (probability.ndtr(-1.0), -probability.ndtri(probability.RARE_ALARM))
 """Share of still windows below one deviation under their median, and deviations above it up to which they are still."""
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.probability import FALSE_ALARM
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
@@ -17,8 +18,6 @@ from trihedron.segment.runs import Run, means_of
 from trihedron.segment.settling import Settling
 from trihedron.units import rate_to_si
 
-CREEP_CHANCE = 1e-3
-"""Probability that any steady pose of a log is called settling though none is."""
 LARGEST_NOISE_G = 0.05
 """Noise of one sample, in g, above which poses vibrate: at 1 kHz the noisiest MEMS parts (400 µg/√Hz) reach 0.015."""
 LARGEST_DENSITY = np.radians(0.1)
@@ -34,7 +33,7 @@ def judge_runs(
 ) -> list[Finding]:
     """Settling, disturbances and unsteadiness of single poses, each with its number and time."""
     found: list[Finding] = []
-    sizes = _settling_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
+    sizes = _settling_sizes(channels, runs, noise, FALSE_ALARM / max(len(runs), 1))
     creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
     if creeping:
         worst, k = max(creeping)

@@ -32,8 +32,6 @@ EDGE_BLOCKS = [2**k for k in range(16)]
 """Lengths of the edges of a pose that are compared with its middle, in blocks."""
 CREEP_PART = 0.02
 """Rate of a settling support over that of the log's own moves, at most."""
-SAME_POSE = 1e-3
-"""Probability that two parts of one pose are taken for two poses."""
 SWAY_RAD = 0.02
 """About one degree, the tremor and sway of a hand that tries to hold still: the limit for an unsteady pose."""
 ONE_WAY = 0.5
@@ -166,7 +164,7 @@ def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise,
     variance += 2.0 * channels.quantisation_variance
     live = variance > 0.0
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
-    if statistic > float(probability.chdtri(int(live.sum()), SAME_POSE)):
+    if statistic > float(probability.chdtri(int(live.sum()), probability.FALSE_ALARM)):
         return False
     return _comes_back(channels, before, after, noise, creeping)
 
@@ -184,7 +182,7 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
     variance = noise.variance(len(rate) * channels.step_s)[gyro]
     live = variance > 0.0
     statistic = float(np.sum(net[live] ** 2 / variance[live]))
-    is_nothing = statistic < float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
+    is_nothing = statistic < float(probability.chdtri(max(int(live.sum()), 1), probability.FALSE_ALARM))
     travelled = float(np.linalg.norm(rate, axis=1).mean())
     return is_nothing or float(np.linalg.norm(net)) < max(RETURN * travelled, creeping)
 
@@ -271,7 +269,7 @@ def turns_on(channels: Channels, first: int, last: int, bias: FloatArray, still:
     along = float(np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * n))
     parts = [run.quiet_rows(channels.mean)[:, gyro] for run in still]
     noise = float(np.median([part.var(axis=0).sum() for part in parts])) if parts else 0.0
-    is_seen = along > float(probability.chdtri(6, SAME_POSE)) * noise / (3.0 * n)
+    is_seen = along > float(probability.chdtri(6, probability.FALSE_ALARM)) * noise / (3.0 * n)
     return is_seen and along > ONE_WAY * (float(np.mean(np.sum(rate**2, axis=1))) - noise)
 
 

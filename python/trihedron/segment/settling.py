@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.probability import fdtrc
+from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.segment.channels import Channels
 from trihedron.segment.means import PoseMeans, along_verticals, upright
 from trihedron.segment.runs import Run, means_of
@@ -16,8 +16,6 @@ TIME_CONSTANTS_S = 0.7 * 2.0 ** np.arange(0.0, 4.1, 0.5)
 """Up to 11.2 s. Faster ones are over before a pose counts as static, slower ones are a drift."""
 FINER = 2.0 ** np.array([-0.36, -0.25, -0.16, -0.09, -0.04, 0.04, 0.09, 0.16, 0.25, 0.36])
 """Factors on the likeliest: strong settling shows its time constant to a percent."""
-FALSE_ALARM = 1e-3
-"""Probability, over all time constants, that a sound accelerometer is found to settle."""
 FEWEST_POSES = 9
 """Three components, and twice as many poses that show how much the decay scatters from pose to pose."""
 FEWEST_ON_QUADRIC = 18

@@ -8,12 +8,12 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.quantiles import medians
+from trihedron.quantiles import MAD_TO_SIGMA, medians
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.means import left_by_rounding
-from trihedron.segment.runs import CREEP_PART, SAME_POSE, SWAY_RAD, speed_of_moves
+from trihedron.segment.runs import CREEP_PART, SWAY_RAD, speed_of_moves
 
 TILT_SIGMAS = 6.0
 """Standard errors of gravity by which a rotation that the gyro reads must differ from none to be a bias."""
@@ -46,7 +46,7 @@ def turning_blocks(
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(LEAST_POSE_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - bias), long[:-1], axis=0)[::2]
-        scatter = np.maximum(scatter, 1.4826 * medians(nearest))
+        scatter = np.maximum(scatter, MAD_TO_SIGMA * medians(nearest))
     # A few short poses have few independent seconds, among which the shortest interval is too short. No window has a
     # smaller error than the white noise of its blocks.
     inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])
@@ -100,7 +100,7 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     statistic = float((drift[live] ** 2 / variance[live]).sum())
     # The halves' means differ by half of the whole drift.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
-    return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
+    return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), probability.FALSE_ALARM))
 
 
 def _would_tilt(channels: Channels, first: int, last: int, turned: FloatArray) -> bool:

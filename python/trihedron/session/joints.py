@@ -7,7 +7,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import chdtri
-from trihedron.session.aliasing import GAP
+from trihedron.session.averaging import GAP
 
 STRONG = 20.0
 """Odds that are strong evidence (Kass, Raftery 1995), asked of a loss after its number and its joint were chosen."""

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.probability import MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
 from trihedron.records.calibration import Calibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.aliasing import unresolved_variance
+from trihedron.session.averaging import unresolved_variance
 from trihedron.session.rounding import rounding_of_moves
 from trihedron.transforms import directions_of
 
@@ -78,11 +78,11 @@ class SessionNoise:
         vertical where it is known, because static poses show no other scatter.
         """
         out = np.ones((2, 3))
-        out[0] = np.sqrt(np.mean(medians(self.pose_force_sigma) ** 2))
+        out[0] = rms_of(medians(self.pose_force_sigma))
         if self.force_up is not None and np.isfinite(self.force_up[1]).any():
             out[0] = np.nanmedian(self.force_up[1])
         if self.pose_rate_sigma is not None:
-            out[1] = np.sqrt(np.mean(medians(self.pose_rate_sigma) ** 2))
+            out[1] = rms_of(medians(self.pose_rate_sigma))
         return np.maximum(out, TINY)
 
 
@@ -212,7 +212,7 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray | Non
         return 0.0
     spans, along = spans[usable], np.eye(3)[None] if up is None else up[usable, None, :]
     halves, parts = (_steps(readings, spans, along, n) for n in (2, PARTS))
-    return float(np.sqrt(np.mean(_between_poses(halves, parts, spans) ** 2)))
+    return rms_of(_between_poses(halves, parts, spans))
 
 
 def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> FloatArray:

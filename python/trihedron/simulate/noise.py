@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import InputError
 from trihedron.simulate.motion.plan import Label
 from trihedron.simulate.readout import NONE, Triple
@@ -88,7 +88,7 @@ def bias_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, 
     for (_, start_s), (stop_s, _) in pairwise(_stretches(labels)):
         ends = rng.standard_normal((2, 3)) * np.asarray(sigma)
         first, last = np.searchsorted(time_s, [start_s, stop_s])
-        part = ((time_s[first:last] - start_s) / max(stop_s - start_s, 1e-300))[:, None]
+        part = ((time_s[first:last] - start_s) / max(stop_s - start_s, TINY))[:, None]
         out[first:last] = (1.0 - part) * ends[0] + part * ends[1]
     return out
 

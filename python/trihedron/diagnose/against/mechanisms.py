@@ -109,7 +109,8 @@ def compare_effects(
     missing: list[AcceptedEffect] = []
     left = list(model)
     for effect in found.effects:
-        partner = next((m for m in left if _are_one(m, effect)), None)
+        as_one = {effect.id, *effect.confounded_with}
+        partner = next((m for m in left if m.id in as_one or effect.id in m.confounded_with), None)
         if partner is not None:
             left.remove(partner)
             pairs.append((partner, effect))
@@ -187,10 +188,6 @@ def _would_drift(effect: AcceptedEffect, found: Diagnosis) -> bool:
 
 def _is_free(effect: AcceptedEffect) -> bool:
     return effect.model.get("variant") == FREE_CURVE
-
-
-def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:
-    return a.id == b.id or a.id in b.confounded_with or b.id in a.confounded_with
 
 
 def _parameters(

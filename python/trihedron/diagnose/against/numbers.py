@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron.arrays import AXES, TINY, FloatArray, rms_of, sigmas_of
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import chdtri, fdtrc
@@ -122,7 +122,7 @@ def compare_numbers(
     out: list[ParameterDifference] = []
     for group, p_value, is_significant in zip(groups, p.tolist(), significant.tolist(), strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group
-        sigma = np.sqrt(np.maximum(np.diag(named.covariance), 0.0))
+        sigma = sigmas_of(named.covariance)
         remark = named.remark if is_significant or named.is_relative else ""
         # Scales were compared by their logarithms.
         apart = np.expm1(named.difference) if named.id in RELATIVE else named.difference
@@ -213,7 +213,7 @@ def _never_added(
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
     is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, NO_BIAS)
-    would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
+    would_show = bool(np.all(sigma < WOULD_SHOW * rms_of(recording)))
     name = "accelerometer" if prefix == "accel" else "gyro"
     return words("biases-never-added", sensor=name) if is_none and would_show else ""
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trihedron.arrays import AXES
+from trihedron.arrays import AXES, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence, per_axis_parameters
 from trihedron.records.domains import Where
@@ -26,7 +26,7 @@ class AxisHandedness(DirectEffect):
         order, against = order_and_reversed(S)
         moved, reversed_axes = [AXES[j] for j in range(3) if order[j] != j], [AXES[j] for j in against]
         main, n = np.argmax(np.abs(S), axis=0), len(reversed_axes)
-        sigma = np.sqrt(np.maximum(np.diag(context.fitted.covariance())[9:18], 0.0)).reshape(3, 3)
+        sigma = sigmas_of(context.fitted.covariance())[9:18].reshape(3, 3)
         largest = S[main, range(3)]
         # The sign of an axis is used only where its scale is determined.
         if not (moved or n) or (np.abs(largest) < SIGN_SIGMA * sigma[main, range(3)]).any():

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Distortion
@@ -135,7 +135,7 @@ class Effect:
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones, then the shape parameters with ``shape_sigma`` as uncertainty."""
-        sigma = abs(variant.scale) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma = abs(variant.scale) * sigmas_of(covariance)
         linear = tuple(
             EffectParameter(name, variant.scale * float(v), float(s), unit)
             for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
@@ -221,9 +221,6 @@ def acting_on(sensor: int, columns: FloatArray) -> Distortion:
 def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
     """Values (points, 3) along the axes of a sensor (0 accelerometer, 1 gyro), or (points, 1) alike on all of them, as
     three parameters each."""
-    columns = [
-        (context.on_gyros if sensor else context.on_accelerometers)(np.broadcast_to(one, (len(one), 3)))
-        for one in values
-    ]
+    columns = [context.on_axes(sensor, np.broadcast_to(one, (len(one), 3))) for one in values]
     whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
     return acting_on(sensor, whole)

@@ -8,7 +8,7 @@ Columns are computed for a time of a grid and scale with their parameter, which 
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
 from trihedron.diagnose.session.solve import Distortion
@@ -68,7 +68,7 @@ class SensorLag(Effect):
         return _filtered(context, sensor, variant.scale * float(value[0]), variant.label)
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
-        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma = sigmas_of(covariance)
         if (value < -SIGMAS * sigma).any() or not (value > 0.0).any():
             return False
         return not _has_size(variant) or is_near_one(value, covariance)

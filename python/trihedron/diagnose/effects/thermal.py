@@ -74,7 +74,8 @@ class ThermalBias(Thermal):
         shapes = {"linear": powers[:1], "quadratic": powers[:2]}
         # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
         is_fitted, beside = context.obs.n_poses > 0, {}
-        if speed is not None and (not is_fitted or _varies(speed)):
+        varies = speed is not None and speed.any() and np.ptp(speed) >= LEAST_RATE_RANGE * np.abs(speed).max()
+        if speed is not None and (not is_fitted or varies):
             beside["rate"] = [("bias_per_kelvin_per_s", speed[:, None], f"{unit}/(K/s)")]
             if not is_fitted or (speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S):
                 beside["hysteresis"] = [("half_gap", np.tanh(speed / BRANCH_K_S)[:, None], unit)]
@@ -93,10 +94,6 @@ class ThermalBias(Thermal):
             )
             for label, parts in shapes.items()
         ]  # fmt: skip
-
-
-def _varies(speed: FloatArray) -> bool:
-    return bool(speed.any() and np.ptp(speed) >= LEAST_RATE_RANGE * np.abs(speed).max())
 
 
 class AccelThermalBias(ThermalBias):

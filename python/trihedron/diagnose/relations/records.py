@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
@@ -34,7 +34,7 @@ def records(found: Related) -> tuple[Relation, ...]:
 
 
 def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
-    effect, sigma = one.effect, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    effect, sigma = one.effect, sigmas_of(covariance)
     axes = tuple(one.term.variant.label)
     # The column of poses without a known previous rotation is no coefficient of the relation.
     told = [k for k, name in enumerate(effect.names) if name != NOT_TURNED]

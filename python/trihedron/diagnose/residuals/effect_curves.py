@@ -12,6 +12,7 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import EffectCurve
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.words import words
+from trihedron.transforms import directions_of
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
     ("static-accel", "static-length", "m/s^2", "pose", ("norm",)),
@@ -245,7 +246,7 @@ def _of_poses(context: Context, sensor: str, one: _Column, left: DomainResiduals
     if sensor == "gyroscope":
         return nothing if one.is_relative else (np.arange(h), left.after @ one.direction)
     # The norm determines only the component along gravity.
-    up = context.force[:h] / np.linalg.norm(context.force[:h], axis=1)[:, None]
+    up = directions_of(context.force[:h])
     part = up @ one.direction
     said = np.flatnonzero(np.abs(part) >= LEAST_PART)
     along = left.after[said, 0] / part[said]

@@ -9,6 +9,7 @@ from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import f_upper
 from trihedron.records.domains import DOMAINS, Domain, DomainTest, Where
+from trihedron.sensor_model import axis_scales
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF
 
@@ -78,7 +79,7 @@ def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
         )
 
     accel, of_rate = of(0, obs.norm_sigma(state.up @ state.accel_S)), obs.pose_rate_sigma
-    return accel, None if of_rate is None else of(1, of_rate / np.linalg.norm(np.linalg.inv(state.gyro_S), axis=1))
+    return accel, None if of_rate is None else of(1, of_rate * axis_scales(state.gyro_S))
 
 
 def locate(fitted: Fit, label: int) -> Where:

@@ -10,19 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Prior, SessionReadings, SessionState
 from trihedron.session.noise import along_gradient, measure_noise
-from trihedron.session.static_lines import means_beside_lines
 from trihedron.session.support import Support, support_of
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
 have an uncertainty of a fifth."""
+FEWEST_SAMPLES = 64
+"""A spectrum of fewer samples has too few frequencies to separate a line from the noise around it."""
 LONGEST_MOVE_S = 180.0
 """Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
@@ -225,3 +226,44 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     """
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
     return np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
+
+
+def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segments, FloatArray]:
+    """Segments whose poses with a line have mean and standard error of a fit of constant + lines; swing of the lines
+    (docs/diagnosis-method.md, 8.0).
+
+    A sinusoid of amplitude A that is no whole number of cycles moves the mean of a pose of length T by up to A/(πfT),
+    and block means scatter by it. Poses without a significant line stay as they are. Samples are taken as even.
+
+    The swing (h, 2, 3), force and rate, is the variance of a line's integral at the edge of its pose, (raw unit · s)²:
+    A²/2(2πf)². A move that begins or ends in it does not begin or end at rest.
+    """
+    changed: dict[str, FloatArray] = {}
+    swing = np.zeros((segments.n_poses, 2, 3))
+    both = (("accelerometer", recording.accelerometer), ("gyroscope", recording.gyroscope))
+    for s, (sensor, readings) in enumerate(both):
+        mean, error = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
+        sigma = getattr(segments, f"{sensor}_sigma")
+        if readings is None or mean is None or error is None or sigma is None or not len(mean):
+            continue
+        white = sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]
+        # Ratio of the errors of means to white noise: a line does not change the slow noise.
+        colour = np.maximum(np.median(error / np.maximum(white, TINY), axis=0), 1.0)
+        new_mean, new_error = mean.copy(), error.copy()
+        for k, pose in enumerate(segments.poses):
+            part = readings[pose.start : pose.stop]
+            if pose.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
+                continue
+            found = _core.pose_beside_lines(part, sigma)
+            if found is None:
+                continue
+            fitted, own, integral, has_line = (np.array(of_axes) for of_axes in found)
+            swing[k, s] = np.where(has_line, integral / recording.rate_hz**2, 0.0)
+            new_mean[k] = np.where(has_line, fitted, mean[k])
+            new_error[k] = np.where(has_line, colour * own, error[k])
+        if (new_mean != mean).any():
+            changed |= {f"{sensor}_mean": new_mean, f"{sensor}_sigma_mean": new_error}
+            if s == 0 and segments.accelerometer_sigma_up is not None:
+                moved = (new_mean != mean).any(axis=1)
+                changed["accelerometer_sigma_up"] = np.where(moved, np.nan, segments.accelerometer_sigma_up)
+    return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]

@@ -12,6 +12,7 @@ from trihedron.records import Calibration, Recording, Segments, SensorCalibratio
 from trihedron.records.diagnosis import LinearModel
 from trihedron.sensor_model import in_frame
 from trihedron.session.model import LOWER, Prior, SessionState
+from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
 OPEN_BIAS_M_S2, OPEN_SCALE = 0.3, 0.03
@@ -94,7 +95,7 @@ def _rate_of_count(recording: Recording, segments: Segments) -> float:
     mean, bias = segments.accelerometer_mean, segments.gyroscope_mean
     if recording.gyroscope is None or mean is None or bias is None:
         return 1.0
-    up = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+    up = directions_of(mean)
     ratios = []
     for move in segments.moves:
         angle = float(np.arccos(np.clip(up[move.pose_before] @ up[move.pose_after], -1.0, 1.0)))

@@ -11,10 +11,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import design_rows, wrt_relative_errors
 from trihedron.estimate.accelerometer.verdict import covariance_scale
-from trihedron.probability import fdtrc
+from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.records import Calibration, Finding, FindingCode, Segments
 from trihedron.sensor_model import correct, in_frame
 from trihedron.transforms import directions_of
@@ -132,8 +132,6 @@ SHAPES: Mapping[str, Callable[[FloatArray], FloatArray]] = MappingProxyType(
     {"quadratic": lambda u: u**3, "cubic": lambda u: u**4, "unlike-scales": lambda u: np.abs(u) ** 3}
 )
 """Relative change (n, 3) of |f| by each nonlinear axis, as a function of the unit vertical (n, 3)."""
-CHANCE = 1e-3
-"""p-value below which a shape is detected: false alarms of a linear sensor, over all shapes."""
 LEAST_REST = 3
 """Fewest residual degrees of freedom beside a shape: with fewer, one pose dominates the F statistic."""
 AS_WELL = 20.0
@@ -157,7 +155,7 @@ class Shape:
 def shape_of(
     up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float, scale: float
 ) -> Shape | None:
-    """Shapes with p below ``CHANCE`` that shift a parameter by more than ``MATTERS`` σ, or ``None``.
+    """Shapes with p below ``FALSE_ALARM`` that shift a parameter by more than ``MATTERS`` σ, or ``None``.
 
     ``up`` (n, 3) are unit verticals, ``residual``, ``sigma`` (n,) gravity errors in static poses after the fit and
     their noise [m/s²]; ``scale`` is the χ² per degree of freedom by which the covariance of S and b is widened.
@@ -180,10 +178,10 @@ def shape_of(
         if k == 0 or dof < LEAST_REST:
             continue
         drop = float(np.sum((left_over[:, seen].T @ left) ** 2))
-        of_one = fdtrc(k, dof, (drop / k) / max((float(left @ left) - drop) / dof, 1e-300))
+        of_one = fdtrc(k, dof, (drop / k) / max((float(left @ left) - drop) / dof, TINY))
         chances[name] = float(min(len(SHAPES) * of_one, 1.0))
     p = min(chances.values(), default=1.0)
-    if not p < CHANCE:
+    if not p < FALSE_ALARM:
         return None
     names = tuple(sorted((one for one in chances if chances[one] <= AS_WELL * p), key=chances.__getitem__))
     shift = np.sqrt(np.diag(covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), gravity_m_s2)))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import probability
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.estimate.accelerometer import face_poses, verdict
 from trihedron.estimate.accelerometer.face_poses import placements
 from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
@@ -18,6 +18,7 @@ from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
 from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
 METHOD = "faces of the case on a level table"
@@ -177,7 +178,7 @@ def _held_out(seen: _Faces, estimate: _Estimate, widened: KnownFit) -> FloatArra
     residual, covariance, _ = widened.left_out()
     S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
     force = seen.values @ S.T + b
-    along = force / np.linalg.norm(force, axis=1, keepdims=True) @ S
+    along = directions_of(force) @ S
     sigma2 = np.einsum("ni,nij,nj->n", along, covariance, along)
     return np.column_stack([np.einsum("ni,ni->n", along, residual), np.sqrt(sigma2)])
 
@@ -196,12 +197,12 @@ def _quality(seen: _Faces, estimate: _Estimate, is_face: BoolArray, apart: Float
         sigma=sigma,
         chi2=estimate.chi2_noise,
         dof=dof,
-        rms=float(np.sqrt(np.mean(in_m_s2**2))),
+        rms=rms_of(in_m_s2),
         rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / dof)) if dof > 0 else float("nan"),
         floor=float(np.sqrt(floor)),
         held_out=apart[:, 0],
         held_out_sigma=apart[:, 1],
-        held_out_rms=float(np.sqrt(np.mean(apart[is_held, 0] ** 2))) if is_held.any() else None,
+        held_out_rms=rms_of(apart[is_held, 0]) if is_held.any() else None,
         stopped_because=words("linear-least-squares"),
     )
 

@@ -6,13 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
 from trihedron.records import Finding, FindingCode, FitQuality, SensorCalibration
 from trihedron.records.words import words
+from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit
 
 METHOD = "norm of gravity in static poses"
@@ -72,7 +73,7 @@ def _assemble(
     # f = S₊ (D a') + b: flipping a raw axis flips a column of S.
     S = fit.S * signs
     f = values @ S.T + fit.b
-    up = f / np.linalg.norm(f, axis=1)[:, None]
+    up = directions_of(f)
     residual, sigma, chi2 = fit.residuals, fit.sigmas, fit.chi2
     dof = len(values) - N_PARAMETERS
     scale = verdict.covariance_scale(chi2, dof)
@@ -136,14 +137,14 @@ def gravity_quality(
         unit="m/s^2",
         residual=residual,
         sigma=sigma,
-        chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
+        chi2=float(np.sum((residual / np.maximum(sigma, TINY)) ** 2)),
         dof=max(dof, 0),
         rms=float(np.sqrt(total / len(residual))),
         rms_dof=float(np.sqrt(total / dof)) if dof > 0 else float("nan"),
-        floor=float(np.sqrt(np.mean(sigma**2))),
+        floor=rms_of(sigma),
         held_out=None if held is None else held[0],
         held_out_sigma=None if held is None else held[1],
-        held_out_rms=float(np.sqrt(np.mean(known**2))) if known is not None and len(known) else None,
+        held_out_rms=rms_of(known) if known is not None and len(known) else None,
     )
 
 

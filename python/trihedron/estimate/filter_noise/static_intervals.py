@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, rms_of
+from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import NORMAL_95
 from trihedron.records import NoiseAxis, Segments, TermName
@@ -36,8 +36,8 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
         return Bounded(0.0, 0.0, limit, True)
     value = rms_of(np.array([one.value for one in terms]))
     # Errors of the axes are independent: variances add.
-    spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, 1e-300))
-    factor = math.exp(NORMAL_95 * spread / max(value, 1e-300))
+    spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, TINY))
+    factor = math.exp(NORMAL_95 * spread / max(value, TINY))
     return Bounded(value, value / factor, value * factor)
 
 
@@ -93,7 +93,7 @@ def between_intervals(
     return IntervalCheck(
         n=len(poses),
         longest_s=float(apart.max()),
-        bias_change=float(np.sqrt(np.mean(np.diff(bias, axis=0) ** 2))),
+        bias_change=rms_of(np.diff(bias, axis=0)),
         predicted=float(np.sqrt(np.mean(predicted))),
         gravity_spread=float(gravity.std() / gravity.mean()),
     )

@@ -11,6 +11,7 @@ from scipy.special import logsumexp, ndtr, ndtri
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, WEIGHTS, Stretch
 from trihedron.estimate.reference.beside import BLOCK_S
+from trihedron.estimate.reference.likelihood import FARTHEST
 from trihedron.probability import NORMAL_95
 from trihedron.records.filter_noise import Bounded
 
@@ -21,8 +22,6 @@ standard normal number whose quantile Φ(x), in right angles, is the angle with 
 half-Cauchy; Φ(x) as the share of the *square* makes a zero body part so unlikely that ``slow`` comes out too small."""
 SLOW_S = COORDINATES.index("slow_s")
 MAY_BE_NOTHING = np.isin(COORDINATES, ("vibration", "bias_walk", "white", "slow", "per_kelvin"))
-FARTHEST = 4.0
-"""Limit of the search in prior σ: beyond it a strength is negligible."""
 STEP = 1e-3
 """Step in a coordinate for derivatives of the covariance."""
 SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
@@ -115,8 +114,9 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     """Gradient (f,) of the log posterior, and its average information (f, f; Gilmour et al. 1995)."""
     free = prior.is_there > 0.0
     far, sigma = x - prior.mean[free], prior.sigma[free]
-    # Second derivative by the logarithm, averaged over the prior.
-    slope = np.where(prior.may_be_nothing[free], _half_slope(far), -far / sigma**2)
+    # Of the log half-Cauchy density by the logarithm of the strength; the second derivative averaged over the prior.
+    half_cauchy = 1.0 - 2.0 / (1.0 + np.exp(-2.0 * far))
+    slope = np.where(prior.may_be_nothing[free], half_cauchy, -far / sigma**2)
     information = np.diag(np.where(prior.may_be_nothing[free], 0.5, 1.0 / sigma**2))
     at = whole(prior, x)
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
@@ -132,11 +132,6 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
             slope[k] += 0.5 * (weighed @ carried[k] - np.sum(inverse * change))
         information += 0.5 * np.array(carried) @ inverse @ np.array(carried).T
     return slope, information
-
-
-def _half_slope(far: FloatArray) -> FloatArray:
-    """Derivative of the log half-Cauchy density by the logarithm of the strength."""
-    return np.asarray(1.0 - 2.0 / (1.0 + np.exp(-2.0 * far)))
 
 
 def height(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> float:

@@ -192,11 +192,6 @@ def accumulated(walk: FloatArray, per_block: FloatArray) -> FloatArray:
     return np.asarray((walk * np.outer(per_block, WEIGHTS).ravel()) @ walk.T)
 
 
-def neighbours(m: int) -> FloatArray:
-    """(m, m) matrix with ones on the two secondary diagonals."""
-    return np.eye(m, k=1) + np.eye(m, k=-1)
-
-
 def walked(steps: FloatArray) -> FloatArray:
     """Covariance (3 m, 3 m) from a bias random walk with unit steps per block; ``steps`` as ``Stretch.bias_steps``."""
     # A step at block j persists in all later blocks: cumulative sums from the end.

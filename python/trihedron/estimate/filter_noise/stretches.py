@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron._core import ReferenceBlocks
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, neighbours, parts_of_walk, walked
+from trihedron.estimate.filter_noise.stretch import Stretch, accumulated, parts_of_walk, walked
 from trihedron.estimate.reference.beside import BLOCK_S, Beside, Point
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.ranges import edges_of
@@ -197,7 +197,7 @@ def _velocity_stretch(
         observed=observed.ravel(),
         columns=columns,
         centre=np.zeros(columns.shape[1]),
-        alike=(noise, shakes, (2.0 * np.eye(m) - neighbours(m)) / h**2),
+        alike=(noise, shakes, (2.0 * np.eye(m) - np.eye(m, k=1) - np.eye(m, k=-1)) / h**2),
         bias_walk=h * walked(steps),
         bias_steps=steps,
         tilts=np.diff(across, axis=0, prepend=0.0),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.known_vectors import KnownVectors, fit_known
 from trihedron.probability import MEDIAN_CHI2, fdtrc
 
@@ -47,10 +47,10 @@ def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArra
     chi2_mean, chi2_line = float(np.sum((zero - mean) ** 2 / var_bias)), fit.chi2
     per_dof = np.sum(rows.residual(fit.S_a, fit.b_a) ** 2 / var_bias, axis=0) / (n - 4)
     var_z0 = np.diag(fit.covariance)[9:] * np.maximum(per_dof, 1.0)
-    ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
+    ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), TINY)
     # Where noise alone explains the pose biases, the ratio of two small sums is not tested.
     p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
-    left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
+    left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), TINY)))
     return AttitudeDependence(fit.S_a, var_z0, p_value, left)
 
 
@@ -66,7 +66,7 @@ def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, Flo
     mean = (weight * bias).sum(axis=0) / total
     chi2 = (weight * (bias - mean) ** 2).sum(axis=0)
     dof = len(bias) - 1
-    spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
+    spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, TINY)
     # Only a significant spread counts: one fitted to noise alone would reduce the weights of long poses.
     spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
     weight = 1.0 / (floor + spread)
@@ -83,7 +83,7 @@ def shrink(bias: FloatArray, var_bias: FloatArray, mean: FloatArray) -> tuple[Fl
     # Medians are robust to single bad poses.
     square = np.median((bias - mean) ** 2, axis=0) * n / max(n - 1, 1) / MEDIAN_CHI2[1]
     tau2 = np.maximum(square - np.median(var_bias, axis=0), 0.0)
-    gain = tau2 / np.maximum(tau2 + var_bias, 1e-300)
-    pooled = 1.0 / np.sum(1.0 / np.maximum(var_bias + tau2, 1e-300), axis=0)
+    gain = tau2 / np.maximum(tau2 + var_bias, TINY)
+    pooled = 1.0 / np.sum(1.0 / np.maximum(var_bias + tau2, TINY), axis=0)
     variance = gain * var_bias + (1.0 - gain) ** 2 * pooled
     return np.ascontiguousarray(mean + gain * (bias - mean)), np.ascontiguousarray(variance)

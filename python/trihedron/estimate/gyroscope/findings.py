@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
@@ -270,10 +270,10 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a multiple of 360°.
     """
     scale = np.maximum(np.linalg.norm(S, axis=0), np.finfo(float).tiny)
-    share = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / scale
+    share = sigmas_of(covariance).reshape(3, 3) / scale
     rate, axis = (int(k) for k in np.unravel_index(np.argmax(share), (3, 3)))
     weakest = words("gyro-scale" if rate == axis else "gyro-share", axis=axis + 1, rate=rate + 1)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    sigma = np.sqrt(np.maximum(np.diag(covariance), TINY))
     correlation = covariance / np.outer(sigma, sigma)
     pairs = tuple(
         (PARAMETER_NAMES[i], PARAMETER_NAMES[j], float(correlation[i, j]))
@@ -282,7 +282,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
         if abs(correlation[i, j]) > 0.9
     )
     size = max(float(np.linalg.norm(S, 2)), np.finfo(float).tiny)
-    singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 1e-300))
+    singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), TINY))
     # The fit has a prior as wide as the scale: below √2 the moves add less information than the prior.
     rank = int(np.count_nonzero(singular > np.sqrt(2.0)))
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
@@ -300,7 +300,7 @@ def worst_sigma(covariance: FloatArray, S: FloatArray) -> float:
 def _advice(covariance: FloatArray, size: float) -> Words:
     """Turns to add, axes of one protocol together; an axis's own element S_ij shows while axis i is level, so that its
     turn starts with the third axis up."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
+    sigma = sigmas_of(covariance).reshape(3, 3) / size
     turns: dict[tuple[bool, bool, int], list[int]] = {}
     for axis in range(3):
         weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
@@ -117,7 +117,7 @@ def left_out_as_by_losses(
             for left in (missed - off, missed - some[:, None] - some[None])
         ]
         impact = 1.0 / (np.pi * np.e * float(missed @ missed))
-        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / impact))
+        log_odds += float(np.log(max(0.5 * sum(density), TINY) / impact))
     # A fall between two samples causes a fraction of a loss.
     return log_odds > float(np.log(STRONG))
 
@@ -238,12 +238,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     ]
 
 
-def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Findings of a fit, without its possible losses where losses were detected in the motion."""
-    return tuple(one for one in of_fit if not (seen and one.code is FindingCode.LOSSES_POSSIBLE))
-
-
 def _positive(sigma: FloatArray) -> FloatArray:
     """Noise (3,) without zeros: a channel without visible noise (coarse LSB) gets that of the noisiest channel."""
     sigma = np.asarray(sigma, dtype=np.float64)
-    return np.where(sigma > 0.0, sigma, max(float(sigma.max()), 1e-300))
+    return np.where(sigma > 0.0, sigma, max(float(sigma.max()), TINY))

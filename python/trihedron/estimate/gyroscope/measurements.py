@@ -12,7 +12,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dependence, pool_biases, shrink
 from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
 from trihedron.probability import chdtrc
-from trihedron.quantiles import median
+from trihedron.quantiles import MAD_TO_SIGMA, median
 from trihedron.ranges import rows_beside
 from trihedron.records import Move, Recording, Segments, SensorCalibration
 from trihedron.session.rounding import (
@@ -249,7 +249,7 @@ def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     """Time steps (n - 1,), the median step, and the standard deviation of a timestamp, s."""
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
-    return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
+    return steps, nominal, median(np.abs(steps - nominal)) * MAD_TO_SIGMA / np.sqrt(2.0)
 
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, wrong_turn
 from trihedron.estimate.gyroscope.turn_angles import (
     MeasuredTurns,
@@ -59,7 +59,7 @@ def on_stated_turns(
         for k in (*wrong, *either)
     ]
     said += loose_turns(updated.scatter)
-    rms = float(np.sqrt(np.mean(missed[is_used] ** 2)))
+    rms = rms_of(missed[is_used])
     said.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
     if np.all(is_reversed):
         said.append(Finding.of(FindingCode.LEFT_HANDED, "turns-against-moves", turns=len(angles)))

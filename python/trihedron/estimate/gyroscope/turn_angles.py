@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron._core import block_differences, integrate_raw_rate
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
@@ -124,7 +124,7 @@ def measure_turns(
     static_s = np.array(static_duration)[:, None]
     static_rates = static_angle / static_s
     bias, excess, spread = pool_biases(static_rates, var_rate / static_s)
-    var_bias = 1.0 / np.sum(1.0 / np.maximum(var_rate / static_s + spread, 1e-300), axis=0)
+    var_bias = 1.0 / np.sum(1.0 / np.maximum(var_rate / static_s + spread, TINY), axis=0)
     hidden = hidden_angles(gyroscope, step_s, quantum, edges, static_edges, raw_angle)
     return MeasuredTurns(raw_angle, np.array(duration), bias, var_rate, var_bias, spread, excess, static_rates, hidden)
 
@@ -192,7 +192,7 @@ def scale_of_stated(raw: FloatArray, angles: FloatArray) -> FloatArray | None:
     for _ in range(30):
         solution, *_ = np.linalg.lstsq(angles * weight[:, None], raw * weight[:, None], rcond=None)
         miss = np.linalg.norm(raw - angles @ solution, axis=1) / size
-        weight = 1.0 / (size * np.sqrt(np.maximum(miss, 1e-6 * max(float(miss.max()), 1e-300))))
+        weight = 1.0 / (size * np.sqrt(np.maximum(miss, 1e-6 * max(float(miss.max()), TINY))))
     if np.linalg.cond(solution) > 1.0 / MIN_SPREAD:
         return None
     return np.asarray(np.linalg.inv(solution.T), dtype=np.float64)

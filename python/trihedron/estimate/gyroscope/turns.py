@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.findings import TurnName, drift_findings, loose_turns, wrong_turn
 from trihedron.estimate.gyroscope.stated_turns import contradicted
@@ -126,7 +126,7 @@ def _quality(system: TurnSystem, used: BoolArray, fit: KnownFit, S: FloatArray) 
         floor=float(np.sqrt(np.einsum("mii->m", noise)[used].sum() / n)),
         held_out=held if np.any(is_held) else None,
         held_out_sigma=held_sigma if np.any(is_held) else None,
-        held_out_rms=float(np.sqrt(np.mean(held[is_held] ** 2))) if np.any(is_held) else None,
+        held_out_rms=rms_of(held[is_held]) if np.any(is_held) else None,
         weights=np.where(used, 1.0, 0.0),
         n_iterations=1,
         stopped_because=words("closed-form"),

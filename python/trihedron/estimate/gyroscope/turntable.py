@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
@@ -22,11 +22,10 @@ from trihedron.ranges import ranges_of
 from trihedron.records import Calibration, Finding, FindingCode, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.checked import number_of
 from trihedron.sensor_model import norms
+from trihedron.session.noise import NOISE_DOF
 from trihedron.session.rounding import undithered_axes
 
 ITERATIONS = 20
-NOISE_DOF = 100.0
-"""Degrees of freedom of the noise that χ² is relative to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,13 +307,13 @@ def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> F
 
 def not_fitted(rates: StatedRates, updated: Updated, *, is_turned: bool) -> Finding:
     """Finding on rates that the update leaves off by more than noise: it did not converge."""
-    rms = float(np.sqrt(np.mean((updated.left / rates.speeds) ** 2)))
+    rms = rms_of(updated.left / rates.speeds)
     return Finding.of(FindingCode.TURNTABLE, "not-fitted", turns=len(rates.speeds), is_turned=is_turned, rms=rms)
 
 
 def _said(rates: StatedRates, updated: Updated, seen: FloatArray) -> Finding:
     """Finding on the speeds, of which moves and poses give ``seen`` (k,) [rad/s]."""
-    turns, rms = len(seen), float(np.sqrt(np.mean((updated.left / rates.speeds) ** 2)))
+    turns, rms = len(seen), rms_of(updated.left / rates.speeds)
     if updated.scatter == 0.0:
         return Finding.of(FindingCode.TURNTABLE, turns=turns, rms_percent=100.0 * rms)
     off = seen / rates.speeds - 1.0
@@ -325,7 +324,7 @@ def _said(rates: StatedRates, updated: Updated, seen: FloatArray) -> Finding:
         turns=turns,
         seen_rad_s=seen[worst],
         stated_rad_s=rates.speeds[worst],
-        rms=float(np.sqrt(np.mean(off**2))),
+        rms=rms_of(off),
         common_percent=100.0 * float(np.mean(off)),
         numbers={"scatter": updated.scatter, "sigma": rates.relative_sigma},
     )

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import InputError
+from trihedron.estimate.accelerometer.norm import N_PARAMETERS
 from trihedron.estimate.accelerometer.poses import ENTRIES
 from trihedron.estimate.kalman.per_axis import (
     check_innovations,
@@ -40,7 +41,6 @@ def start_from_range(readings: npt.ArrayLike, gravity_m_s2: float) -> tuple[Floa
 NormFrame = Literal["lower", "symmetric"]
 
 MOST_RUNS = 50
-N_PARAMETERS = 9
 
 
 def calibrate_without_references(
@@ -77,7 +77,7 @@ def calibrate_without_references(
     one.load(a - middle, start_s, pose_s, np.ascontiguousarray(extra))
     n_runs = one.relinearise(MOST_RUNS)
     parameters[-1], covariance = wrt @ one.parameters, wrt @ one.covariance @ wrt.T
-    sigmas[-1] = _sigma(covariance)
+    sigmas[-1] = sigmas_of(covariance)
     S, b = parameters[-1, :9].reshape(3, 3).copy(), parameters[-1, 9:].copy()
     innovation, innovation_sigma = one.innovations[:, 0].copy(), np.sqrt(one.innovations[:, 1])
     seen = check_innovations(innovation, innovation_sigma, N_PARAMETERS)
@@ -129,10 +129,6 @@ def _wrt_parameters(frame: NormFrame, middle: FloatArray) -> FloatArray:
     return out
 
 
-def _sigma(covariance: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-
-
 def _track(
     one: _core.NormKalman, wrt: FloatArray, poses: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
@@ -144,5 +140,5 @@ def _track(
         if i < 40 or i % 10 == 0:
             one.relinearise(10)
         parameters.append(wrt @ one.parameters)
-        sigmas.append(_sigma(wrt @ one.covariance @ wrt.T))
+        sigmas.append(sigmas_of(wrt @ one.covariance @ wrt.T))
     return np.array(parameters), np.array(sigmas)

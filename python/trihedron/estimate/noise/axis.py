@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.low_pass import RISE
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
@@ -47,9 +48,6 @@ def _bent(spectrum: BinnedSpectrum, fall: float) -> BinnedSpectrum:
     return replace(spectrum, basis=spectrum.basis / (1.0 + a))
 
 
-RISE = 4.6
-"""Rise of the deviance at the ends of a 95 % interval. For χ² with one degree of freedom it is 3.84, which covers only
-92 to 94 % with other terms at their limit 0."""
 NAMED = 7.88
 """Rise of the deviance without a term above which it is present: an absent term reaches it in 0.25 % (half a chi-square
 with one degree of freedom)."""

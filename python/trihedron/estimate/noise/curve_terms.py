@@ -26,6 +26,7 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.noise.selection import EVIDENCE
 from trihedron.probability import NORMAL_95
 from trihedron.records.noise import TermName, allan_of_unit_terms
 
@@ -101,8 +102,6 @@ def _nodes(kinks: IntArray, first: int, last: int) -> tuple[IntArray, FloatArray
 
 TERMS = tuple(TermName)
 _RAMP = TERMS.index(TermName.RATE_RAMP)
-EVIDENCE = 8.0
-"""Least reduction of the deviance by a term, as for whole logs."""
 _RISE_95 = 3.841
 _RISE_95_ONE_SIDED = 2.706
 _CONVERGED = 3e-4

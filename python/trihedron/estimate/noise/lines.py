@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
+from trihedron.probability import RARE_ALARM
 from trihedron.records.noise import SpectralLine
 
-FALSE_ALARM = 1e-4
 TOLERANCE = 0.05
 """Least relative deviation of a third of an octave from the fitted terms, if significant, that counts as filtering:
 noise terms are idealisations, and a smaller loss of white noise does not change a printed digit."""
@@ -40,7 +40,7 @@ def find_lines(
         power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
         level = smooth_level(band, power / expected) * expected
         ratio = power / level
-        limit = float(chdtri(band.count[0], FALSE_ALARM / total) / band.count[0])
+        limit = float(chdtri(band.count[0], RARE_ALARM / total) / band.count[0])
         mask = np.zeros(len(ratio), dtype=bool)
         for i in np.argsort(-ratio):
             if ratio[i] < limit or len(lines) >= MOST_LINES:
@@ -172,6 +172,6 @@ def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, high
     upper = spectrum.frequency_hz > highest_hz / 4.0
     key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9).astype(np.int64)
     count, ratio = spectrum.count[upper], (spectrum.without_line(slope) / expected)[upper]
-    n = np.maximum(np.bincount(key, count), 1e-300)
+    n = np.maximum(np.bincount(key, count), TINY)
     mean = np.bincount(key, count * ratio) / n
     return bool(np.any((n >= 8) & (np.abs(mean - 1.0) > np.maximum(TOLERANCE, 4.5 * np.sqrt(2.0 / n)))))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of, low_passes
 from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
 from trihedron.channel_facts.static_axes import StaticAxis
@@ -68,7 +68,7 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
         axes.append(_Below(gain, shape, spectrum.beneath(f), power[below], count[below], spectrum.rounding))
     n = len(axes)
     first = np.cumsum([n, *(a.slow.shape[1] for a in axes)])
-    level = np.array([math.log(max(float(np.median(a.power / a.gain)), 1e-300)) for a in axes])
+    level = np.array([math.log(max(float(np.median(a.power / a.gain)), TINY)) for a in axes])
     beneath = [np.zeros(a.slow.shape[1]) for a in axes]
     bend = np.zeros(SHAPE_TERMS)
     covariance = np.eye(n)

@@ -11,14 +11,15 @@ import numpy as np
 from scipy.special import chdtri
 
 from trihedron import _core
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.static_axes import adc_step
+from trihedron.probability import RARE_ALARM
+from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.ranges import edges_of
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
+from trihedron.transforms import directions_of
 
-FALSE_ALARM = 1e-4
-"""Probability that a clean log shows an event of one kind."""
 READOUT_SAMPLE = 200_000
 """Readings from which resolution, noise and saturation are measured."""
 MOST_EVENTS = 500
@@ -27,7 +28,6 @@ STEP_REACHES = (4, 16, 64)
 """Multiples of its own width over which a step must keep its level on either side."""
 FEW, CLOSELY = 2, 0.7
 """Most events that are accepted without the test for tails, and the fraction of the limit that is close to it."""
-_MAD_TO_SIGMA = 1.4826
 TURN_RAD = 0.002
 """Turn of gravity from one mean to the next that motion makes: noise of 1 mg/√Hz, more than any part has, averaged
 over a second turns it by as much, a bias that drifts by 0.1 g in a log by a third of it."""
@@ -92,10 +92,10 @@ def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
     n = len(x) // size
     if n < 32:
         return []
-    level = np.log(_core.block_scatter(x, size) + 1e-300)
+    level = np.log(_core.block_scatter(x, size) + TINY)
     centre = np.nanmedian(level)
     # With counts that rarely change the spread may be underestimated: at least that of chi-square is used.
-    spread = max(_MAD_TO_SIGMA * float(np.nanmedian(np.abs(level - centre))), math.sqrt(2.0 / size))
+    spread = max(MAD_TO_SIGMA * float(np.nanmedian(np.abs(level - centre))), math.sqrt(2.0 / size))
     distance, limit = (level - centre) / spread, _limit(n, n)
     hit = (distance > limit) & (level - centre > math.log(1.5))
     # As many close below the limit as above it are the tail of one distribution, as in `find_jumps`: no events.
@@ -152,7 +152,7 @@ def _directions(x: FloatArray, size: int) -> tuple[FloatArray, IntArray]:
     """Directions of means of ``size`` rows, and the number of each."""
     mean, _, count = _core.block_statistics(x, size)
     held = np.flatnonzero(count > 0)
-    return mean[held] / np.linalg.norm(mean[held], axis=1, keepdims=True), held
+    return directions_of(mean[held]), held
 
 
 def _turn(x: FloatArray, size: int) -> float:
@@ -166,7 +166,7 @@ def _mean(values: FloatArray) -> float:
 
 
 def _limit(n_looks: int, n_independent: float) -> float:
-    gaussian = math.sqrt(float(chdtri(1.0, FALSE_ALARM / n_looks)))
+    gaussian = math.sqrt(float(chdtri(1.0, RARE_ALARM / n_looks)))
     # The robust spread of k values has the relative standard error 1.17/√(2k): three of these are added.
     return gaussian * (1.0 + 3.0 * 1.17 / math.sqrt(2.0 * n_independent))
 

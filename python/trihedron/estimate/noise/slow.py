@@ -27,7 +27,7 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import nnls
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.probability import chdtrc, chdtri
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise, Ratio
 
@@ -214,14 +214,14 @@ class _Drawn:
 def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> FloatArray:
     """Weighted quantiles (k,) of ``values`` at ``places`` (k,)."""
     order = np.argsort(values)
-    reached = np.cumsum(weight[order]) / max(float(weight.sum()), 1e-300)
+    reached = np.cumsum(weight[order]) / max(float(weight.sum()), TINY)
     return values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
 
 
 def _measured(values: FloatArray, weight: FloatArray) -> Measured:
     low, middle, high = _quantiles(values, weight, INTERVAL).tolist()
     of_absent = float(weight[values == 0.0].sum())
-    is_there = of_absent / max(1.0 - of_absent, 1e-300) < SHOWN * ABSENT / (1.0 - ABSENT)
+    is_there = of_absent / max(1.0 - of_absent, TINY) < SHOWN * ABSENT / (1.0 - ABSENT)
     sigma = math.log(high / max(low, LOWEST * high)) / 3.92 if high > 0.0 else 0.0
     return Measured(middle, low if is_there else 0.0, high, sigma)
 
@@ -255,7 +255,7 @@ def _kernels(biases: PoseBiases) -> tuple[FloatArray, FloatArray]:
 
 def _twice_integrated(x: FloatArray) -> FloatArray:
     """The second integral of ln|x|: x²/2 ln|x| - 3x²/4."""
-    size = np.maximum(np.abs(x), 1e-300)
+    size = np.maximum(np.abs(x), TINY)
     return size**2 * (0.5 * np.log(size) - 0.75)
 
 

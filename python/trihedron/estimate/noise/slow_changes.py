@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.session.drift import LEAST_SWING_K
 
 MEANS = 64
@@ -48,13 +48,9 @@ def warm_up(x: FloatArray, rate_hz: float) -> WarmUp | None:
     if found is None:
         return None
     (y, t, _), n = found, len(x) // MEANS
-    walk = MEANS * np.minimum.outer(t, t)
     columns = np.column_stack([y, np.ones_like(t), t, np.exp(-t[:, None] / TIMES)])
     without, tried = [], []
-    for strength in WALKS:
-        factor = np.linalg.cholesky(np.eye(len(t)) + strength * walk)
-        white = np.linalg.solve(factor, columns)
-        constant = -float(np.sum(np.log(np.diag(factor))))
+    for white, constant in _whitened(columns, t):
         without.append(constant + _fitted(white[:, :3])[0])
         for k, time in enumerate(TIMES):
             likelihood, weight = _fitted(white[:, [0, 1, 2, 3 + k]])
@@ -103,9 +99,7 @@ def wave(x: FloatArray, rate_hz: float) -> Wave | None:
     phase = 2.0 * np.pi * t[:, None] * CYCLES
     columns = np.column_stack([np.ones_like(t), t, y, np.cos(phase), np.sin(phase)])
     without, tried = [], []
-    for strength in WALKS:
-        factor = np.linalg.cholesky(np.eye(len(t)) + strength * MEANS * np.minimum.outer(t, t))
-        white = np.linalg.solve(factor, columns)
+    for white, constant in _whitened(columns, t):
         line = np.linalg.qr(white[:, :2])[0]
         rest, cosine, sine = np.split(white[:, 2:] - line @ (line.T @ white[:, 2:]), [1, 1 + len(CYCLES)], axis=1)
         square = np.stack([(cosine**2).sum(0), (cosine * sine).sum(0), (sine**2).sum(0)])
@@ -114,13 +108,20 @@ def wave(x: FloatArray, rate_hz: float) -> Wave | None:
         parts = np.stack([square[2] * along[0] - square[1] * along[1], square[0] * along[1] - square[1] * along[0]])
         parts /= determinant
         k = int(np.argmax((parts * along).sum(0)))
-        constant, left = -float(np.sum(np.log(np.diag(factor)))), float((rest**2).sum())
-        least = max(left - float(parts[:, k] @ along[:, k]), 1e-300)
-        without.append(constant - 0.5 * len(t) * float(np.log(max(left, 1e-300))))
+        left = float((rest**2).sum())
+        least = max(left - float(parts[:, k] @ along[:, k]), TINY)
+        without.append(constant - 0.5 * len(t) * float(np.log(max(left, TINY))))
         tried.append((constant - 0.5 * len(t) * float(np.log(least)), float(CYCLES[k]), *map(float, parts[:, k])))
     best, cycles, cosine_part, sine_part = max(tried)
     rise = 2.0 * (best - max(without))
     return Wave(MEANS * n / rate_hz / cycles, cosine_part, sine_part, rise) if rise > EARNED_BY_WAVE else None
+
+
+def _whitened(columns: FloatArray, t: FloatArray) -> Iterator[tuple[FloatArray, float]]:
+    """Columns (n, c) of means at ``t`` (n,) whitened for each random walk, and the constant of its log-likelihood."""
+    for strength in WALKS:
+        factor = np.linalg.cholesky(np.eye(len(t)) + strength * (MEANS * np.minimum.outer(t, t)))
+        yield np.asarray(np.linalg.solve(factor, columns)), -float(np.sum(np.log(np.diag(factor))))
 
 
 def _fitted(white: FloatArray) -> tuple[float, float]:
@@ -128,7 +129,7 @@ def _fitted(white: FloatArray) -> tuple[float, float]:
     weight, _, _, _ = np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)
     left = float(np.sum((white[:, 0] - white[:, 1:] @ weight) ** 2))
     k = len(white)
-    return float(-0.5 * k * np.log(max(left, 1e-300) / k)), float(weight[-1])
+    return float(-0.5 * k * np.log(max(left, TINY) / k)), float(weight[-1])
 
 
 def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequence[float] = ()) -> float:
@@ -147,13 +148,10 @@ def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequenc
         return 0.0
     u, side = (heat - heat.mean()) / swing, np.searchsorted(np.sort(breaks), t * n * MEANS + inside.start)
     columns = np.column_stack([y, side[:, None] == np.unique(side), t, u, u**2, u**3])
-    walk = MEANS * np.minimum.outer(t, t)
     fits = []
-    for strength in WALKS:
-        factor = np.linalg.cholesky(np.eye(len(t)) + strength * walk)
-        white = np.linalg.solve(factor, columns)
+    for white, constant in _whitened(columns, t):
         without, beside = (_fitted(part)[0] for part in (white[:, :-3], white))
-        fits.append((without - float(np.sum(np.log(np.diag(factor)))), beside - without))
+        fits.append((without + constant, beside - without))
     # In the covariance that is most likely without it, whose whitened readings have the walk's increments.
     return 1.0 - float(np.exp(-2.0 * max(fits)[1] / len(t)))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference, Windows
@@ -206,10 +206,10 @@ def _turning(windows: Windows, reference: Reference, time: FloatArray) -> FloatA
 def _first_up(base: FloatArray, path: FloatArray, gravity: float) -> FloatArray:
     """Initial direction of up (3,): readings rotated into the world less the acceleration of the path."""
     k, _, n = base.shape
-    scale = np.sqrt(np.mean(base**2, axis=(0, 1))) + 1e-300
+    scale = np.sqrt(np.mean(base**2, axis=(0, 1))) + TINY
     X = np.column_stack([(base / scale).reshape(3 * k, n), np.tile(-gravity * np.eye(3), (k, 1))])
     u = np.linalg.lstsq(X, path.ravel(), rcond=None)[0][n:]
-    return np.asarray(u / max(float(np.linalg.norm(u)), 1e-300))
+    return np.asarray(u / max(float(np.linalg.norm(u)), TINY))
 
 
 def _under_gravity(

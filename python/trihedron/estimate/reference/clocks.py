@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference.together import Grid, Reference, running_mean
 
@@ -111,8 +111,8 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, IntArray, F
     count = np.maximum(over("ma", "mb"), 1e-9)
     sa, sb = over("a", "mb"), over("ma", "b")
     covariance = over("a", "b") - sa * sb / count
-    va = np.maximum(over("aa", "mb") - sa**2 / count, 1e-12 * np.sum(za**2) + 1e-300)
-    vb = np.maximum(over("ma", "bb") - sb**2 / count, 1e-12 * np.sum(zb**2) + 1e-300)
+    va = np.maximum(over("aa", "mb") - sa**2 / count, 1e-12 * np.sum(za**2) + TINY)
+    vb = np.maximum(over("ma", "bb") - sb**2 / count, 1e-12 * np.sum(zb**2) + TINY)
     lag = np.arange(n)
     lag = np.asarray(np.where(lag < len(b), lag, lag - n))
     order = np.argsort(lag)

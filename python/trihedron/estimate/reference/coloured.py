@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 
 ORDERS = (0, 2, 12)
@@ -131,7 +131,7 @@ def _weights(r: FloatArray, size: FloatArray, used: BoolArray) -> FloatArray:
     level = np.array([np.median(square[part]) for part in parts])
     at = np.array([np.mean(size[part] ** 2) for part in parts])
     slope = max(float(np.polyfit(at, level, 1)[0]), 0.0) if np.ptp(at) > 0.0 else 0.0
-    floor = max(float(np.median(np.maximum(level - slope * at, 0.0))), 0.05 * float(level.mean()), 1e-300)
+    floor = max(float(np.median(np.maximum(level - slope * at, 0.0))), 0.05 * float(level.mean()), TINY)
     scale = np.sqrt(floor + slope * size**2)
     return np.asarray(np.median(scale) / scale, dtype=np.float64)
 
@@ -151,11 +151,11 @@ def _autoregression(r: FloatArray, index: IntArray, used: BoolArray, order: int)
     """Whitening filter (order + 1,): 1, then minus the coefficients of the lags, divided by the innovation's σ."""
     rows = _with_past(index, used, order)
     if order == 0 or len(rows) < 3 * order:
-        return np.array([1.0 / max(float(np.sqrt(np.mean(r[used] ** 2))), 1e-300)])
+        return np.array([1.0 / max(rms_of(r[used]), TINY)])
     past = np.column_stack([r[rows - lag] for lag in range(1, order + 1)])
     phi = _least_squares(past, r[rows])
     sigma = float(np.sqrt(np.sum((r[rows] - past @ phi) ** 2) / max(len(rows) - order, 1)))
-    return np.concatenate([[1.0], -phi]) / max(sigma, 1e-300)
+    return np.concatenate([[1.0], -phi]) / max(sigma, TINY)
 
 
 def _with_past(index: IntArray, used: BoolArray, order: int) -> IntArray:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trihedron.arrays import AXES, BoolArray, FloatArray
+from trihedron.arrays import AXES, BoolArray, FloatArray, rms_of
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.clocks import Alignment, align
@@ -260,7 +260,7 @@ def _fit(S: FloatArray, b: FloatArray, covariance: FloatArray, solution: Solutio
         S=S,
         b=b,
         covariance=np.asarray(covariance[:12, :12]),
-        rms=float(np.sqrt(np.mean(used**2))),
+        rms=rms_of(used),
         rms_held_out=solution.rms_held_out,
         band_hz=0.5 / (windows.spacing * windows.step_s),
         n_rows=len(solution.residual),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
@@ -79,7 +79,7 @@ def fit_gyroscope(
 
 def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
     p = design.shape[2]
-    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + 1e-300
+    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + TINY
     theta: FloatArray = np.linalg.lstsq((design / scale).reshape(-1, p), target.ravel(), rcond=None)[0]
     return np.asarray(theta / scale)
 
@@ -206,4 +206,4 @@ def replay(
         errors.append(float(np.arccos(np.clip((np.trace(off) - 1.0) / 2.0, -1.0, 1.0))))
     if not errors:
         return None
-    return ReplayStage(stage, HORIZON_S, float(np.sqrt(np.mean(np.square(errors)))), len(errors))
+    return ReplayStage(stage, HORIZON_S, rms_of(errors), len(errors))

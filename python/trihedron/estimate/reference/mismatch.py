@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import TINY, XYZ, FloatArray, rms_of, sigmas_of
 from trihedron.errors import InputError
 from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.likelihood import Problem, most_likely, together
@@ -21,9 +21,9 @@ TURNING = 0.5
 
 def share_left(gyro: GyroFit) -> float:
     """Median residual over the median reference rate, of rows that rotate; medians are robust to impacts."""
-    turns = gyro.size >= TURNING * float(np.sqrt(np.mean(gyro.size**2)))
+    turns = gyro.size >= TURNING * rms_of(gyro.size)
     left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
-    return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
+    return float(np.median(left) / max(float(np.median(gyro.size[turns])), TINY))
 
 
 def reject_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
@@ -61,7 +61,7 @@ def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -
 
 def reject_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
     """Raise ``InputError`` for axes of S (9,) whose relative σ by its covariance (9, 9) is 0.5 or more."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
+    sigma = sigmas_of(covariance).reshape(3, 3)
     size = np.linalg.norm(S.reshape(3, 3), axis=0)
     weak = [XYZ[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
     if weak:

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import matmul_toeplitz
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.estimate.reference.accelerometer import ForceFit, turns, turns_of_frame
 from trihedron.estimate.reference.likelihood import (
     FARTHEST,
@@ -224,7 +224,7 @@ def _with_frame(covariance: FloatArray, force: ForceFit, frame: FloatArray) -> F
 
 def _positive(covariance: FloatArray) -> FloatArray:
     """The covariance with negative eigenvalues (rounding errors) set to 0."""
-    scale = np.sqrt(np.abs(np.diag(covariance))) + 1e-300
+    scale = np.sqrt(np.abs(np.diag(covariance))) + TINY
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(root @ root.T)

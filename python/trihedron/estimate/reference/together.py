@@ -6,8 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
+from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
@@ -138,7 +139,7 @@ def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> BoolArray:
         raw = grid.gyroscope[inside]
         later = raw[len(raw) // 3 :]
         level = np.median(later, axis=0)
-        sigma = 1.4826 * np.median(np.abs(later - level), axis=0) + 1e-12 * np.abs(level).max() + 1e-300
+        sigma = MAD_TO_SIGMA * np.median(np.abs(later - level), axis=0) + 1e-12 * np.abs(level).max() + TINY
         smooth = running_mean(np.abs(raw - level) / sigma, max(guard // 2, 1))
         off = np.flatnonzero(np.any(smooth > LEVELS, axis=1))
         begin = off[off < len(raw) // 3]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, rms_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri, fdtrc
@@ -160,7 +160,7 @@ class SessionSolution:
         of their drift along a curve, largest axis; m/s²."""
         along_curves = _drift(self.observed, self.core, self.observed.force_effect, self.S_a)
         away = self.core.pose_force_bias @ self.S_a.T + along_curves
-        return float(np.sqrt(np.mean(away**2))), float(np.ptp(along_curves, axis=0).max())
+        return rms_of(away), float(np.ptp(along_curves, axis=0).max())
 
     @property
     def parameters(self) -> FloatArray:

@@ -8,12 +8,14 @@ session apart, a step at one place, an even trend; else scatter.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
-from trihedron.probability import fdtrc
-from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
+from trihedron.arrays import TINY, FloatArray
+from trihedron.defaults import FALSE_ALARM
+from trihedron.probability import fdtrc, ndtr
+from trihedron.records.sessions import GEOMETRY, ONE_UNIT, PARAMETERS, Change, ChangeKind, Session
 
 SPREAD_DOF, DRIFT_DOF = 25.0, 5.0
 """Degrees of freedom per session of its covariance and of its bias drift: some 25 poses, and half of that measured for
@@ -80,13 +82,9 @@ MIN_REST_P = 0.01
 
 def _weight(session: Session, picked: list[int], drift: FloatArray) -> FloatArray:
     covariance = session.covariance[np.ix_(picked, picked)] + np.diag(drift)
-    ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), 1e-300)
+    ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), TINY)
     shrunk = (SPREAD_DOF - 2.0) / SPREAD_DOF
     return np.asarray(shrunk * np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
-
-
-def _dof(name: str, n_sessions: int) -> float:
-    return n_sessions * (DRIFT_DOF if name.endswith("bias") else SPREAD_DOF)
 
 
 def _left(values: FloatArray, weights: FloatArray, column: FloatArray | None) -> float:
@@ -111,7 +109,8 @@ def _solved(values: FloatArray, weights: FloatArray, column: FloatArray | None) 
 
 
 def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
-    return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), 1e-300)
+    of_weights = n_sessions * (DRIFT_DOF if name.endswith("bias") else SPREAD_DOF)
+    return max(fdtrc(dof, of_weights, statistic / dof), TINY)
 
 
 def _candidates(n: int) -> Iterator[Candidate]:
@@ -143,7 +142,7 @@ def _stands_out(values: FloatArray, weights: FloatArray, column: FloatArray) -> 
     if n < 3:
         return False
     before, after = _left(values, weights, None), _left(values, weights, column)
-    ratio = ((before - after) / k) / max(after / dof, 1e-300)
+    ratio = ((before - after) / k) / max(after / dof, TINY)
     return fdtrc(k, dof, ratio) * len(list(_candidates(n))) < MIN_REST_P
 
 
@@ -170,3 +169,27 @@ def _as_common_scale(
         return p_value, values, weights, name, names
     common_name = name.replace("-scale", "-common-scale")
     return p_value, common[:, None], (1.0 / variance)[:, None, None], common_name, ("all axes",)
+
+
+def of_another_unit(sessions: Sequence[Session], changes: Sequence[Change]) -> tuple[Change, ...]:
+    """Significant ``changes`` of the sessions that one unit does not make, the most significant first: of a
+    misalignment, or of a scale by more than ``ONE_UNIT``.
+
+    A scale common to all axes is not among them: a unit of measurement or a clock changes it as well.
+    """
+    apart = {*GEOMETRY, *_beyond_one_unit(sessions)}
+    return tuple(sorted((c for c in changes if c.significant and c.id in apart), key=lambda c: c.p_adjusted))
+
+
+def _beyond_one_unit(sessions: Sequence[Session]) -> set[str]:
+    """Ids of scales and axis angles of which two sessions differ significantly by more than ``ONE_UNIT``."""
+    fixed = [k for k, one in enumerate(PARAMETERS[: len(sessions[0].numbers)]) if not one.id.endswith("bias")]
+    pairs = list(combinations(sessions, 2))
+    found = set()
+    for a, b in pairs:
+        for k in fixed:
+            away = float(abs(a.numbers[k] - b.numbers[k]))
+            sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], TINY)))
+            if ndtr(-(away - ONE_UNIT) / sigma) * len(pairs) * len(fixed) < FALSE_ALARM:
+                found.add(PARAMETERS[k].id)
+    return found

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.probability import chdtri, ndtri, stdtrit
 from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
@@ -33,7 +33,7 @@ def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
     out = []
     for k, parameter in enumerate(PARAMETERS[: len(sessions[0].numbers)]):
         values = np.array([session.numbers[k] for session in sessions])
-        own = np.array([max(float(session.covariance[k, k]), 1e-300) for session in sessions])
+        own = np.array([max(float(session.covariance[k, k]), TINY) for session in sessions])
         within = spread_within(values, own, groups)
         between = spread_between(values, own, groups)
         mean = common_mean(values, own, groups, within, between)
@@ -49,7 +49,7 @@ def next_session(sessions: Sequence[Session], repeated: Sequence[Repeated]) -> t
     """
     groups = _groups(sessions)
     numbers = np.array([session.numbers for session in sessions])
-    own = np.array([np.maximum(np.diag(session.covariance), 1e-300) for session in sessions])
+    own = np.array([np.maximum(np.diag(session.covariance), TINY) for session in sessions])
     within2, between2 = np.zeros(len(repeated)), np.zeros(len(repeated))
     for name in dict.fromkeys(one.parameter.id for one in repeated):
         of = [k for k, one in enumerate(repeated) if one.parameter.id == name]
@@ -204,7 +204,7 @@ def _solved(y: FloatArray, v: FloatArray, is_there: BoolArray, targets: FloatArr
     """σ² (..., m) at which Q, which decreases with σ², equals each target (m,); 0 where Q(0) is below it."""
     centre = np.sum(y, axis=-1, where=is_there) / is_there.sum(axis=-1)
     squares = np.sum((y - centre[..., None]) ** 2, axis=(-1, -2), where=is_there)
-    scale = max(float(squares.max()), float(v.max()), 1e-300)
+    scale = max(float(squares.max()), float(v.max()), TINY)
     shape = (*y.shape[:-2], len(targets))
     low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
     is_zero = _q(y, v, is_there, np.exp(low)) <= targets
@@ -217,7 +217,7 @@ def _solved(y: FloatArray, v: FloatArray, is_there: BoolArray, targets: FloatArr
 
 def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:
     """σ at the maximum of the restricted likelihood, with free group means."""
-    largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), 1e-300)
+    largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), TINY)
 
     y, v, is_there = _padded(values, variances, members)
 

@@ -18,6 +18,7 @@ from trihedron.files.formats.losses import lost_to_a_diagonal
 from trihedron.records import Calibration, Onboard, SensorCalibration
 from trihedron.records.onboard import Autopilot
 from trihedron.records.plain import as_plain, from_plain
+from trihedron.sensor_model import axis_scales
 
 _DEG_ROLL_PITCH_YAW = (
     (0, 0, 0), (0, 0, 45), (0, 0, 90), (0, 0, 135), (0, 0, 180), (0, 0, 225), (0, 0, 270), (0, 0, 315), (180, 0, 0),
@@ -156,7 +157,7 @@ def composed(
         if thermal is not None:
             thermal = replace(thermal, coefficients=thermal.coefficients @ (own.turn / own.scale))
         offset = np.asarray(-np.linalg.solve(S, b), dtype=np.float64)
-        out[name] = Composed(offset, np.asarray(1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)), thermal)
+        out[name] = Composed(offset, axis_scales(S), thermal)
     return replace(known, **made), out  # type: ignore[arg-type]
 
 

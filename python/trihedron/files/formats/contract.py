@@ -11,6 +11,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import InputError
 from trihedron.files.plausible import LARGEST_SI_FACTOR, has_one_handedness
 from trihedron.records import Calibration, SensorCalibration
+from trihedron.sensor_model import axis_scales
 from trihedron.thermal_model import parameters_at
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
@@ -190,7 +191,7 @@ def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
     coefficients = np.zeros((3, 3))
     for order, symbol in enumerate(("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")):
         coefficients[order] = [values.get(f"{symbol}_{axis}", 0.0) for axis in AXES]
-    return Thermal(reference, coefficients * np.linalg.norm(np.linalg.inv(sensor.S), axis=1), range_degc)
+    return Thermal(reference, coefficients / axis_scales(sensor.S), range_degc)
 
 
 def _through_sessions(calibration: Calibration, name: str, range_degc: tuple[float, float]) -> Thermal | None:

@@ -6,6 +6,7 @@ from trihedron.arrays import FloatArray
 from trihedron.files.plausible import ROUNDING
 from trihedron.probability import NORMAL_95
 from trihedron.records import Calibration, SensorCalibration
+from trihedron.sensor_model import axis_scales
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 
@@ -40,7 +41,7 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
         # The rotation of the accelerometer's triad as a whole is a choice of frame and is removed.
         unit = (u @ vt).T @ _unit_columns(sensor)
         off = np.abs(unit - np.diag(np.diag(unit)))
-        seen = off[exceeds(off, sensor.sigma_S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1))]
+        seen = off[exceeds(off, sensor.sigma_S / axis_scales(sensor.S))]
         if not len(seen):
             continue
         share = float(seen.max())
@@ -52,13 +53,13 @@ def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
 
 def _unit_columns(sensor: SensorCalibration) -> FloatArray:
     """S with column j times the sensitivity of axis j (raw per SI): off-diagonal elements are cross-axis fractions."""
-    out: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+    out: FloatArray = sensor.S / axis_scales(sensor.S)
     return out
 
 
 def lost_gyro_scale(gyro: SensorCalibration, target: str) -> list[str]:
     """The gyro scale error that a target with gyro offsets alone cannot represent."""
-    scale = 1.0 / np.linalg.norm(np.linalg.inv(gyro.S), axis=1) - 1.0
+    scale = axis_scales(gyro.S) - 1.0
     seen = np.abs(scale)[exceeds(scale, np.diag(gyro.sigma_S))]
     return [f"{target} has no gyro scale: up to {100.0 * seen.max():.2g} % of scale is lost."] if len(seen) else []
 

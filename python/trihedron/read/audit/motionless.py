@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import AXES, FloatArray, rms_of
 from trihedron.channel_facts.quiet import Windows
 from trihedron.quantiles import quantile
 from trihedron.records import Finding, FindingCode
@@ -45,7 +45,7 @@ def _off_circle(points: FloatArray) -> float:
     design = np.column_stack([2.0 * points, np.ones(len(points))])
     solved = np.linalg.lstsq(design, (points**2).sum(axis=1), rcond=None)[0]
     radius = np.sqrt(max(float(solved[2] + solved[:2] @ solved[:2]), 0.0))
-    return float(np.sqrt(np.mean((np.linalg.norm(points - solved[:2], axis=1) - radius) ** 2)))
+    return rms_of(np.linalg.norm(points - solved[:2], axis=1) - radius)
 
 
 def _finding(sensor: str, k: int, without: str) -> Finding:

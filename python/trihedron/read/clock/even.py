@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray, IntArray
-from trihedron.quantiles import median, quantiles
+from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.quantiles import MAD_TO_SIGMA, median, quantiles
 from trihedron.read.clock.losses import ahead, behind_late_rows, block_rows, lateness, track
 from trihedron.read.clock.period import STALL_STEPS, Period, find_period
 from trihedron.records.sampling import TimestampKind
@@ -167,7 +167,7 @@ def _lay(
         u = (x - x0) / scale
         line = _core.robust_line(u, y)
         left = y - np.polyval(line, u)
-        noise = 1.4826 * median(np.abs(np.diff(each))) / np.sqrt(2.0) + 1e-3 * period
+        noise = MAD_TO_SIGMA * median(np.abs(np.diff(each))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
         smooth = _core.running_median(left, size)
         # The rate drifts if the smoothed residual is far larger than the scatter of the blocks explains.
@@ -205,7 +205,7 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
 
     def typical(lag: int) -> float:
         change = np.abs(piece[lag:] - piece[:-lag])
-        return float(np.mean(np.minimum(change, 8.0 * median(change) + 1e-300) ** 2))
+        return float(np.mean(np.minimum(change, 8.0 * median(change) + TINY) ** 2))
 
     return typical(far) / max(typical(near), unseen**2)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
 from trihedron.read.clock.rate import steps_of, steps_of_counter
 from trihedron.records import Finding, FindingCode
@@ -51,7 +51,7 @@ def _active(triads: list[FloatArray], n: int) -> list[slice]:
     activity = np.zeros(len(parts))
     for x in triads:
         spread = np.array([_spread(x[p][::16]) for p in parts])
-        activity += spread / max(float(np.median(spread)), 1e-300)
+        activity += spread / max(float(np.median(spread)), TINY)
     return [parts[k] for k in sorted(np.argsort(activity)[::-1][:PARTS])]
 
 
@@ -158,8 +158,7 @@ def settle_clock(
         is_even = not follows and (ignores or by_itself)
     sampling = Sampling(
         clock.kind, clock.period_s, clock.sigma_period_s, clock.timestamp_error_s, is_even, clock.counts_losses,
-        int(lost.sum()) if clock.counts_losses else 0, int(np.count_nonzero(lost)) if clock.counts_losses else 0,
-        share, sigma,
+        int(lost.sum()) if clock.counts_losses else 0, share, sigma,
     )  # fmt: skip
     findings = _findings(sampling, clock, shared)
     told = lost if clock.counts_losses else None

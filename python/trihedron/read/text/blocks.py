@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import check_ratio
@@ -23,6 +24,7 @@ size of a block)."""
 
 _PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
+_OPENED_BY: dict[str | None, Any] = {"gzip": gzip.open, "bzip2": bz2.open, "xz": lzma.open, None: open}
 Stream = io.BufferedReader | gzip.GzipFile | bz2.BZ2File | lzma.LZMAFile
 
 
@@ -58,13 +60,8 @@ def open_binary(file: TextFile) -> Stream:
     """A stream of the decompressed bytes of a file."""
     if file.content is not None:
         return io.BufferedReader(io.BytesIO(file.content))
-    if file.compression == "gzip":
-        return gzip.open(file.path, "rb")
-    if file.compression == "bzip2":
-        return bz2.open(file.path, "rb")
-    if file.compression == "xz":
-        return lzma.open(file.path, "rb")
-    return file.path.open("rb")
+    opened: Stream = _OPENED_BY[file.compression](file.path, "rb")
+    return opened
 
 
 def blocks(file: TextFile, cursor: Cursor) -> Generator[bytes, None, None]:

@@ -6,7 +6,7 @@ with timestamps spread evenly to the next packet's; ``sensors`` and ``values`` a
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -146,10 +146,6 @@ def _finite(value: Any) -> float | None:
         return None
 
 
-def _are_numbers(values: Iterable[Any]) -> bool:
-    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-
-
 def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
     """Values by their path; lists of three numbers become ``x``, ``y``, ``z``."""
     out: Row = {}
@@ -157,7 +153,7 @@ def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
         name = f"{prefix}{key}"
         if isinstance(leaf, Mapping):
             out |= _flat(leaf, f"{name}.")
-        elif isinstance(leaf, list) and len(leaf) == 3 and _are_numbers(leaf):
+        elif isinstance(leaf, list) and len(leaf) == 3 and all(type(v) in (int, float) for v in leaf):
             out |= {f"{name}.{axis}": v for axis, v in zip(AXES, leaf, strict=True)}
         else:
             out[name] = leaf

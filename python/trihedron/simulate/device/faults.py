@@ -40,11 +40,6 @@ class Faults:
     start_text: bool = False
     clean_ends: int = 0
 
-    @property
-    def any_per_frame(self) -> bool:
-        """Whether any fault per frame has a probability above 0."""
-        return any(getattr(self, kind) > 0.0 for kind in KINDS)
-
     def during(self, t: float) -> Faults:
         """The faults at device time ``t`` [s]: in a pause every frame is missing."""
         is_paused = any(begin <= t < begin + self.paused_s for begin in self.pause_s)
@@ -109,7 +104,7 @@ class Sent:
 def spoil(frame: bytes, number: int, faults: Faults, rng: random.Random, sent: Sent) -> bytes:
     """The frame's bytes with random faults applied; counted in ``sent``."""
     sent.frames += 1
-    if not faults.any_per_frame:
+    if not any(getattr(faults, kind) > 0.0 for kind in KINDS):
         sent.bytes += len(frame)
         return frame
     struck = [kind for kind in KINDS if rng.random() < getattr(faults, kind)]

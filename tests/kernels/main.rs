@@ -1,0 +1,11 @@
+//! Property and derivative tests of the kernels, one module per room.
+
+mod allan;
+mod ellipsoid;
+mod gauss_newton;
+mod made_session;
+mod norm_invariant;
+mod poisson;
+mod rotation;
+mod session_model;
+mod stillness;
