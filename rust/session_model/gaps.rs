@@ -9,12 +9,15 @@ pub const GAP: f64 = 1.5;
 /// Fewest places in the move with as many complete samples: fewer do not determine the curvature of its motion.
 const FEWEST: usize = 12;
 
+/// Places nearest to a gap that count: motion is quicker in the middle of a move than at its ends.
+const NEAREST: usize = 24;
+
 /// A step over lost samples.
 #[derive(Debug, Clone)]
 pub struct Gap {
     /// Index of the step in the move.
     pub step: usize,
-    /// Mean square error of the same interpolation elsewhere in the move, where nothing was lost: integrals of force
+    /// Mean square error of the same interpolation near it in the move, where nothing was lost: integrals of force
     /// and rate, (raw unit · s)². `None` where the move is too short.
     pub square: Option<[Vector3<f64>; 2]>,
     /// Factor of the variance of one sample's noise in it, s².
@@ -50,19 +53,49 @@ pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]
         .map(|step| ((step.h / usual).round() as usize).clamp(1, steps.len()))
         .collect();
     let is_gap = |k: usize| steps[k].h > GAP * usual;
-    let mut known: Vec<(Bridge, Gap)> = Vec::new();
+    let mut known: Vec<(Bridge, Missed)> = Vec::new();
     let mut out = Vec::new();
     for k in (0..steps.len()).filter(|&k| is_gap(k)) {
         let bridge = Bridge::over(k, steps, &whole);
-        let seen = known.iter().find(|(other, _)| *other == bridge);
-        let one = seen.map_or_else(
-            || bridge.measured(steps, &is_gap, usual, [force, rate]),
-            |(_, one)| one.clone(),
-        );
-        known.push((bridge, one.clone()));
-        out.push(Gap { step: k, ..one });
+        let place = known.iter().position(|(other, _)| *other == bridge);
+        let place = place.unwrap_or_else(|| {
+            let missed = bridge.measured(steps, &is_gap, usual, [force, rate]);
+            known.push((bridge, missed));
+            known.len() - 1
+        });
+        out.push(known[place].1.at(k));
     }
     out
+}
+
+/// Errors of the integral that the interpolation across a gap makes where no samples were lost.
+struct Missed {
+    /// Middle of each place, in steps, and its squared error of force and rate.
+    squares: Vec<(usize, [Vector3<f64>; 2])>,
+    /// Factor of the variance of one sample's noise, s².
+    noise: f64,
+}
+
+impl Missed {
+    /// At the gap that is step `k`: the mean square of the nearest places.
+    fn at(&self, k: usize) -> Gap {
+        let mut order: Vec<&(usize, [Vector3<f64>; 2])> = self.squares.iter().collect();
+        order.sort_by_key(|(middle, _)| middle.abs_diff(k));
+        order.truncate(NEAREST);
+        let n = order.len();
+        let mean = |s: usize| {
+            order
+                .iter()
+                .map(|(_, square)| square[s])
+                .sum::<Vector3<f64>>()
+                / n as f64
+        };
+        Gap {
+            step: k,
+            square: (n >= FEWEST).then(|| [mean(0), mean(1)]),
+            noise: self.noise,
+        }
+    }
 }
 
 /// The samples through which the rate across a gap is interpolated: two for a line, four for a cubic.
@@ -110,40 +143,32 @@ impl Bridge {
         weights
     }
 
-    /// Error of the integral across the gap, measured where no samples were lost.
+    /// Its errors where no samples were lost.
     fn measured(
         &self,
         steps: &[StepWeights],
         is_gap: &impl Fn(usize) -> bool,
         usual: f64,
         signals: [&[Vector3<f64>]; 2],
-    ) -> Gap {
+    ) -> Missed {
         let weights = self.contrast();
-        let mut sum = [Vector3::zeros(); 2];
-        let mut n = 0;
+        let mut squares = Vec::new();
         for (first, window) in steps.windows(weights.len() - 1).enumerate() {
             if (first..first + window.len()).any(is_gap) {
                 continue;
             }
-            n += 1;
-            let at = |j: usize| {
-                if j == 0 {
-                    window[0].from
-                } else {
-                    window[j - 1].to
-                }
-            };
-            for (sum, signal) in sum.iter_mut().zip(signals) {
-                let mut missed = Vector3::zeros();
-                for (j, weight) in weights.iter().enumerate() {
-                    missed += signal[at(j)] * (*weight * usual);
-                }
-                *sum += missed.component_mul(&missed);
-            }
+            let samples = std::iter::once(window[0].from).chain(window.iter().map(|step| step.to));
+            let weighted: Vec<(f64, usize)> =
+                weights.iter().map(|w| w * usual).zip(samples).collect();
+            let missed = signals.map(|signal| {
+                let each = weighted.iter().map(|&(weight, k)| signal[k] * weight);
+                let sum: Vector3<f64> = each.sum();
+                sum.component_mul(&sum)
+            });
+            squares.push((first + window.len() / 2, missed));
         }
-        Gap {
-            step: 0,
-            square: (n >= FEWEST).then(|| sum.map(|s| s / n as f64)),
+        Missed {
+            squares,
             noise: usual * usual * weights.iter().map(|w| w * w).sum::<f64>(),
         }
     }
