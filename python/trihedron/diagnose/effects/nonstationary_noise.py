@@ -25,26 +25,22 @@ class NonstationaryNoise(DirectEffect):
         changes = noise_changes(context.obs)
         if not changes:
             return None
-        obs, parameters = context.obs, []
+        obs, parameters, said = context.obs, [], []
         clearest = max(changes, key=lambda one: one.score)
         same = [one for one in changes if one.score >= 0.5 * clearest.score]
-        poses = obs.segments.poses
-        spans = [
-            (float(obs.time_s[poses[one.first].start]), float(obs.time_s[poses[one.last].stop - 1])) for one in same
-        ]
+        poses, t = obs.segments.poses, obs.time_s
+        spans = [(float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])) for one in same]
         for one, span in zip(same, spans, strict=True):
+            label, prefix, _ = SENSORS[one.sensor]
             parameters += [
                 EffectParameter(f"noise_ratio_{CHANNELS[3 * one.sensor + axis]}", float(ratio), float(sigma), "1")
                 for axis, ratio, sigma in zip(one.axes, one.ratio, one.sigma, strict=True)
             ]
-            prefix = SENSORS[one.sensor].prefix
             parameters += [
                 EffectParameter(f"{prefix}_{name}", at, 0.0, "s") for name, at in zip(("from", "to"), span, strict=True)
             ]
-        said = []
-        for one, span in zip(same, spans, strict=True):
             axes = [AXES[one.axes[k]] for k in one.changed]
-            said.append((SENSORS[one.sensor].label, one.ratio[one.changed].tolist(), axes, *span))
+            said.append((label, one.ratio[one.changed].tolist(), axes, *span))
         channels = tuple(channel for one in same for channel in one.channels)
         named = [pose for one in same for pose in range(one.first, one.last + 1)]
         return Evidence(

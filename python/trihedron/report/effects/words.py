@@ -173,8 +173,8 @@ SESSION = {
             "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of 0|change "
             "in steps of {step:.4g} in raw units (LSB), {times:.2g} times their noise}: averaging does not "
             "resolve less.",
-            "missing": "Codes of {channels:&, } never occur beside codes that do ({codes:&, }): {share:.0f %} of the "
-            "readings are shifted by one LSB.",
+            "missing": "{share:.0f %} of the codes of {channels:&, } never occur between codes that do ({codes:&, } "
+            "are missing): readings there come out one LSB higher or lower.",
         },
     ),
     "nonstationary-noise": EffectWords(
