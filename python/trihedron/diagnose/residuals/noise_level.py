@@ -34,6 +34,9 @@ SAME_SHAPE = np.log(1.3)
 most of its power in the first differences."""
 DITHERED = 0.5
 """Noise, in LSB, below which its variance depends on the place inside an LSB."""
+LEAST_RATIO = 2.0
+"""Variance over the usual one from which a change is named, or its inverse: noise of a part changes by a factor of two
+over a hundred kelvin."""
 CLEAR = 3.0
 """Standard errors by which the noise of an axis differs, or that of a move may be below the level."""
 
@@ -90,7 +93,7 @@ def _change(obs: Observations, sensor: int, poses: list[list[Range]], moves: lis
     logs = np.log(variance[usable][:, :, axes] / usual[:, axes])
     noise = np.repeat(2.0 * SAMPLES_OF_ONE / n[usable, None], len(axes), axis=1)
     score, inside, level = _interval(logs[:, 0], noise)
-    if not inside.any() or not _is_noise(logs[inside], usual[:, axes]):
+    if np.abs(level).max() < np.log(LEAST_RATIO) or not _is_noise(logs[inside], usual[:, axes]):
         return None
     first, last = usable[inside][[0, -1]]
     in_moves = _variances(readings, moves)
