@@ -119,9 +119,9 @@ impl StepWeights {
     }
 }
 
-/// Ratio of neighbouring steps (jitter, one lost sample) above which a cubic through them is worse than a straight
-/// line: across a longer gap it overshoots.
-const UNEVEN_STEPS: f64 = 3.0;
+/// Ratio of neighbouring steps (jitter, three lost samples) above which a cubic through them may be worse than a straight
+/// line: it overshoots.
+const UNEVEN_STEPS: f64 = 4.5;
 
 /// Integration steps between the samples `used` (ascending, of strictly increasing time).
 #[must_use]

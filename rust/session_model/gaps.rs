@@ -6,17 +6,18 @@ use crate::poisson::StepWeights;
 
 /// A step longer than this many usual ones has lost samples.
 pub const GAP: f64 = 1.5;
-/// Number of samples lost together above which a straight line bridges the gap, not a cubic (`poisson::UNEVEN_STEPS`).
-const CROSSED_BY_CUBIC: usize = 2;
 /// Fewest places in the move with as many complete samples: fewer do not determine the curvature of its motion.
 const FEWEST: usize = 12;
+
+/// Places nearest to a gap that count: motion is quicker in the middle of a move than at its ends.
+const NEAREST: usize = 24;
 
 /// A step over lost samples.
 #[derive(Debug, Clone)]
 pub struct Gap {
     /// Index of the step in the move.
     pub step: usize,
-    /// Mean square error of the same interpolation elsewhere in the move, where nothing was lost: integrals of force
+    /// Mean square error of the same interpolation near it in the move, where nothing was lost: integrals of force
     /// and rate, (raw unit · s)². `None` where the move is too short.
     pub square: Option<[Vector3<f64>; 2]>,
     /// Factor of the variance of one sample's noise in it, s².
@@ -45,110 +46,158 @@ pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]
     }
     let middle = lengths.len() / 2;
     let usual = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let is_gap = |step: &StepWeights| step.h > GAP * usual;
-    let mut known: Vec<(usize, Gap)> = Vec::new();
+    // A gap longer than the move itself cannot be measured.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let whole: Vec<usize> = steps
+        .iter()
+        .map(|step| ((step.h / usual).round() as usize).clamp(1, steps.len()))
+        .collect();
+    let is_gap = |k: usize| steps[k].h > GAP * usual;
+    let mut known: Vec<(Bridge, Missed)> = Vec::new();
     let mut out = Vec::new();
-    for (k, step) in steps.iter().enumerate().filter(|(_, step)| is_gap(step)) {
-        // A gap longer than the move itself cannot be measured.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let lost = ((step.h / usual).round() as usize).min(steps.len()).max(2) - 1;
-        let seen = known
-            .iter()
-            .find(|(n, _)| *n == lost)
-            .map(|(_, one)| one.clone());
-        let one = seen.unwrap_or_else(|| {
-            let one = measured(steps, &is_gap, lost, usual, [force, rate]);
-            known.push((lost, one.clone()));
-            one
+    for k in (0..steps.len()).filter(|&k| is_gap(k)) {
+        let bridge = Bridge::over(k, steps, &whole);
+        let place = known.iter().position(|(other, _)| *other == bridge);
+        let place = place.unwrap_or_else(|| {
+            let missed = bridge.measured(steps, &is_gap, usual, [force, rate]);
+            known.push((bridge, missed));
+            known.len() - 1
         });
-        out.push(Gap { step: k, ..one });
+        out.push(known[place].1.at(k));
     }
     out
 }
 
-/// Weights, in steps, of the samples around a gap (two before, those lost, two after) in the error of the integral: a
-/// lost sample has weight one, and its interpolation is subtracted.
-fn contrast(lost: usize) -> Vec<f64> {
-    let mut weights = vec![1.0; lost + 4];
-    let end = lost as f64 + 1.0;
-    let known = [-1.0, 0.0, end, end + 1.0];
-    let places = [0, 1, lost + 2, lost + 3];
-    for (j, (&at, place)) in known.iter().zip(places).enumerate() {
-        let share = |x: f64| -> f64 {
-            if lost > CROSSED_BY_CUBIC {
-                return match j {
-                    1 => 1.0 - x / end,
-                    2 => x / end,
-                    _ => 0.0,
-                };
-            }
-            (0..4)
-                .filter(|&i| i != j)
-                .map(|i| (x - known[i]) / (at - known[i]))
-                .product()
-        };
-        weights[place] = -(1..=lost).map(|i| share(i as f64)).sum::<f64>();
-    }
-    weights
+/// Errors of the integral that the interpolation across a gap makes where no samples were lost.
+struct Missed {
+    /// Middle of each place, in steps, and its squared error of force and rate.
+    squares: Vec<(usize, [Vector3<f64>; 2])>,
+    /// Factor of the variance of one sample's noise, s².
+    noise: f64,
 }
 
-/// Error of a step over `lost` samples, where none were lost.
-fn measured(
-    steps: &[StepWeights],
-    is_gap: &impl Fn(&StepWeights) -> bool,
-    lost: usize,
-    usual: f64,
-    signals: [&[Vector3<f64>]; 2],
-) -> Gap {
-    let weights = contrast(lost);
-    let mut sum = [Vector3::zeros(); 2];
-    let mut n = 0;
-    for window in steps.windows(lost + 3) {
-        if window.iter().any(is_gap) {
-            continue;
-        }
-        n += 1;
-        let at = |j: usize| {
-            if j == 0 {
-                window[0].from
-            } else {
-                window[j - 1].to
-            }
+impl Missed {
+    /// At the gap that is step `k`: the mean square of the nearest places.
+    fn at(&self, k: usize) -> Gap {
+        let mut order: Vec<&(usize, [Vector3<f64>; 2])> = self.squares.iter().collect();
+        order.sort_by_key(|(middle, _)| middle.abs_diff(k));
+        order.truncate(NEAREST);
+        let n = order.len();
+        let mean = |s: usize| {
+            order
+                .iter()
+                .map(|(_, square)| square[s])
+                .sum::<Vector3<f64>>()
+                / n as f64
         };
-        for (sum, signal) in sum.iter_mut().zip(signals) {
-            let mut missed = Vector3::zeros();
-            for (j, weight) in weights.iter().enumerate() {
-                missed += signal[at(j)] * (*weight * usual);
-            }
-            *sum += missed.component_mul(&missed);
+        Gap {
+            step: k,
+            square: (n >= FEWEST).then(|| [mean(0), mean(1)]),
+            noise: self.noise,
         }
     }
-    Gap {
-        step: 0,
-        square: (n >= FEWEST).then(|| sum.map(|s| s / n as f64)),
-        noise: usual * usual * weights.iter().map(|w| w * w).sum::<f64>(),
+}
+
+/// The samples through which the rate across a gap is interpolated: two for a line, four for a cubic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Bridge {
+    /// Their places, in usual steps from the first of them.
+    known: Vec<usize>,
+    /// Which of them the gap follows.
+    left: usize,
+}
+
+impl Bridge {
+    /// As the integration crosses step `k`; `whole` are the lengths of all steps, in usual ones.
+    fn over(k: usize, steps: &[StepWeights], whole: &[usize]) -> Self {
+        let is_line = steps[k].sample[2] == steps[k].from;
+        let first = if is_line {
+            k
+        } else {
+            k.saturating_sub(1).min(steps.len() - 3)
+        };
+        let mut known = vec![0];
+        for length in &whole[first..first + if is_line { 1 } else { 3 }] {
+            known.push(known.last().map_or(0, |last| last + length));
+        }
+        Self {
+            known,
+            left: k - first,
+        }
+    }
+
+    /// Weights, in steps, of all samples from the first to the last of them in the error of the integral: a lost sample
+    /// has weight one, and its interpolation is subtracted.
+    fn contrast(&self) -> Vec<f64> {
+        let n = self.known.len();
+        let mut weights = vec![0.0; self.known[n - 1] + 1];
+        for lost in self.known[self.left] + 1..self.known[self.left + 1] {
+            weights[lost] += 1.0;
+            for &at in &self.known {
+                let others = self.known.iter().filter(|&&other| other != at);
+                weights[at] -= others
+                    .map(|&other| (lost as f64 - other as f64) / (at as f64 - other as f64))
+                    .product::<f64>();
+            }
+        }
+        weights
+    }
+
+    /// Its errors where no samples were lost.
+    fn measured(
+        &self,
+        steps: &[StepWeights],
+        is_gap: &impl Fn(usize) -> bool,
+        usual: f64,
+        signals: [&[Vector3<f64>]; 2],
+    ) -> Missed {
+        let weights = self.contrast();
+        let mut squares = Vec::new();
+        for (first, window) in steps.windows(weights.len() - 1).enumerate() {
+            if (first..first + window.len()).any(is_gap) {
+                continue;
+            }
+            let samples = std::iter::once(window[0].from).chain(window.iter().map(|step| step.to));
+            let weighted: Vec<(f64, usize)> =
+                weights.iter().map(|w| w * usual).zip(samples).collect();
+            let missed = signals.map(|signal| {
+                let each = weighted.iter().map(|&(weight, k)| signal[k] * weight);
+                let sum: Vector3<f64> = each.sum();
+                sum.component_mul(&sum)
+            });
+            squares.push((first + window.len() / 2, missed));
+        }
+        Missed {
+            squares,
+            noise: usual * usual * weights.iter().map(|w| w * w).sum::<f64>(),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::contrast;
+    use super::Bridge;
 
     #[test]
-    fn a_cubic_hides_nothing_in_one_or_two_lost_samples_and_a_line_nothing_in_more() {
-        for (lost, degree) in [(1, 3), (2, 3), (3, 1), (7, 1)] {
-            let weights = contrast(lost);
-            assert!(weights[2..lost + 2].iter().all(|w| (w - 1.0).abs() < 1e-12));
+    fn a_cubic_hides_nothing_in_lost_samples_and_a_line_nothing_of_a_line() {
+        for (known, left, degree) in [
+            (vec![0, 1, 3, 4], 1, 3),
+            (vec![0, 1, 4, 5], 1, 3),
+            (vec![0, 2, 4, 5], 0, 3),
+            (vec![0, 3, 4, 5], 0, 3),
+            (vec![0, 4], 0, 1),
+        ] {
+            let lost = known[left + 1] - known[left] - 1;
+            let weights = Bridge { known, left }.contrast();
+            let ones = weights.iter().filter(|w| (**w - 1.0).abs() < 1e-12);
+            assert!(ones.count() >= lost);
             for power in 0..=degree {
                 let missed: f64 = weights
                     .iter()
                     .enumerate()
                     .map(|(j, w)| w * (j as f64 - 1.0).powi(power))
                     .sum();
-                assert!(
-                    missed.abs() < 1e-9 * (lost as f64 + 3.0).powi(power),
-                    "{lost} {power}"
-                );
+                assert!(missed.abs() < 1e-9 * 5_f64.powi(power), "{lost} {power}");
             }
         }
     }

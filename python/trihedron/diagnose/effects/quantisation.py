@@ -1,8 +1,9 @@
-"""Resolution too coarse for the noise: pose means follow the staircase of the ADC."""
+"""Resolution too coarse for the noise: pose means follow the staircase of the ADC; and codes that never occur."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import pdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -15,8 +16,8 @@ from trihedron.session.rounding import before_adc
 
 COARSE = 0.45
 """Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
-MISSED = 25.0
-"""Expected readings of an empty code from which it counts as missing: by chance once in 10¹¹."""
+RARE, FALSE_ALARM = 0.01, 1e-6
+"""Chance that a code is empty, below which it is tested; and that as many of those tested are."""
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
 FEWEST_CODES = 2
@@ -32,7 +33,10 @@ FEWEST_READINGS = 4
 """Readings of a pose from which its codes determine a scatter."""
 NOISE_ENOUGH = 0.75
 """Scatter, in LSB, at which averaging resolves the LSB: without the rounding variance of 1/12 it is a noise of 0.69,
-and the staircase of the mean is exp(-2π²·0.69²)/π = 3·10⁻⁵ LSB. Around a missing code steps are twice as wide."""
+and the staircase of the mean is exp(-2π²·0.69²)/π = 3·10⁻⁵ LSB."""
+LEAST_SHARE = 0.1
+"""Share of the codes from which missing ones are named: exports that rescale counts lack up to 9 %, 16-bit converters 3
+to 5 %, which changes no mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +45,8 @@ class Lattice:
 
     ``sigma`` that noise and ``scatter`` the scatter of the readings, raw units; ``mean_shift`` (poses,) posterior mean
     minus plain mean and ``mean_sigma`` (poses,) its uncertainty, raw units; ``missing`` number of codes skipped between
-    visited ones; ``dead`` half-width of the zone around one code without any reading, raw units.
+    visited ones, ``shifted`` their share; ``dead`` half-width of the zone around one code without any reading, raw
+    units.
     """
 
     channel: int
@@ -50,29 +55,64 @@ class Lattice:
     scatter: float
     mean_shift: FloatArray
     mean_sigma: FloatArray
-    missing: int
-    dead: float
+    missing: int = 0
+    shifted: float = 0.0
+    dead: float = 0.0
+
+    @property
+    def added(self) -> float:
+        """Variance that the codes add to a reading."""
+        return self.step**2 * (self.shifted if self.missing else 1.0 / 12.0)
 
 
-def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> int | None:
-    """Number of codes skipped between visited ones, or ``None`` where the poses show no LSB."""
+@dataclass(frozen=True, eq=False)
+class MissingCodes:
+    """Codes skipped between visited ones: their number, their share of the codes, and the standard error of a pose mean
+    by readings that come out one code higher or lower, in LSB."""
+
+    number: int
+    share: float
+    error: float
+
+
+NONE_MISSING = MissingCodes(0, 0.0, 0.0)
+
+
+def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> MissingCodes | None:
+    """Codes skipped between visited ones (8.15a), or ``None`` where the poses show no LSB."""
     values = np.concatenate(poses)
     codes = np.unique(values)
     if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
         return None
-    # A code is missing where a pose's own readings lie on both sides of it: noise is unimodal, so at least the
-    # geometric mean of its neighbours' counts is expected there.
-    expected: dict[int, float] = {}
+    if sigma <= REACHES * step:
+        return NONE_MISSING
     # Gap by gap: over hundreds of codes a relative error of 0.1 % of the step would add up to a whole code.
-    place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(int)
-    visited = set(place.tolist())
-    for one in poses if sigma > REACHES * step else []:
-        own, seen = np.unique(place[np.searchsorted(codes, one)], return_counts=True)
-        count = dict(zip(own.tolist(), seen.tolist(), strict=True))
-        for k in own.tolist():
-            if k + 1 not in visited and k + 2 in count:
-                expected[k + 1] = expected.get(k + 1, 0.0) + float(np.sqrt(count[k] * count[k + 2]))
-    return sum(value > MISSED for value in expected.values())
+    place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(np.int64)
+    expected, squares = np.zeros(place[-1] + 1), np.zeros(place[-1] + 1)
+    is_visited = np.zeros(place[-1] + 1, dtype=bool)
+    is_visited[place] = True
+    independent = [np.var(np.diff(one)) / (2.0 * np.var(one)) for one in poses if np.ptp(one) > 0.0]
+    for one in poses:
+        own = place[np.searchsorted(codes, one)]
+        first = own.min()
+        count = np.bincount(own - first)
+        # Noise is unimodal: at least the geometric mean of the neighbours' counts is expected.
+        between = np.sqrt(count[:-2] * count[2:])
+        inside = slice(first + 1, first + 1 + len(between))
+        expected[inside] += between
+        squares[inside] += (between / len(one)) ** 2
+    # As many readings as both neighbours have, a third of them on the code itself: the binomial chance of none.
+    chance = (2.0 / 3.0) ** (2.0 * min(float(np.median(independent)), 1.0) * expected)
+    is_tested = chance < RARE
+    missing = is_tested & ~is_visited
+    if not missing.any() or pdtrc(np.count_nonzero(missing) - 1.0, chance[is_tested].sum()) > FALSE_ALARM:
+        return NONE_MISSING
+    # Between all of them up and all down: uniform.
+    error = float(np.sqrt(squares[missing].sum() / len(poses) / 3.0))
+    # Beside a missing code none is tested.
+    known = is_tested | np.convolve(missing, [True, False, True], "same").astype(bool)
+    number = int(np.count_nonzero(missing))
+    return MissingCodes(number, number / int(np.count_nonzero(known)), error)
 
 
 def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
@@ -109,15 +149,20 @@ class Quantisation(DirectEffect):
 
         worst = max(found, key=lambda one: one.step / one.sigma)
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
-        grid = worst.step**2 / 12.0  # variance of the staircase; that of the noise before the ADC is added below
         names = tuple(CHANNELS[one.channel] for one in found)
-        statement = self.reported(
-            "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
-            times=worst.step / worst.sigma,
-        )  # fmt: skip
+        if worst.missing and worst.sigma > NOISE_ENOUGH * worst.step:
+            statement = self.reported(
+                "missing", channels=names, codes=[one.missing for one in found],
+                share=max(one.shifted for one in found),
+            )  # fmt: skip
+        else:
+            statement = self.reported(
+                "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
+                times=worst.step / worst.sigma,
+            )  # fmt: skip
         return Evidence(
             0.0, strength, _parameters(context, found), statement, "within-static", Where(names),
-            reweigh=reweigh, share=grid / (grid + worst.sigma**2),
+            reweigh=reweigh, share=worst.added / (worst.added + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip
 
@@ -139,18 +184,21 @@ class Quantisation(DirectEffect):
             if not dead:
                 return None
             size = np.full(len(poses), dead / np.sqrt(3.0))  # anywhere inside the zone
-            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, 0, dead)
-        if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
+            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, dead=dead)
+        if missing.share > LEAST_SHARE:
+            density = obs.force_density if c < 3 else obs.rate_density
+            assert density is not None
+            variance = density[c % 3] ** 2 * obs.recording.rate_hz
+            sigma = float(np.sqrt(max(variance - step**2 / 12.0, variance / 2.0)))
+            error = np.full(len(poses), missing.error * step)
+            return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), error, missing.number, missing.share)
+        if scatter > NOISE_ENOUGH * step:
             return None
         found = before_adc(poses, step)
         sigma, shift, spread = found.sigma, found.shift, np.hypot(found.own, found.common)
-        if missing and scatter < 2.0 * NOISE_ENOUGH * step:
-            return Lattice(
-                c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(poses), 0.25 * step), missing, 0.0
-            )
         if sigma > COARSE:
             return None
-        return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)
+        return Lattice(c, step, sigma * step, scatter, shift * step, spread * step)
 
 
 def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter, ...]:

@@ -1,4 +1,4 @@
-"""Inside the poses: spectral lines, and poses noisier than the others."""
+"""Inside the poses: spectral lines, poses noisier than the others, and noise of another level for a while."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
+from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import LEAST_P
 from trihedron.records.domains import DomainTest, Where
@@ -124,24 +125,29 @@ def loud_poses(obs: Observations) -> FloatArray:
 
 
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
-    """Lines and noisy poses, as one domain; the p-value is the smallest, corrected for the number of tests."""
+    """Lines, noisy poses and changes of noise, as one domain; the p-value is the smallest, corrected for the number of
+    tests."""
     scatter, loud = pose_scatter(obs), loud_poses(obs)
     p_scatter = float(loud.min(initial=1.0))
     steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
-    p = min(1.0, 2.0 * min(p_scatter, p_line))
+    changes = {one: float(np.exp(-0.5 * one.score)) for one in noise_changes(obs)}
+    p = min(1.0, 3.0 * min(p_scatter, p_line, *changes.values()))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
     weight = scatter.dof * steady if steady.any() else scatter.dof
     chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=weight).mean())
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
-        poses = np.flatnonzero(loud.min(axis=1) < alpha)[:8]
+        clear = [one for one, p_change in changes.items() if p_change < alpha]
+        changed = {pose for one in clear for pose in range(one.first, one.last + 1)}
+        poses = sorted({*np.flatnonzero(loud.min(axis=1) < alpha).tolist()[:8], *changed})
         t = obs.time_s
         spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in poses)
         strong = [line for line in lines if line.p_value < alpha]
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) < alpha)]
-        channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
+        changed_channels = [channel for one in clear for channel in one.channels]
+        channels = tuple(dict.fromkeys([*(line.channel for line in strong), *loud_channels, *changed_channels]))
         where = Where(channels, obs.pose_names(poses), spans, tuple(line.frequency_hz for line in strong))
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

@@ -172,7 +172,17 @@ SESSION = {
         {
             "steps": "Readings of {channels:&, } {is_dead:?do not change within {dead:.4g} raw units of 0|change "
             "in steps of {step:.4g} in raw units (LSB), {times:.2g} times their noise}: averaging does not "
-            "resolve less."
+            "resolve less.",
+            "missing": "{share:.0f %} of the codes of {channels:&, } never occur between codes that do ({codes:&, } "
+            "are missing): readings there come out one LSB higher or lower.",
+        },
+    ),
+    "nonstationary-noise": EffectWords(
+        "the noise of a sensor has another level for a while",
+        "record the same poses again with sources of interference (motors, radio, chargers) off, then on",
+        {"changes": "{changes:each; }; rotations meanwhile have it too."},
+        lines={
+            "changes": "Noise of the {v0} is {v1:all .2g} times ({v2:axes}) its usual level from {v3:.1f} to {v4:.1f} s"
         },
     ),
     "periodic-interference": EffectWords(

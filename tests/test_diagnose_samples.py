@@ -1,0 +1,95 @@
+"""What samples show: rows lost between even timestamps, noise of another level, codes that never occur."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from diagnosed_session import diagnosed, simulated, unit_of
+from trihedron.diagnose.residuals.noise_level import noise_changes
+from trihedron.diagnose.session.observations import observe
+from trihedron.records import FindingCode
+from trihedron.simulate import hand_session, simulate
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_moves_across_lost_rows_are_as_uncertain_as_their_interpolation(seed):
+    motion = hand_session(20, pose_s=3.0, move_s=1.2, first_pose_s=6.0, layout=seed)
+    made, truth = simulate(unit_of(motion, seed, is_wide=True), seed)
+    # Up to three rows at a time, in a dozen places of every move of a second or two.
+    kept = np.random.default_rng(seed).random(made.n_samples) > 0.08
+    log = replace(
+        made, time_s=made.time_s[kept], accelerometer=made.accelerometer[kept], gyroscope=made.gyroscope[kept],
+        temperature_degc=None, supply_v=None,
+    )  # fmt: skip
+    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert found.verdict == "consistent"
+    # Half as large again as noise at the most: with straight lines across some gaps it was two to four times.
+    assert next(d for d in found.domains if d.domain == "moves").chi2_per_dof < 1.5
+
+
+def louder(log, sensor, where, factor, seed=0):
+    """The log with white noise on a sensor, which is ``factor`` (n,) times as noisy where ``where`` (n,)."""
+    segments = trihedron.segment(log)
+    readings, sigma = getattr(log, sensor), getattr(segments, f"{sensor}_sigma")
+    extra = np.sqrt(np.maximum(factor**2 - 1.0, 0.0))[:, None] * where[:, None] * sigma
+    noise = extra * np.random.default_rng(seed).standard_normal(readings.shape)
+    return replace(log, **{sensor: np.round(readings + noise)})
+
+
+@pytest.mark.parametrize("sensor", ["accelerometer", "gyroscope"])
+def test_noise_of_another_level_is_located_with_its_ratio(sensor):
+    made, truth = simulated(seed=1, n_poses=20)
+    share = made.time_s / made.time_s[-1]
+    log = louder(made, sensor, (share > 0.4) & (share < 0.6), np.full(made.n_samples, 1.6))
+    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
+    assert [one.id for one in found.effects] == ["nonstationary-noise"]
+    assert found.verdict == "missing-physics"
+    (where,) = [d.where for d in found.domains if d.disagrees]
+    assert {channel[0] for channel in where.channels} == {sensor[0]}
+    value = {p.name: p.value for p in found.effects[0].parameters}
+    ratios = [v for name, v in value.items() if name.startswith("noise_ratio")]
+    # Of the readings, filter and rounding included, so a little below that of the white noise.
+    assert ratios == pytest.approx([1.6] * 3, rel=0.1)
+    begin, end = (v for name, v in value.items() if name.endswith(("from", "to")))
+    # From pose to pose: a pose and a move beyond either end.
+    assert (begin, end) == pytest.approx(tuple(made.time_s[-1] * np.array([0.4, 0.6])), abs=8.0)
+
+
+def test_poses_each_with_a_noise_of_its_own_are_no_change():
+    made, _ = simulated(seed=1, n_poses=20)
+    rng, poses = np.random.default_rng(3), trihedron.segment(made).poses
+    factor, where = np.ones(made.n_samples), np.zeros(made.n_samples, dtype=bool)
+    # A hand holds eight poses of twenty, among them neighbours, moves between them quiet.
+    for pose in rng.choice(poses, 8, replace=False):
+        where[pose.start : pose.stop] = True
+        factor[pose.start : pose.stop] = np.exp(rng.uniform(0.2, 1.5))
+    for sensor in ("accelerometer", "gyroscope"):
+        log = louder(made, sensor, where, factor)
+        assert noise_changes(observe(log, trihedron.segment(log))) == ()
+    assert noise_changes(observe(made, trihedron.segment(made))) == ()
+
+
+def test_codes_that_never_occur_are_named_where_noise_spans_many():
+    # Every eighth code, with noise of 65 LSB: eight poses have their readings on the same codes as another.
+    found = diagnosed("quantisation", 4, 14, sensor="accelerometer", missing_every=8)
+    assert [one.id for one in found.effects] == ["quantisation"]
+    missing = [p.value for p in found.effects[0].parameters if p.name.startswith("missing_codes")]
+    assert len(missing) >= 2
+    # Some 500 codes of an axis have readings enough on both sides.
+    assert min(missing) > 40
+    assert "never occur" in found.effects[0].statement
+    assert diagnosed("", 4, 14).verdict == "consistent"
+
+
+def test_a_gap_is_told_as_lost_samples():
+    made, _ = simulated(seed=2, n_poses=14)
+    kept = np.ones(made.n_samples, dtype=bool)
+    kept[2000:2040] = False
+    log = trihedron.Recording.from_arrays(
+        made.time_s[kept], made.accelerometer[kept], made.gyroscope[kept],
+        accelerometer_unit=made.accelerometer_unit, gyroscope_unit=made.gyroscope_unit,
+    )  # fmt: skip
+    (gap,) = [one for one in log.findings if one.code is FindingCode.TIME_GAP]
+    assert gap.numbers["lost_samples"] == 40
