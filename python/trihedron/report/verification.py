@@ -14,6 +14,7 @@ from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, likely, verdict_of
+from trihedron.report.findings.wording import opening
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
@@ -74,15 +75,29 @@ def imprecise(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def verified_in_words(v: Verification) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence: errors beyond noise and uncertainty, else parameters that differ from the file."""
     beyond = above_noise(v)
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in beyond]
     word = "Not contradicted" if imprecise(v.findings) or _is_untested(v) else "Verified"
-    verified = f"{word}: errors are within noise and uncertainty"
-    usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
+    usable = f"{word}: errors are within noise and uncertainty"
+    if above:
+        usable = f"Doubtful: {listed(above)} what noise and uncertainty allow"
+    elif beyond := _shifts(v):
+        (shift,) = beyond
+        doubtful = f"Doubtful: errors are within noise and uncertainty, but {opening(shift.seen)}"
+        seen = f"{shift.seen[:1].lower()}{opening(shift.seen)[1:]}"
+        alone = (
+            f"{word} with the gyro bias measured anew at rest: {seen}; other errors are within noise and uncertainty"
+        )
+        usable = doubtful if shift.numbers["n_others"] else alone
     others = [one for one in v.findings if one not in beyond or one.severity is Severity.SERIOUS]
     said = verdict_of(others, f"{usable}.", usable, "NOT VERIFIED")
-    return f"{said} {likely(beyond[0].cause)}" if above and said.startswith(usable) else said
+    return f"{said} {likely(beyond[0].cause)}" if beyond and said.startswith(usable) else said
+
+
+def _shifts(v: Verification) -> list[Finding]:
+    """The finding that parameters differ from the file; they may where the errors agree."""
+    return [one for one in v.findings if one.code is FindingCode.CALIBRATION_SHIFT and "n_others" in one.numbers]
 
 
 def _is_untested(v: Verification) -> bool:
@@ -96,6 +111,8 @@ def use_in_words(v: Verification, what: str) -> str:
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
     above += imprecise(v.findings)
+    if not above and v.is_passed and use:
+        return " ".join([*(one.action for one in _shifts(v)), use])
     if above and v.is_passed:
         return f"{above[0].action} Where the errors are acceptable it may be used as it is."
     return above[0].action if above else use

@@ -212,8 +212,10 @@ _MOVES = {
         "to {per_g_rad_s:.2g °/s} per g|}.",
         "{is_by_gravity:?G-sensitivity of the gyro, which S and b cannot correct|The bias drifts in this log more than "
         "in the one that was calibrated (warm-up, temperature)}.",
-        "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted with --extended"
+        "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted by "
+        "`trihedron calibrate LOG --extended -o calibration.json`"
         "|Let the sensor warm up, or estimate the bias in use}.",
+        or_severity=SERIOUS,
     ),
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
