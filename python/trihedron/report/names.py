@@ -61,7 +61,7 @@ FINDINGS = {
 }
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = (
-    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "poses-vibrate"),
+    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
     *("scale-not-nominal", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""
