@@ -62,7 +62,7 @@ FINDINGS = {
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = (
     *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
-    *("scale-not-nominal", "turntable"),
+    *("scale-not-nominal", "static-force", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+(?: at [\d.]+ s)?)\b", re.IGNORECASE)

@@ -106,8 +106,8 @@ _USE = {
         "Check it on this log: `trihedron verify FILE LOG`.",
     ),
     (Code.STATIC_FORCE, "scatter", WARNING): Words(
-        f"{_FORCE} and differs from stretch to stretch by {{sigma_m_s2:.2g}} m/s² (1 σ); gravity is "
-        "{gravity_m_s2:.5g} m/s².",
+        "in quiet intervals the corrected |f| differs from stretch to stretch by {sigma_m_s2:.2g} m/s² (1 σ); its "
+        "mean is {norm_m_s2:.5g} m/s² and gravity {gravity_m_s2:.5g} m/s².",
         "The calibration is of another sensor or range, or the sensor was not still.",
         "Test it on this log: `trihedron verify FILE LOG`.",
         numbers=("share",),
