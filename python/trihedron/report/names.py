@@ -45,7 +45,6 @@ FINDINGS = {
     "log-motion": "motion or vibration in the log",
     "non-finite": "rows without time",
     "not-tested": "parameters that this log does not test",
-    "reference-apart": "reference deviates in a part of the log",
     "reference-misfit": "parts of the log disagree",
     "reference-of-itself": "reference in the log's own file",
     "static-rate-above-noise": "gyro rate in static poses above noise",
@@ -62,7 +61,7 @@ FINDINGS = {
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = (
     *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
-    *("scale-not-nominal", "static-force", "turntable"),
+    *("reference-apart", "scale-not-nominal", "static-force", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+(?: at [\d.]+ s)?)\b", re.IGNORECASE)
