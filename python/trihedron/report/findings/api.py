@@ -246,7 +246,8 @@ _MANY_RECORDINGS = {
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
         "in {n} of {n_all} recordings by themselves {seen:clause}; these are the figures of {name}.",
         "What S and b of each recording leave, the common ones leave as well; their uncertainty is widened by it.",
-        "Run `trihedron diagnose ...`, which looks for what they share.",
+        "Run `trihedron diagnose ...`: it looks for what they share; `calibrate --extended` of one recording stores it "
+        "with S and b.",
     ),
     (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",

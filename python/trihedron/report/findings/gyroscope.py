@@ -124,9 +124,9 @@ _MOVES = {
         numbers=("times",),
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
-        "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
-        "{force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. The "
-        "moves were fitted without it; S and b alone cannot correct it.",
+        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for "
+        "force along {force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. "
+        "The moves were fitted without it; S and b alone cannot correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
         "Separate g-sensitivity from a bias that differs from pose to pose: `trihedron diagnose LOG`; --extended fits "
         "g-sensitivity.",
