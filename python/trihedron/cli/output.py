@@ -159,13 +159,10 @@ def style() -> Style:
     """
     from trihedron.report.text import WIDTH, Style
 
-    return Style(_columns(sys.stdout) or WIDTH, has_colour(), not speaks_unicode(sys.stdout))
-
-
-def _columns(stream: TextIO) -> int | None:
-    """Width of a terminal, or that of ``COLUMNS`` whatever the stream is; None where neither is known."""
-    is_known = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
-    return shutil.get_terminal_size().columns if is_known else None
+    is_terminal = sys.stdout.isatty()
+    is_said = os.environ.get("COLUMNS", "").isdigit()
+    width = shutil.get_terminal_size((WIDTH, 24)).columns if is_terminal or is_said else WIDTH
+    return Style(width, has_colour(), not speaks_unicode(sys.stdout))
 
 
 def has_colour() -> bool:
@@ -199,10 +196,9 @@ def silence(stream: TextIO) -> None:
 
 
 def say(sentence: str) -> None:
-    """Print on stderr what was done, wrapped as results on stdout are; a line of a pipe stays one."""
+    """Print on stderr what was done; results go to stdout."""
     text = escaped(sentence)
-    columns = _columns(sys.stderr)
-    if columns is not None and len(text) > columns:
+    if sys.stderr.isatty() and len(text) > (columns := shutil.get_terminal_size().columns):
         from trihedron.report.text import wrapped
 
         text = "\n".join(wrapped(text, columns))

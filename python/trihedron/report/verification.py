@@ -13,7 +13,7 @@ from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
-from trihedron.report.findings import findings_block, likely, verdict_of
+from trihedron.report.findings import by_weight, findings_block, likely, verdict_of
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
@@ -145,14 +145,14 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """The errors with their expected size, the one that fails first: by its limit, else the farthest above noise and
-    uncertainty; then the change of the gyro's bias."""
+    """The errors with their expected size, the one that fails first: by its limit, else the one of the verdict; the
+    change of the gyro's bias last, or first where it alone does."""
     out = [
         Headline(what, rms, unit, f"rms over {of}; expected {allowed}")
         for what, rms, unit, of, allowed, _ in _errors(v)
     ]
-    farthest = max(above_noise(v), key=lambda one: one.numbers["times"], default=None)
-    code = FindingCode.RESIDUAL_ABOVE_NOISE if farthest is None else farthest.code
+    gravest = next(iter(by_weight(above_noise(v))), None)
+    code = FindingCode.RESIDUAL_ABOVE_NOISE if gravest is None else gravest.code
     for one in v.findings:
         if one.code is FindingCode.LIMIT_EXCEEDED:
             code = FindingCode.HELD_OUT_WORSE if "limit_deg" in one.numbers else FindingCode.RESIDUAL_ABOVE_NOISE
@@ -161,7 +161,9 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
         Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)
         for changes in _bias_changes(v)
     ]
-    return (*sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code]), *moved)
+    errors = sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code])
+    is_bias = v.is_passed and gravest is None and any(not one.numbers["n_others"] for one in _shifts(v))
+    return (*moved, *errors) if is_bias else (*errors, *moved)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
