@@ -55,6 +55,7 @@ CONSEQUENCE = (
     FindingCode.POSE_AT_RANGE_LIMIT,
     FindingCode.OUTLIER_POSE,
     FindingCode.OUTLIER_MOVE,
+    FindingCode.INNOVATIONS_TOO_LARGE,
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
     FindingCode.STATIC_RATE_ABOVE_NOISE,
