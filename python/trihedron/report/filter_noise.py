@@ -89,9 +89,9 @@ def _predicted(found: FilterNoise) -> str:
     for one in (sensor for sensor in found.sensors if sensor.consistency):
         last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
         sizes = [with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)]
-        own = ", that of the reference included," if one.reference is not None else ""
-        said.append(f"{what} over {last.horizon_s:g} s{own} predicted {sizes[0]}, was {sizes[1]}")
-    return f": {'; '.join(said)}" if said else ""
+        said.append(f"{what} over {last.horizon_s:g} s predicted {sizes[0]}, was {sizes[1]}")
+    own = " (the reference's own error included)" if any(one.reference is not None for one in found.sensors) else ""
+    return f": {'; '.join(said)}{own}" if said else ""
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:
