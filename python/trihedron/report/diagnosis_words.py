@@ -21,7 +21,7 @@ from trihedron.report.numbers import (
     with_unit,
 )
 from trihedron.report.verification import imprecise
-from trihedron.units import degrees_from_radians
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 LEVELS: dict[str, Level] = {
     "consistent": "good",
@@ -276,8 +276,10 @@ def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
     factor, printed = 1.0, {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
     if unit.startswith(("rad/s", "(rad/s)")):
         factor, printed = degrees_from_radians(1.0), printed.replace("rad", "°", 1)
+    if unit == "(rad/s)/(m/s^2)":
+        factor, printed = factor * STANDARD_GRAVITY_M_S2, "°/s/g"  # as data sheets state a g-sensitivity
     exponent = engineering_exponent(factor * largest)
-    if printed == "°" or -3 < exponent <= 3 or (printed == "°/s" and exponent == -3):
+    if printed == "°" or -3 < exponent <= 3 or (printed in ("°/s", "°/s/g") and exponent == -3):
         exponent = 0
     return factor * 10.0**-exponent, unit_with_power(exponent, printed)
 
