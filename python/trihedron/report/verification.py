@@ -110,9 +110,10 @@ def use_in_words(v: Verification, what: str) -> str:
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
-    above += imprecise(v.findings)
-    if not above and v.is_passed and use:
-        return " ".join([*(one.action for one in _shifts(v)), use])
+    shifts = _shifts(v)
+    above += [*imprecise(v.findings), *(one for one in shifts if one.numbers["n_others"])]
+    if not above and use:
+        return " ".join([*(one.action for one in shifts), use])
     if above and v.is_passed:
         return f"{above[0].action} Where the errors are acceptable it may be used as it is."
     return above[0].action if above else use
