@@ -123,11 +123,15 @@ def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_dr
     healthy = result.gyroscope.quality
     assert healthy.static_rate_rms < 1.5 * healthy.static_rate_floor
 
-    def judged(known):
-        checked = trihedron.verify(known, other)
+    def judged(known, limit_deg=None):
+        checked = trihedron.verify(known, other, limit_deg=limit_deg)
         return checked, [one for one in checked.findings if one.code is FindingCode.STATIC_RATE_ABOVE_NOISE]
 
     checked, (finding,) = judged(alone)
+    # More than ten times what noise allows is not verified, whichever error it is, unless a limit accepts the gyro.
+    assert not checked.is_passed
+    assert "NOT VERIFIED: The gyro rate in static poses" in " ".join(str(checked).split())
+    checked, (finding,) = judged(alone, limit_deg=1.0)
     assert checked.is_passed
     assert finding.numbers["per_g_rad_s"] == pytest.approx(1.1e-3, rel=0.3)
     assert "Doubtful: gyro rate in static poses" in str(checked)

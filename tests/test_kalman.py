@@ -8,7 +8,7 @@ from scipy import stats
 
 import twins_kalman as twins
 from trihedron import _core
-from trihedron.estimate.kalman.per_axis import calibrate_with_references, shaping_model
+from trihedron.estimate.kalman.per_axis import calibrate_with_references, check_innovations, shaping_model
 from trihedron.records import AxisNoise, FindingCode, PoseTable
 
 SIGMA = 0.11 * 0.032002 / twins.GRAVITY
@@ -195,3 +195,13 @@ def test_malformed_questions_are_refused_in_plain_words(change, message):
     asked = {"readings": readings, "table": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
     with pytest.raises(ValueError, match=message):
         calibrate_with_references(**asked)
+
+
+def test_the_pose_from_which_innovations_are_beyond_chance_is_named():
+    """A reference that slips is wrong from one pose on."""
+    z = np.random.default_rng(3).normal(size=24)
+    assert check_innovations(z, np.ones(24), 4).first_beyond == 0
+    z[12:] += 30.0
+    # The first four start the filter.
+    sigma = np.concatenate([np.full(4, 1e6), np.ones(20)])
+    assert check_innovations(z, sigma, 4).first_beyond == 13

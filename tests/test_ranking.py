@@ -164,7 +164,7 @@ def test_the_recording_that_a_calibration_was_made_from_proves_nothing_of_it(ses
 def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification(session):
     """No bias of such a log is the next one's, whatever the file states; a log without drift has no such warning."""
     log, known = session
-    counts = np.radians(0.5) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
+    counts = np.radians(0.06) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
     found = [
         [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is RATE]
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
@@ -181,3 +181,15 @@ def test_verify_names_the_one_scale_that_is_wrong_and_does_not_suspect_gravity(s
     assert len(causes) == 1
     assert "accelerometer scale Y" in causes[0]
     assert "gravity" not in causes[0].lower()
+
+
+def test_a_gyro_bias_that_changed_alone_is_named_in_the_verdict_and_no_rejection(session):
+    """0.05 °/s is fifty standard uncertainties and what a gyro does from one turn-on to the next."""
+    log, known = session
+    w = known.gyroscope
+    moved = replace(known, gyroscope=replace(w, b=w.b + np.radians([0.0, 0.05, 0.0])))
+    result = trihedron.verify(moved, log, gravity_m_s2=9.81)
+    assert result.is_passed
+    screen = " ".join(str(result).partition("Result\n")[0].split())
+    assert "Verified with the gyro bias measured anew at rest: the gyro bias changed" in screen
+    assert "Measure the calibrated rate in a static pose" in screen

@@ -10,6 +10,7 @@ from reference_rig import G, commanded_table, forces, hand, measured_table, rate
 from trihedron._core import rotation_from_vector
 from trihedron.api.beside import shared_log
 from trihedron.cli import _a_reference_each
+from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 from trihedron.estimate.reference.fit import fit_reference
 from trihedron.files.calibration import diagnosis_document
 from trihedron.records import FindingCode, Severity
@@ -242,9 +243,12 @@ def test_a_reference_that_slips_on_the_body_is_told_from_a_wobble_with_its_time_
     time = trial.motion.time_s
     axis = np.array([0.6, 0.0, -0.8])
 
+    def turned(degrees):
+        return rotation_from_vector(np.radians(degrees)[:, None] * axis)
+
     def turned_by(degrees):
-        by = rotation_from_vector(np.radians(degrees)[:, None] * axis)
-        return fit_reference(trial.log, replace(trial.motion, attitude=trial.motion.attitude @ by), G).findings
+        attitude = trial.motion.attitude @ turned(degrees)
+        return fit_reference(trial.log, replace(trial.motion, attitude=attitude), G).findings
 
     assert all(one.code is not FindingCode.REFERENCE_APART for one in turned_by(np.sin(time / 4.0)))
     findings = turned_by(np.where(time > 30.0, 2.0, 0.0))
@@ -252,6 +256,12 @@ def test_a_reference_that_slips_on_the_body_is_told_from_a_wobble_with_its_time_
     assert apart.severity is Severity.SERIOUS
     assert apart.numbers["at_s"] == pytest.approx(30.0 - trial.lead_s, abs=1.5)
     assert abs(apart.numbers["angle_rad"] - np.radians(2.0)) < 4.5 * apart.numbers["sigma_rad"]
+    # N of a filter contains no slip; the reference's own error does.
+    slipped = trial.motion.attitude @ turned(np.where(time > 30.0, 2.0, 0.0))
+    asked = Request((1.0, 10.0), 20.0, G)
+    _, noted = beside_reference(trial.log, replace(trial.motion, attitude=slipped), asked)
+    (apart,) = (one for one in noted if one.code is FindingCode.REFERENCE_APART)
+    assert (apart.severity, "angle_rad" in apart.numbers) == (Severity.WARNING, True)
 
 
 def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other():

@@ -54,7 +54,8 @@ def verify(
         |g| at the place; that of the calibration unless given.
     limit_mg, limit_deg : float, optional
         Largest acceptable rms gravity error [mg] and tilt error [°]: beyond one there is a serious finding. Without
-        a limit, errors above ten times those expected are serious; within a limit they are a warning.
+        a limit, errors above ten times those expected are serious; within a limit they are a warning (the gyro's
+        rate in static poses, within that of tilt).
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
 
@@ -85,9 +86,11 @@ def verify(
     gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, gravity_of(known))
     own = own_calibration(recording, segments, gravity)
     judged = verify_calibration(_with_drifts(known, changed), recording, segments, gravity, source, own)
+    is_tilt_limited = limit_deg is not None
     accepted = {
         FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
-        FindingCode.HELD_OUT_WORSE: limit_deg is not None,
+        FindingCode.HELD_OUT_WORSE: is_tilt_limited,
+        FindingCode.STATIC_RATE_ABOVE_NOISE: is_tilt_limited,
     }
     missed = tuple(
         replace(found, severity=Severity.WARNING) if accepted.get(found.code, False) else found

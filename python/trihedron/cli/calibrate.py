@@ -92,7 +92,8 @@ def calibrate(
             return
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "frame"}:
             raise typer.BadParameter(
-                "several logs are calibrated without --method faces, --turns and --turntable, without --extended"
+                "--extended, --method faces, --turns and --turntable are for one log: "
+                "several logs are calibrated without them"
             )
         if method != "joint":
             raise typer.BadParameter("several logs are calibrated with --method joint")

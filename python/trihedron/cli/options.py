@@ -205,7 +205,8 @@ def with_options(table: Table | None = None, /, **groups: type) -> Callable[[Cal
         def run(**given: Any) -> None:
             note_options(given)
             note_file(given.get("output"))
-            note_reference(given.get("reference"))
+            if command.__name__ != "kalman":  # whose reference is a table of poses
+                note_reference(given.get("reference"))
             for name, group in groups.items():
                 given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
                 if group is GravitySource:

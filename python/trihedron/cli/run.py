@@ -155,7 +155,7 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
             option = f"{_extended(document.findings)}-o {UNSTORED}"
             is_added = f": add `{option}` to this `{(*_now().typed, '')[0]}` command"
             how = is_added if is_long else f" (`{stored_by} {option}`)"
-            said = f"Store it{how}. {said}"
+            said = f"Store {'S and b' if len(_now().logs) > 1 else 'it'}{how}. {said}"
             what_next = replace(document, next_step=said).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
     advised = _READ_WITH.match(what_next)
@@ -198,6 +198,9 @@ def _filled(command: str) -> str:
         named = shlex.split(command.strip("`"))[2:]
         options = next((shlex.join(words[len(named) :]) for words in _now().logs if words[: len(named)] == named), "")
         return f"`{' '.join(filter(None, (command.strip('`'), options, _now().place)))}`"
+    is_own = any(word in _OF_ITS_COMMAND for word in given)
+    if re.fullmatch(r"`trihedron \w+ \.\.\.`", command) and len(again(given)) > LONG and not is_own:
+        return f"this command with `{verb}` in place of `{given[0]}`"
     same = (
         again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_ITS_COMMAND).split()[2:])
     )

@@ -121,7 +121,6 @@ def simulate(
         from trihedron.api.applying import apply
         from trihedron.api.reading import segment
         from trihedron.files.calibration import read_calibration
-        from trihedron.records import Severity
         from trihedron.records.recording import as_arguments
 
         repeated = LogSource(**asdict(how), log=like).read()
@@ -131,8 +130,6 @@ def simulate(
         note_file(calibration)
         findings = (*apply(of_unit, repeated).findings, *segment(repeated).findings)
         findings = tuple(replace(one, action=with_commands(one.action)) for one in findings)
-        for finding in (one for one in findings if one.severity is Severity.WARNING):
-            say(str(finding))
         note_file(output)
     else:
         recording, known = run(str(scenario), seed)
@@ -151,7 +148,9 @@ def simulate(
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     _show(output, recording, known)
-    say(f"→ {with_commands(document.next_step)}")
+    if beside:
+        say(document.verdict)
+    say(f"→ {with_commands(document.what_next)}")
     leave(findings)
 
 

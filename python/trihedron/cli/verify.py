@@ -40,8 +40,8 @@ def verify(
     """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
     Calibrations may be files of other programs (Kalibr, PX4, ArduPilot, ...); several are ranked. Exit status 2 when a
-    limit is exceeded, or, without one, when a gravity or tilt error is more than ten times the expected one; of
-    several, when the best is rejected.
+    limit is exceeded, or, without one, when an error is more than ten times the expected one; of several, when the
+    best is rejected.
     """
     results.check(inputs=source.files)
     from trihedron.api import verifying

@@ -182,7 +182,7 @@ def effect_record(
         id=effect.id, statement=statement, parameters=parameters,
         p_adjusted=min(1.0, max(p_value, TINY) * len(catalogue())), delta_bic=float(score), held_out=held_out,
         confounded_with=rivals,
-        separating_experiment=" / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
+        separating_experiment="; or ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
         model=MappingProxyType(said), curves=curves,
     )  # fmt: skip
 

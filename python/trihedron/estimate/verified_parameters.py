@@ -100,9 +100,15 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
     shifted = shifted_parameters(parameters)
     if not shifted:
         return
+    others = sum(one.id != "gyro-bias" for one in shifted)
+    amounts = [(-one.difference, one.sigma, one.unit) for one in shifted]
+    named = [(f"{one.id}-{one.name}", amount, one.name) for one, amount in zip(shifted, amounts, strict=True)]
     yield Finding.of(
         FindingCode.CALIBRATION_SHIFT,
-        parameters=[(one.id + "-" + one.name, (-one.difference, one.sigma, one.unit)) for one in shifted[:LISTED]],
+        "" if others else "gyro-bias-alone",
+        parameters=named[:LISTED],
+        first=named[0][0],
+        n_others=others,
         n_parameters=len(shifted),
         n_judged=sum(one.is_judged for one in parameters),
         times_sigma=abs(shifted[0].times_sigma),

@@ -8,7 +8,8 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import AXES, FloatArray, rms_of
 from trihedron.estimate.gyroscope.biases import attitude_dependence
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
+from trihedron.session.drift import TYPICAL
 from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF, expected_scatter
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -64,25 +65,29 @@ def _stated_change(known: Calibration) -> float:
 def bias_findings(
     gyroscope: SensorCalibration | None, rest: FloatArray, far: float, *, is_alone: bool
 ) -> Iterator[Finding]:
-    """Finding where the gyro bias differs by more than ``far`` σ, of the poses' scatter and stated uncertainty.
+    """Finding where the gyro bias differs by more than ``far`` σ of its repeatability: the change of typical parts,
+    the poses' scatter and the stated uncertainty. ``is_alone``: poses and moves agree.
 
-    Sessions of one unit differ by 0.1 to 1.5 σ (mimu4444, kim, getovermassif). ``is_alone``: poses and moves agree.
+    Up to there it is what a switched-on gyro does: its change is stated among the parameters (``shift_findings``).
     """
     if gyroscope is None or len(rest) < 2:
         return
-    sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2)))
+    sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2) + TYPICAL[1] ** 2))
     shift = rms_of(np.mean(rest, axis=0))
-    if shift <= far * sigma:
-        return
-    times = shift / sigma if sigma > 0.0 else float("inf")
-    yield Finding.of(
-        FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times, is_alone=is_alone
-    )
+    if shift > far * sigma:
+        yield Finding.of(
+            FindingCode.CALIBRATION_SHIFT,
+            "gyro-bias",
+            rate_rad_s=shift,
+            times_expected=shift / sigma,
+            sigma_rad_s=sigma,
+            is_alone=is_alone,
+        )
 
 
-def rate_findings(rest: FloatArray, sigma: FloatArray, force: FloatArray) -> Iterator[Finding]:
-    """Finding where rates (n, 3) change from pose to pose by more than is expected, and whether with the specific force
-    (n, 3), m/s²."""
+def rate_findings(rest: FloatArray, sigma: FloatArray, force: FloatArray, far: float) -> Iterator[Finding]:
+    """Finding where rates (n, 3) change from pose to pose by more than is expected, serious above ``far`` times, and
+    whether with the specific force (n, 3), m/s²."""
     if len(rest) < 3 or not (sigma > 0.0).all():
         return
     away, dof = rest - rest.mean(axis=0), 3.0 * (len(rest) - 1)
@@ -93,6 +98,7 @@ def rate_findings(rest: FloatArray, sigma: FloatArray, force: FloatArray) -> Ite
     pose, axis = np.unravel_index(int(np.argmax(np.abs(away))), away.shape)
     yield Finding.of(
         FindingCode.STATIC_RATE_ABOVE_NOISE,
+        severity=Severity.SERIOUS if chi2_per_dof > far**2 else Severity.WARNING,
         rate_rms_rad_s=rms_of(away),
         times=np.sqrt(chi2_per_dof),
         chi2_per_dof=chi2_per_dof,

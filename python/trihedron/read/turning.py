@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.units import RateUnit, rate_to_si
 
 USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
@@ -34,6 +34,8 @@ _STILL, _ONE_SIDED = 2.0, 4.0
 of gravity that the others leave, 4 times as much is a rotation about its axis as is not."""
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
+_TRIANGLE = np.array([0.125, 0.375])
+"""Share of a triangle over two blocks in the halves of the first; in those of the second in reverse order."""
 _MOST_TURN_RAD = 0.7
 _NEAR_GRAVITY = 0.2
 """Blocks whose |a| differs from the median by more than this fraction contain acceleration and are excluded."""
@@ -89,22 +91,27 @@ class Turning:
 def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float) -> Turning | None:
     """The scale of gyro readings (n, 3) from the rotation of gravity in accelerometer readings (n, 3); None where
     there is no rotation."""
-    length = max(1, round(_BLOCK_S * rate_hz))
-    n = min(len(accelerometer) // length, _MAX_BLOCKS)
+    half = max(1, round(0.5 * _BLOCK_S * rate_hz))
+    n, length = min(len(accelerometer) // (2 * half), _MAX_BLOCKS), 2 * half
     if n < 3:
         return None
     a = _core.block_mean_readings(accelerometer, length, n)
-    w = _core.block_mean_readings(gyroscope, length, n)
+    halves = _core.block_mean_readings(gyroscope, half, 2 * n).reshape(n, 2, 3)
+    w = halves.mean(axis=1)
     norm = np.linalg.norm(a, axis=1)
     finite = np.isfinite(w).all(axis=1) & np.isfinite(norm) & (norm > 0.0)
     if not finite.any():
         return None
     usual = float(np.median(norm[finite]))
     # Raw biases may be large (a static 10-bit gyro reads 512): the median is close to the bias.
-    w = w - np.median(w[finite], axis=0)
+    halves = halves - np.median(w[finite], axis=0)
     good = finite & (np.abs(norm - usual) < _NEAR_GRAVITY * usual)
     a = a / np.where(finite, norm, 1.0)[:, None]
-    mean_a, mean_w, seen = 0.5 * (a[1:] + a[:-1]), 0.5 * (w[1:] + w[:-1]), np.diff(a, axis=0)
+    # Two block means differ by the integral of ȧ under a triangle over both blocks.
+    mean_w = halves[:-1].transpose(0, 2, 1) @ _TRIANGLE + halves[1:].transpose(0, 2, 1) @ _TRIANGLE[::-1]
+    seen = np.diff(a, axis=0)
+    # Mean direction along the arc between them: half the sum is shorter by a twelfth of the angle squared.
+    mean_a = 0.5 * (a[1:] + a[:-1]) * (1.0 + np.sum(seen**2, axis=1, keepdims=True) / 12.0)
     speed = np.linalg.norm(mean_w, axis=1)
     usable = good[1:] & good[:-1]
     if not usable.any():
@@ -112,7 +119,9 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     usable &= (speed > np.median(speed[usable])) & (np.linalg.norm(seen, axis=1) < _MOST_TURN_RAD)
     # Motion lasts longer than a block, noise does not.
     is_noise = np.nanstd(w, axis=0) < _STILL * np.nanstd(np.diff(w, axis=0), axis=0) / math.sqrt(2.0)
-    return _fitted(mean_a[usable], mean_w[usable], seen[usable], is_noise, length / rate_hz)
+    # A body's acceleration lasts as long as a move: blocks in succession are one observation of the error.
+    starts = np.flatnonzero(np.diff(np.flatnonzero(usable), prepend=-2) > 1)
+    return _fitted(mean_a[usable], mean_w[usable], seen[usable], starts, is_noise, length / rate_hz)
 
 
 @dataclass(frozen=True)
@@ -157,7 +166,10 @@ def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sum
     return _Sums(design.T @ design, design.T @ seen.ravel(), float(squared.sum()), float(squared @ squared), len(a))
 
 
-def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray, step_s: float) -> Turning | None:
+def _fitted(
+    a: FloatArray, w: FloatArray, seen: FloatArray, starts: IntArray, is_noise: BoolArray, step_s: float
+) -> Turning | None:
+    """The scale from directions, rates and changes (n, 3) of blocks; ``starts`` are the first ones of each move."""
     parts = [
         _sums(*part, step_s)
         for part in zip(np.array_split(a, PARTS), np.array_split(w, PARTS), np.array_split(seen, PARTS), strict=True)
@@ -178,7 +190,11 @@ def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, is_noise: BoolArray,
     if found is None:
         return None
     turning, axes = found
-    left = seen - turning.scale * step_s * np.cross(a, w @ axes.T)
+    predicted = step_s * np.cross(a, w @ axes.T)
+    left = seen - turning.scale * predicted
+    of_moves = np.add.reduceat(np.sum(predicted * left, axis=1), starts)
+    spread = float(np.linalg.norm(of_moves) / np.sum(predicted**2))
+    turning = replace(turning, sigma=max(turning.sigma, spread))
     still = [k for k in range(3) if is_noise[k] and len(a) >= _FEWEST and _turns_about(axes[:, k], a, left)]
     turning = replace(turning, motionless=tuple(still))
     for k, part in enumerate(parts):

@@ -9,9 +9,9 @@ from trihedron.records.sessions import Change, Parameter, Repeated
 
 @dataclass(frozen=True, eq=False)
 class FleetLog:
-    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, codes of ``serious``
-    findings, parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where not calibrated;
-    ``reread`` is the action against a contradicted unit."""
+    """One log: ``status`` with its ``reason``, the diagnosis' ``verdict`` and effects, codes of ``serious`` findings,
+    parameters ``numbers`` (9,) or (21,) with standard errors ``std``; ``None`` where not calibrated; ``reread`` is the
+    action against a contradicted unit, ``warned`` are codes of warnings."""
 
     name: str
     serial: str
@@ -28,6 +28,7 @@ class FleetLog:
     numbers: FloatArray | None
     std: FloatArray | None
     reread: str = ""
+    warned: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,15 @@ class Outlier:
 @dataclass(frozen=True)
 class MixedLogs:
     """Logs under one serial number that are of different devices: ``parameter`` differs by ``difference``; ``odd`` is
-    the one log that differs from all others, empty where there is none."""
+    the one log that differs from all others, ``fits`` the only device whose logs it agrees with; each empty where there
+    is none."""
 
     serial: str
     n_logs: int
     parameter: Parameter
     difference: float
     odd: str = ""
+    fits: str = ""
 
 
 @dataclass(frozen=True)

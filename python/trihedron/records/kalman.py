@@ -181,7 +181,8 @@ class AxisKalmanResult:
 class Consistency:
     """Consistency of the innovations with the filter's model: mean of NIS with its 99 % limits, and a whiteness test.
 
-    ``whiteness_p`` is the Ljung-Box probability that white innovations look as correlated as these in ``n_lags`` lags.
+    ``whiteness_p`` is the Ljung-Box probability that white innovations look as correlated as these in ``n_lags`` lags,
+    ``first_beyond`` the first pose (from 1) with an innovation that no chance explains, 0 without one.
     """
 
     nis_mean: float
@@ -191,6 +192,7 @@ class Consistency:
     whiteness_p: float
     n_lags: int
     autocorrelation: tuple[float, ...] = ()
+    first_beyond: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_unit,
 )
-from trihedron.report.segments import rate_in_words
+from trihedron.report.segments import if_rate_is_right, rate_in_words, scale_by_rate
 from trihedron.report.verification import USES
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
@@ -57,7 +57,7 @@ def calibration_report(
     """Lay out a calibration; with its segments and recording also their tables and figures. ``errors_beside`` are the
     errors in words of one whose fit is to a reference."""
     sections = [
-        Section("Result", _result(calibration, segments, recording)),
+        Section("Result", _result(calibration, segments, recording, has_reference=bool(errors_beside))),
         Section("Findings", (findings_block(calibration.findings),)),
     ]
     figures = tuple(figure_blocks(calibration, segments, recording))
@@ -103,6 +103,7 @@ def scale_headlines(calibration: Calibration) -> list[Headline]:
             worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
             is_open = is_assumed and name == "accelerometer"
             beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
+            beside += if_rate_is_right(name, sensor.raw_unit)
             uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
     return uncertain
 
@@ -168,11 +169,14 @@ def verdict(calibration: Calibration, errors_beside: str = "") -> str:
     return " ".join([whole, *drifts, *effects])
 
 
-def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:
+def _result(
+    calibration: Calibration, segments: Segments | None, recording: Recording | None, *, has_reference: bool
+) -> tuple[Block, ...]:
     facts = []
     if recording is not None:
         rate = rate_in_words(recording.rate_hz, recording.findings, 4)
-        facts.append(("recording", f"{duration(recording.duration_s)} at {rate}"))
+        alone = "" if has_reference else scale_by_rate(recording)
+        facts.append(("recording", f"{duration(recording.duration_s)} at {rate}{alone}"))
     if segments is not None:
         facts.append(("motion", f"{how_many(segments.n_poses, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))

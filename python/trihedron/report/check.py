@@ -10,7 +10,7 @@ from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, serious_ones, verdict_of
 from trihedron.report.numbers import how_many, plain_number, shown
-from trihedron.report.segments import recording_facts, signals_picture
+from trihedron.report.segments import if_rate_is_right, recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 
 NONE = "–"
@@ -50,11 +50,13 @@ def check_report(
 def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
     out = [] if calibration is None else undetermined(serious_ones(calibration.findings))
     expected = {} if calibration is None else _expected_cells(calibration)
+    units = {} if calibration is None else {name: sensor.raw_unit for name, sensor in calibration.sensors}
     for name, (scale, *_) in expected.items():
         if scale == NONE:
             out.append(Headline(f"{name} scale", "none", "", "this log does not determine it"))
         else:
-            out.append(Headline(f"expected {name} scale uncertainty", scale, "", "1 σ, worst axis"))
+            beside = f"1 σ, worst axis{if_rate_is_right(name, units.get(name, ''))}"
+            out.append(Headline(f"expected {name} scale uncertainty", scale, "", beside))
     out.append(Headline("poses", str(segments.n_poses), "", how_many(len(segments.moves), "move")))
     return out
 

@@ -11,6 +11,7 @@ from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, Held
 from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
+from trihedron.report.diagnosis_headlines import differing_headline, headlines_of
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (
@@ -23,10 +24,8 @@ from trihedron.report.diagnosis_numbers import (
 from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     NOT_JUDGED,
-    differing_headline,
     findings_of,
     follows,
-    headlines_of,
     is_explained,
     judged_in_words,
     level_of,

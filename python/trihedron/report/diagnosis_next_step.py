@@ -10,7 +10,16 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
-from trihedron.report.diagnosis_words import IN_FULL, OF_SAMPLES, dependent, findings_of, named_effects, own_serious
+from trihedron.report.diagnosis_words import (
+    IN_FULL,
+    OF_SAMPLES,
+    dependent,
+    findings_of,
+    may_be_used,
+    named_effects,
+    own_serious,
+    poses_disagree,
+)
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
@@ -25,6 +34,13 @@ LAST = 0.1
 """Share of a log, at its end, whose mean is the end of a drift; share of its range that is left of one that ended."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
+
+
+BY_TEMPERATURE = (
+    "For S and b that follow the temperature record 18 or more poses at each of three or more temperatures, and "
+    "calibrate these logs together: `trihedron calibrate COLD WARM HOT --by temperature -o calibration.json`."
+)
+"""What to do about thermal effects of a log whose orientations determine no S and b."""
 
 
 def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = "") -> str:
@@ -49,14 +65,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         is_short = log is not None and log.duration_s < least_length_s(log.rate_hz)
         return record if is_short else f"{record} {noise}"
     if diagnosis.verdict == "unexplained":
-        experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
-        left = {one.domain for one in diagnosis.domains if one.disagrees}
-        clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
-        is_of_moves = "moves" in left <= {"moves", "dynamics"}
-        again = f"Record again{clock if is_of_moves else ''}; what returns belongs to the sensor, what does not "
-        again += "to the session."
-        checked = of_another_device(diagnosis, model)
-        return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
+        return _of_unexplained(diagnosis, model)
     differs = any(p.significant for p in diagnosis.parameters)
     of_session = [effect.id for effect in diagnosis.effects if not effect.model.get("applies_to_other_recordings")]
     is_file, is_carried = model.endswith(".json"), len(of_session) < len(diagnosis.effects)
@@ -78,6 +87,10 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         other = of_another_device(diagnosis, model)
         # A log made with a calibration of another sensor is made again with the right one.
         steps.append(other.rstrip() if other and not is_file else f"{other}Take over {said}: {by}.")
+    if is_static and not is_file and any("thermal" in effect.id for effect in diagnosis.effects):
+        return BY_TEMPERATURE  # which separates them, too
+    if not steps and may_be_used(diagnosis) and (more := _separation(diagnosis, "If the effects matter, separate")):
+        return " ".join([use, *more])
     steps += _separation(diagnosis, "Then separate" if steps else "Separate")
     if steps:
         return " ".join(steps) + _by_themselves(diagnosis)
@@ -93,7 +106,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
         return f"{first}{use}{_by_themselves(diagnosis)}"
     if not is_carried:
         remedy, beside = _in_the_next_log(diagnosis), _by_themselves(diagnosis)
-        if remedy and is_file and _disagrees(diagnosis):
+        if remedy and is_file and poses_disagree(diagnosis):
             return f"{first}{remedy} {use}"
         if remedy and not is_file and _is_far_from_noise(diagnosis):
             # What the effects leave unexplained leaves their calibration untrusted, too.
@@ -107,6 +120,18 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
     said = f"{first}{store}{beside}.{_by_themselves(diagnosis)}"
     remedy = _in_the_next_log(diagnosis) if _is_far_from_noise(diagnosis) else ""
     return " ".join(filter(None, (said, remedy)))
+
+
+def _of_unexplained(diagnosis: Diagnosis, model: str) -> str:
+    """What to record where no effect explains the residuals."""
+    experiments = [f"{capital(one.experiment)}." for one in diagnosis.relations if one.experiment]
+    left = {one.domain for one in diagnosis.domains if one.disagrees}
+    clock = ", with the sensor's own sample counter or time: samples lost without a trace turn rotations short"
+    is_of_moves = "moves" in left <= {"moves", "dynamics"}
+    again = f"Record again{clock if is_of_moves else ''}; what returns belongs to the sensor, what does not "
+    again += "to the session."
+    checked = of_another_device(diagnosis, model)
+    return f"{checked}{experiments[0] if experiments else again}{_by_themselves(diagnosis)}"
 
 
 def _separation(diagnosis: Diagnosis, begun: str) -> list[str]:
@@ -141,11 +166,6 @@ def _ended(effect: AcceptedEffect) -> str:
     return f", nine tenths of which were over after {duration(last_s)}" if is_over else ""
 
 
-def _disagrees(diagnosis: Diagnosis) -> bool:
-    """Whether poses or rotations disagree with the model without effects."""
-    return any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES)
-
-
 def _misread(diagnosis: Diagnosis) -> Finding | None:
     """The finding of the log's own calibration that axes are not those that their columns name."""
     own = getattr(diagnosis, "calibration", None)
@@ -163,10 +183,10 @@ def _is_far_from_noise(diagnosis: Diagnosis) -> bool:
 
 def _by_themselves(diagnosis: Diagnosis) -> str:
     """Whether S and b fitted to the log may be used without the effects; empty for a given model."""
+    if may_be_used(diagnosis):
+        return " S and b may be used without effects: errors of poses and rotations are within noise."
     if getattr(diagnosis, "model_is_given", False) or diagnosis.parameters:
         return ""
-    if not _disagrees(diagnosis):
-        return " S and b may be used without effects: errors of poses and rotations are within noise."
     own = getattr(diagnosis, "calibration", None)
     if own is None or any(one.severity is Severity.SERIOUS for one in own.findings):
         return "" if own is None else " S and b without effects are not to be trusted."

@@ -1,11 +1,13 @@
 """A diagnosis in words: the verdict, where it disagrees, and residuals in customary units."""
 
+import numpy as np
+
 from trihedron.records import Calibration, Finding, FindingCode, Severity
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
-from trihedron.report.diagnosis_numbers import differing_in_short, n_differing
-from trihedron.report.document import Headline, Level
+from trihedron.report.diagnosis_numbers import differing_in_short
+from trihedron.report.document import Level
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import MEANING, channel_in_print, id_in_print, variable_in_print
 from trihedron.report.numbers import (
@@ -19,7 +21,7 @@ from trihedron.report.numbers import (
     with_unit,
 )
 from trihedron.report.verification import imprecise
-from trihedron.units import degrees_from_radians
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 LEVELS: dict[str, Level] = {
     "consistent": "good",
@@ -33,8 +35,6 @@ LEVELS: dict[str, Level] = {
 _CHANNELS = {"a": "accelerometer ", "g": "gyro "}
 _PLAIN = {"1": "", "raw": "", "sigma": "σ"}
 """Units without another one in print."""
-LEAST_SHARE = 0.005
-"""Smallest share of the misfit that is printed."""
 MOSTLY = 0.5
 """Share of the misfit from which an effect is not of little effect."""
 MOST_NAMED = 4
@@ -89,17 +89,42 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     still += [
         f"{name} agrees by χ², yet {followed} (empirical relation)" for name, followed in ends.items() if followed
     ]
-    tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or "; nothing else disagrees"
+    tail = "".join(f"; {one}" for one in still) or _untested(diagnosis) or _else(diagnosis)
     is_other = any(p.significant and p.id in GEOMETRY for p in diagnosis.parameters)
     said = [_clause(opening(effect.statement)) for effect in diagnosis.effects if effect.id in STATED]
     if missing:
-        said.append(f"the model lacks {listed(missing)}")
+        said.append(f"the model lacks {listed(missing)}{_temperatures(diagnosis)}")
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:
         # What the package fixes differs before all else: a calibration of another device has any effect missing.
         said = [listed(numbers), *said] if is_other else [*said, f"parameters differ ({listed(numbers)})"]
     return f"{'PARAMETERS DIFFER' if is_other else 'MISSING PHYSICS'}: {'; '.join(said)}{tail}."
+
+
+def poses_disagree(diagnosis: Diagnosis) -> bool:
+    """Whether poses or rotations disagree with the model without effects."""
+    return any(d.disagrees for d in diagnosis.domains if d.domain not in OF_SAMPLES)
+
+
+def may_be_used(diagnosis: Diagnosis) -> bool:
+    """Whether S and b fitted to the log alone are as good as its noise, whatever effects were found in it."""
+    is_of_log = not getattr(diagnosis, "model_is_given", False) and not diagnosis.parameters
+    return is_of_log and not poses_disagree(diagnosis)
+
+
+def _else(diagnosis: Diagnosis) -> str:
+    """What agrees: S and b too where poses and rotations do without the effects."""
+    return "; errors of poses and rotations are within noise" if may_be_used(diagnosis) else "; nothing else disagrees"
+
+
+def _temperatures(diagnosis: Diagnosis) -> str:
+    """Between which temperatures a thermal effect was seen; empty without one."""
+    recording = getattr(diagnosis, "recording", None)
+    degc = None if recording is None else recording.temperature_degc
+    if degc is None or not any("thermal" in effect.id for effect in diagnosis.effects):
+        return ""
+    return f", between {plain_number(float(np.nanmin(degc)), 2)} and {plain_number(float(np.nanmax(degc)), 2)} °C"
 
 
 def _sized(effect: AcceptedEffect) -> str:
@@ -251,8 +276,10 @@ def parameter_unit(unit: str, largest: float) -> tuple[float, str]:
     factor, printed = 1.0, {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
     if unit.startswith(("rad/s", "(rad/s)")):
         factor, printed = degrees_from_radians(1.0), printed.replace("rad", "°", 1)
+    if unit == "(rad/s)/(m/s^2)":
+        factor, printed = factor * STANDARD_GRAVITY_M_S2, "°/s/g"  # as data sheets state a g-sensitivity
     exponent = engineering_exponent(factor * largest)
-    if printed == "°" or -3 < exponent <= 3 or (printed == "°/s" and exponent == -3):
+    if printed == "°" or -3 < exponent <= 3 or (printed in ("°/s", "°/s/g") and exponent == -3):
         exponent = 0
     return factor * 10.0**-exponent, unit_with_power(exponent, printed)
 
@@ -286,42 +313,3 @@ def where_in_words(test: DomainTest) -> str:
 
 def value_in_words(value: float, sigma: float) -> str:
     return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 4)
-
-
-def differing_headline(diagnosis: Diagnosis) -> tuple[Headline, ...]:
-    """Number of parameters of the model that differ from the recording's."""
-    n_off = n_differing(diagnosis)
-    if not n_off:
-        return ()
-    return (Headline("parameters that differ", str(n_off), "", f"of {len(diagnosis.parameters)} compared"),)
-
-
-def headlines_of(diagnosis: Diagnosis) -> tuple[Headline, ...]:
-    """Share of the misfit of every effect, and the cross-validated gain of the strongest; else the worst domain."""
-    explained = [(id_in_print(effect.id), 100.0 * (effect.share or 0.0)) for effect in diagnosis.effects]
-    shares = tuple(
-        Headline(f"{name} explains", plain_number(share, 2), "%", "of the misfit by itself")
-        for name, share in explained
-        if share > 100.0 * LEAST_SHARE
-    )
-    for k, effect in enumerate(diagnosis.effects):
-        if effect.held_out and effect.side == "recording":
-            held = effect.held_out[0]
-            after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
-            before = size_in_words(held.rms_before, held.unit)
-            return (
-                *shares[:MOST_NAMED],
-                Headline(quantity(held), after, unit, f"cross-validated, with {explained[k][0]}; {before} without"),
-            )
-    tests = [d for d in diagnosis.domains if d.dof > 0]
-    if not tests:
-        return ()
-    worst = min((d for d in tests if d.disagrees), key=lambda d: d.p_value, default=tests[0])
-    is_open = judged_in_words(diagnosis, worst) == NOT_JUDGED
-    judged = "1 by noise alone; " + (NOT_JUDGED if is_open else f"p {p_in_words(worst.p_value)}")
-    chi2 = plain_number(worst.chi2_per_dof)
-    if not worst.unit:
-        return (Headline(f"{MEANING[worst.domain]}, χ²/dof", chi2, "", judged),)
-    size, _, unit = rms_in_words(worst).partition(" ")
-    of = "rms" if getattr(diagnosis, "model_is_given", False) else "rms in sample"
-    return (Headline(MEANING[worst.domain], size, unit, f"{of}; χ²/dof {chi2}, {judged}"),)

@@ -90,7 +90,8 @@ def _predicted(found: FilterNoise) -> str:
         last, (factor, unit, what) = one.consistency[-1], OF_SENSOR[one.sensor]
         sizes = [with_unit(plain_number(factor * size, 2), unit) for size in (last.predicted, last.actual)]
         said.append(f"{what} over {last.horizon_s:g} s predicted {sizes[0]}, was {sizes[1]}")
-    return f": {'; '.join(said)}" if said else ""
+    own = " (the reference's own error included)" if any(one.reference is not None for one in found.sensors) else ""
+    return f": {'; '.join(said)}{own}" if said else ""
 
 
 def _headlines(one: SensorFilterNoise) -> list[Headline]:

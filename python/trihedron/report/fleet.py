@@ -19,6 +19,7 @@ from trihedron.report.fleet_next_step import (
     BY_FILE,
     MOST_NAMED,
     OPEN,
+    called,
     files_of,
     is_usable,
     next_step_of_fleet,
@@ -70,7 +71,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
         sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
     sections.append(Section("Every log", (_logs(summary),)))
-    verdict = f"{n_usable} of {how_many(n, 'log')} usable, of {n_devices}."
+    verdict = f"{n_usable} of {how_many(n, 'log')} usable{_warned(summary)}, of {n_devices}."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
     none = {log.serial for log in summary.logs} - {log.serial for log in summary.logs if is_usable(log)}
@@ -78,7 +79,8 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices"
-        verdict += f": {one.odd} differs from the others." if one.odd else "."
+        fits = f" and agrees with those of {one.fits}" if one.fits else ""
+        verdict += f": {one.odd} differs from the others{fits}." if one.odd else "."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
@@ -105,6 +107,20 @@ def fleet_report(summary: FleetSummary) -> Document:
         next_step=next_step_of_fleet(summary, outliers, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or outliers or moved) else None,
     )
+
+
+def _warned(summary: FleetSummary) -> str:
+    """Usable logs with warnings, by the name of the warning, the commonest first."""
+    logs: dict[str, list[str]] = {}
+    for log in filter(is_usable, summary.logs):
+        for code in log.warned:
+            logs.setdefault(code, []).append(called(log, summary))
+    said = [
+        f"{finding_in_print(code)} in {names[0] if len(names) == 1 else how_many(len(names), 'log')}"
+        for code, names in sorted(logs.items(), key=lambda one: -len(one[1]))
+    ]
+    n = sum(bool(log.warned) for log in filter(is_usable, summary.logs))
+    return f" ({n} with warnings: {first_of(said)})" if said else ""
 
 
 def _named(devices: list[str]) -> str:
@@ -263,12 +279,13 @@ def _logs(summary: FleetSummary) -> Table:
             log.status if log.is_trustworthy or log.status != "done" else "done, not to be trusted",
             log.verdict or "–",
             ", ".join(map(id_in_print, log.effects)) or "–",
+            ", ".join(map(finding_in_print, (*log.serious, *log.warned))) or "–",
             "–" if log.n_poses is None else str(log.n_poses),
             "–" if log.held_out_rms_m_s2 is None else plain_number(log.held_out_rms_m_s2 * shown("m/s^2")[0], 2),
         )
         for log in summary.logs
     )
-    head = ("log", "device", "status", "verdict", "effects", "poses", "cross-validated [mm/s²]")
+    head = ("log", "device", "status", "verdict", "effects", "findings", "poses", "cross-validated [mm/s²]")
     return Table(head, rows, "What became of every log")
 
 

@@ -19,18 +19,21 @@ OPEN = ("missing-physics", "unexplained")
 def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[str]) -> str:
     usable = [log for log in summary.logs if is_usable(log)]
     unusable = [log for log in summary.logs if not is_usable(log)]
-    rates = [_called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
+    rates = [called(log, summary) for log in unusable if RATE_ASSUMED in log.serious]
     unusable = [log for log in unusable if RATE_ASSUMED not in log.serious]
-    again = [f"{_called(log, summary)}{_why(log)}" for log in unusable if not log.reread]
-    opened = [_called(log, summary) for log in usable if log.verdict in OPEN]
-    mixed = [one.serial for one in summary.mixed]
+    again = [f"{called(log, summary)}{_why(log)}" for log in unusable if not log.reread]
+    opened = [called(log, summary) for log in usable if log.verdict in OPEN]
+    mixed = [one.serial for one in summary.mixed if not one.fits]
+    strays = [f"{one.odd} from {one.serial} to {one.fits}" for one in summary.mixed if one.fits]
     # One device a file separates all folders, also those of one device.
     counts = Counter(log.serial for log in summary.logs)
-    by_file = f" ({BY_FILE})" if all(n == 1 or name in (*mixed, *moved) for name, n in counts.items()) else ""
+    several = {*moved, *(one.serial for one in summary.mixed)}
+    by_file = f" ({BY_FILE})" if all(n == 1 or name in several for name, n in counts.items()) else ""
     steps = [f"give each device of {first_of(mixed)} a folder of its own{by_file}"] if mixed else []
+    steps += [f"move {first_of(strays)}, if that is where it belongs, and run again"] if strays else []
     steps += [f"if {first_of(moved)} contains several units, give each a folder{by_file}"] if moved else []
     for action in dict.fromkeys(log.reread for log in unusable if log.reread):
-        names = first_of([_called(log, summary) for log in unusable if log.reread == action])
+        names = first_of([called(log, summary) for log in unusable if log.reread == action])
         steps += [f"for {names}, by `trihedron calibrate`: {action[:1].lower()}{action[1:].rstrip('.')}"]
     steps += [f"give --rate for {first_of(rates)}"] if rates else []
     steps += [f"record again, if it was to be a calibration: {first_of(again)}"] if again else []
@@ -57,7 +60,7 @@ def is_usable(log: FleetLog) -> bool:
     return log.status == "done" and log.is_trustworthy
 
 
-def _called(log: FleetLog, summary: FleetSummary) -> str:
+def called(log: FleetLog, summary: FleetSummary) -> str:
     """The name of a log, with its device where several have that name."""
     is_alone = sum(one.name == log.name for one in summary.logs) == 1
     return log.name if is_alone else f"{log.serial}: {log.name}"

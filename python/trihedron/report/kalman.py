@@ -30,6 +30,7 @@ from trihedron.report.kalman_charts import (
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
+TEST = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
 CLOSE = 0.01
 """Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
 _INNOVATIONS = """Normalised innovations squared (NIS), innovation² / predicted variance: every pose that is judged, \
@@ -67,21 +68,8 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections=tuple(sections),
         headlines=(*consistency, *scale_headlines(calibration)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)) if is_tested else None,
-        next_step=_next_step(calibration),
+        next_step=TEST if calibration.is_trustworthy else "",
     )
-
-
-def _next_step(calibration: Calibration) -> str:
-    """The use of the result; first the cause of innovations that the noise model does not predict."""
-    if not calibration.is_trustworthy:
-        return ""
-    verified = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
-    doubted = [one for one in calibration.findings if one.code is FindingCode.INNOVATIONS_TOO_LARGE]
-    if not doubted:
-        return verified
-    widening = plain_number(max(one.numbers["widening"] for one in doubted), 2)
-    return f"`trihedron diagnose LOG` shows what the readings have beside noise; until it is modelled, the \
-uncertainties are multiplied by {widening} for it. {verified}"
 
 
 def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:

@@ -45,7 +45,6 @@ FINDINGS = {
     "log-motion": "motion or vibration in the log",
     "non-finite": "rows without time",
     "not-tested": "parameters that this log does not test",
-    "reference-apart": "reference deviates in a part of the log",
     "reference-misfit": "parts of the log disagree",
     "reference-of-itself": "reference in the log's own file",
     "static-rate-above-noise": "gyro rate in static poses above noise",
@@ -61,8 +60,8 @@ FINDINGS = {
 }
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = (
-    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "poses-vibrate"),
-    *("scale-not-nominal", "turntable"),
+    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
+    *("innovations-too-large", "reference-apart", "scale-not-nominal", "static-force", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""
 PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+(?: at [\d.]+ s)?)\b", re.IGNORECASE)
@@ -92,7 +91,8 @@ def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str], 
     that they name, or else their number ``n``: ``clipping (accelerometer and gyro)``, ``outlier poses 3, 7``; one of
     ``IN_FULL`` by its sentence."""
     if code in IN_FULL and len(sentences) == 1:
-        return sentences[0]
+        said = sentences[0]
+        return said[:1].lower() + said[1:] if said[1:2].islower() else said
     name = finding_in_print(code)
     named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
     if named and not any(one in name for one in named):

@@ -14,6 +14,7 @@ from trihedron.report.document import Document, Facts, Headline, Picture, Sectio
 from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
+from trihedron.units import RateUnit
 
 SHAKEN = "moved or vibrated"
 
@@ -59,7 +60,7 @@ def _is_of_noise(segments: Segments, recording: Recording) -> bool:
 def recording_facts(recording: Recording, segments: Segments | None = None) -> tuple[tuple[str, str], ...]:
     """Length, rate, sensors with unit; with segments also noise, and the number of poses and moves."""
     facts = [("length", f"{duration(recording.duration_s)}, {recording.n_samples} samples")]
-    facts.append(("rate", rate_in_words(recording.rate_hz, recording.findings, 5)))
+    facts.append(("rate", f"{rate_in_words(recording.rate_hz, recording.findings, 5)}{scale_by_rate(recording)}"))
     for name in ("accelerometer", "gyroscope"):
         readings, unit = getattr(recording, name), unit_in_print(getattr(recording, f"{name}_unit").value)
         sigma = None if segments is None else getattr(segments, f"{name}_sigma")
@@ -77,6 +78,17 @@ def rate_in_words(rate_hz: float, findings: Iterable[Finding], digits: int) -> s
     """The sampling rate, and whether it was assumed: times and lengths follow from it."""
     is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in findings)
     return f"{plain_number(rate_hz, digits)} Hz{' (assumed)' if is_assumed else ''}"
+
+
+def scale_by_rate(recording: Recording) -> str:
+    """What a wrong sampling rate would do unseen: the scale of a gyro in counts rests on it."""
+    is_open = recording.gyroscope is not None and recording.gyroscope_unit is RateUnit.COUNTS
+    return "; the gyro's scale rests on it: in counts a wrong rate shows nowhere else" if is_open else ""
+
+
+def if_rate_is_right(sensor: str, raw_unit: str) -> str:
+    """The condition on the uncertainty of a scale: a wrong rate changes that of a gyro in counts, and nothing else."""
+    return ", if the sample rate is right" if sensor == "gyroscope" and raw_unit == RateUnit.COUNTS.value else ""
 
 
 def _still_s(segments: Segments) -> float:

@@ -26,6 +26,7 @@ from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.report.segments import if_rate_is_right
 from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
@@ -119,6 +120,8 @@ def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
             value += f" to {plain_number(math.hypot(ahead[k], factor * within.high), 2)}"
         beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
         beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
+        gyro = model.calibration.gyroscope
+        beside += if_rate_is_right("gyroscope", gyro.raw_unit) if gyro is not None and name == "gyro-scale" else ""
         out.append(Headline(f"{what} in the next recording", value, unit, beside))
     return tuple(out)
 

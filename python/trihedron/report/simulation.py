@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import AXES
-from trihedron.records import Finding, Recording, TermName, Truth
+from trihedron.records import Finding, FindingCode, Recording, Severity, TermName, Truth
 from trihedron.report.calibration import SYMBOLS
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
-from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.findings import findings_block, likely, verdict_of
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
 from trihedron.report.segments import truth_chart
 from trihedron.units import degrees_from_radians
 
+BEYOND = "beyond S, b, noise, resolution and range limits"
+"""What every simulated instrument has, and is no effect."""
 ON_A_FACE = 0.99
 """Cosine of the largest angle (8°) from the vertical of a face on which a case stands."""
 
@@ -29,7 +31,6 @@ def simulation_report(
     and its calibration.
     """
     n = len(truth.effects)
-    effects = f"{how_many(n, 'effect')} beyond the linear model" if n else "no effect beyond the linear model"
     poses, moves = how_many(len(truth.poses), "pose"), how_many(len(truth.moves), "move")
     facts = (
         ("scenario", f"{truth.scenario or 'its own'}, seed {truth.seed}"),
@@ -38,12 +39,18 @@ def simulation_report(
         ("gravity", f"{truth.gravity_m_s2:.5f} m/s²"),
         ("motion", f"{poses}, {moves}"),
     )
-    what = f"{poses} and {moves} of an instrument with {effects}"
+    what = f"{poses} and {moves} of an instrument with {how_many(n, 'effect') if n else 'no effect'} {BEYOND}"
+    if repeated:
+        what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits, with the S and "
+        what += "b of the calibration and no further effect"
+    verdict = verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED")
+    # A serious one is in the verdict with its cause.
+    doubts = [f for f in findings if f.code is FindingCode.STATIC_FORCE and f.severity is Severity.WARNING]
     caption = "The simulated log; shaded where the body was truly static."
     return Document(
         title="Simulation",
         subtitle=recording.source,
-        verdict=verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED"),
+        verdict=" ".join([verdict, *(likely(one.cause) for one in doubts)]),
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
@@ -54,7 +61,7 @@ def simulation_report(
         next_step=_next_step(truth, repeated),
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
-            Headline("effects", str(n), "", ", ".join(truth.effects) or "the linear model and noise"),
+            Headline("effects", str(n), "", ", ".join(truth.effects) or f"none {BEYOND}"),
         ),
         lead=Picture("signals", caption, partial(truth_chart, recording, truth)),
     )

@@ -13,7 +13,8 @@ from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawn import said
-from trihedron.report.findings import findings_block, likely, verdict_of
+from trihedron.report.findings import by_weight, findings_block, likely, verdict_of
+from trihedron.report.findings.wording import opening
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
 from trihedron.report.segments import signals_picture
@@ -74,15 +75,29 @@ def imprecise(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def verified_in_words(v: Verification) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence: errors beyond noise and uncertainty, else parameters that differ from the file."""
     beyond = above_noise(v)
     above = [f"{_ABOVE_NOISE[f.code]} {plain_number(f.numbers['times'], 2)} times" for f in beyond]
     word = "Not contradicted" if imprecise(v.findings) or _is_untested(v) else "Verified"
-    verified = f"{word}: errors are within noise and uncertainty"
-    usable = f"Doubtful: {listed(above)} what noise and uncertainty allow" if above else verified
+    usable = f"{word}: errors are within noise and uncertainty"
+    if above:
+        usable = f"Doubtful: {listed(above)} what noise and uncertainty allow"
+    elif beyond := _shifts(v):
+        (shift,) = beyond
+        doubtful = f"Doubtful: errors are within noise and uncertainty, but {opening(shift.seen)}"
+        seen = f"{shift.seen[:1].lower()}{opening(shift.seen)[1:]}"
+        alone = (
+            f"{word} with the gyro bias measured anew at rest: {seen}; other errors are within noise and uncertainty"
+        )
+        usable = doubtful if shift.numbers["n_others"] else alone
     others = [one for one in v.findings if one not in beyond or one.severity is Severity.SERIOUS]
     said = verdict_of(others, f"{usable}.", usable, "NOT VERIFIED")
-    return f"{said} {likely(beyond[0].cause)}" if above and said.startswith(usable) else said
+    return f"{said} {likely(beyond[0].cause)}" if beyond and said.startswith(usable) else said
+
+
+def _shifts(v: Verification) -> list[Finding]:
+    """The finding that parameters differ from the file; they may where the errors agree."""
+    return [one for one in v.findings if one.code is FindingCode.CALIBRATION_SHIFT and "n_others" in one.numbers]
 
 
 def _is_untested(v: Verification) -> bool:
@@ -95,7 +110,10 @@ def use_in_words(v: Verification, what: str) -> str:
     if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
-    above += imprecise(v.findings)
+    shifts = _shifts(v)
+    above += [*imprecise(v.findings), *(one for one in shifts if one.numbers["n_others"])]
+    if not above and use:
+        return " ".join([*(one.action for one in shifts), use])
     if above and v.is_passed:
         return f"{above[0].action} Where the errors are acceptable it may be used as it is."
     return above[0].action if above else use
@@ -128,14 +146,14 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
 
 
 def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """The errors with their expected size, the one that fails first: by its limit, else the farthest above noise and
-    uncertainty; then the change of the gyro's bias."""
+    """The errors with their expected size, the one that fails first: by its limit, else the one of the verdict; the
+    change of the gyro's bias last, or first where it alone does."""
     out = [
         Headline(what, rms, unit, f"rms over {of}; expected {allowed}")
         for what, rms, unit, of, allowed, _ in _errors(v)
     ]
-    farthest = max(above_noise(v), key=lambda one: one.numbers["times"], default=None)
-    code = FindingCode.RESIDUAL_ABOVE_NOISE if farthest is None else farthest.code
+    gravest = next(iter(by_weight(above_noise(v))), None)
+    code = FindingCode.RESIDUAL_ABOVE_NOISE if gravest is None else gravest.code
     for one in v.findings:
         if one.code is FindingCode.LIMIT_EXCEEDED:
             code = FindingCode.HELD_OUT_WORSE if "limit_deg" in one.numbers else FindingCode.RESIDUAL_ABOVE_NOISE
@@ -144,7 +162,9 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
         Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)
         for changes in _bias_changes(v)
     ]
-    return (*sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code]), *moved)
+    errors = sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code])
+    is_bias = v.is_passed and gravest is None and any(not one.numbers["n_others"] for one in _shifts(v))
+    return (*moved, *errors) if is_bias else (*errors, *moved)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:

@@ -23,6 +23,7 @@ from trihedron.estimate.filter_noise.stretches import angle_stretches, velocity_
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside
 from trihedron.estimate.reference.motion import fit_motion
+from trihedron.estimate.reference.slip import slip_of
 from trihedron.estimate.reference.worth import error_of, of_error
 from trihedron.records import Finding, Recording
 from trihedron.records.filter_noise import (
@@ -97,7 +98,8 @@ def beside_reference(
         more = beside_temperature(more, recording)
         of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
         out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
-    return tuple(out), tuple(of_error(error_of(found)))
+    error = error_of(found)
+    return tuple(out), tuple(of_error(error, slip_of(found, 0, error), is_of_noise=True))
 
 
 @dataclass(frozen=True, eq=False)

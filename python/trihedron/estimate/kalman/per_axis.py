@@ -9,7 +9,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import AXES, BoolArray, FloatArray
 from trihedron.errors import InputError
-from trihedron.probability import chdtrc, chdtri
+from trihedron.probability import FALSE_ALARM, chdtrc, chdtri, ndtri
 from trihedron.records import AxisKalmanResult, AxisNoise, Consistency, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -63,7 +63,8 @@ def is_settled(innovation_sigma: FloatArray, n_unknowns: int) -> BoolArray:
 def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray, n_unknowns: int) -> Consistency:
     """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12), from
     one-step prediction errors (n,) and their predicted standard deviations (n,) in any unit."""
-    z = (innovation / innovation_sigma)[is_settled(innovation_sigma, n_unknowns)]
+    judged = np.flatnonzero(is_settled(innovation_sigma, n_unknowns))
+    z = (innovation / innovation_sigma)[judged]
     n = len(z)
     if n == 0:
         return Consistency(np.nan, np.nan, np.nan, 0, np.nan, 0, ())
@@ -76,7 +77,9 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray, n_un
     if len(r):
         q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, n_lags + 1))))
         p = chdtrc(n_lags, q)
-    return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
+    beyond = judged[np.abs(z) > -ndtri(0.5 * FALSE_ALARM / n)]
+    first = int(beyond[0]) + 1 if len(beyond) else 0
+    return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r), first)
 
 
 def covariance_scale(seen: Consistency) -> float:
@@ -102,6 +105,8 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
             nis_low=low,
             nis_high=high,
             widening=np.sqrt(covariance_scale(seen)),
+            has_first=seen.first_beyond > 0,
+            first_pose=seen.first_beyond,
         )
     elif seen.n and mean < low:
         yield Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)

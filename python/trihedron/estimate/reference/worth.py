@@ -152,14 +152,18 @@ def remarks(result: AgainstReference, is_turned: bool, slip: Slip | None) -> Ite
         yield Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened)
 
 
-def of_error(error: ReferenceError, slip: Slip | None = None) -> Iterator[Finding]:
-    """Findings of the reference alone: outliers, and a slip or deviating intervals."""
+def of_error(error: ReferenceError, slip: Slip | None, *, is_of_noise: bool = False) -> Iterator[Finding]:
+    """Findings of the reference alone: outliers, and a slip or deviating intervals; white noise contains no slip."""
     if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
         rows = error.rows + error.rows_left_out
         yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
     if slip is not None:
         yield Finding.of(
-            FindingCode.REFERENCE_APART, "slipped", at_s=slip.at_s, angle_rad=slip.angle_rad, sigma_rad=slip.sigma_rad
+            FindingCode.REFERENCE_APART,
+            "slipped-in-noise" if is_of_noise else "slipped",
+            at_s=slip.at_s,
+            angle_rad=slip.angle_rad,
+            sigma_rad=slip.sigma_rad,
         )
     elif apart := error.apart_s:
         yield Finding.of(FindingCode.REFERENCE_APART, start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))

@@ -77,7 +77,8 @@ ACCELEROMETER = {
     ),
     "accel-thermal-bias": EffectWords(
         "the accelerometer bias depends on temperature",
-        f"{UP_AND_DOWN}; with one orientation repeat the cycle turned over",
+        "repeat the temperature cycle, up and down, with the sensor upside down: a bias keeps its sign, a scale error "
+        "does not, and a drift in time does not reverse",
     ),
     "accel-thermal-scale": EffectWords("the accelerometer scale depends on temperature", TWO_TEMPERATURES),
     "accel-bias-drift": EffectWords(

@@ -72,61 +72,6 @@ _CALIBRATE = {
     ),
 }
 
-_VERIFIED = {
-    (Code.CALIBRATION_SHIFT, "", WARNING): Words(
-        "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
-        "both uncertainties and the bias drift seen in this log allow (log − file, {times_sigma:.1f} σ first): "
-        "{parameters:each}.",
-        "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
-        "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
-        "each.",
-        lines={"parameters": "{v0:ids} {v1:quantity}"},
-    ),
-    (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
-        "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
-        "{rms_without:.3g mm/s²} without.",
-        "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
-        "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
-    ),
-    (Code.WORSE_THAN_UNCALIBRATED, "reference", WARNING): Words(
-        "The accelerometer is not improved: the gravity error in static poses is {rms_m_s2:.3g mm/s²} rms with this "
-        "calibration, uncertain by {expected_m_s2:.2g mm/s²}, and {rms_without_m_s2:.3g mm/s²} without.",
-        "Motion determines the accelerometer less accurately than the uncorrected readings are.",
-        "Use the gyro alone; calibrate the accelerometer in 18 or more static poses (`trihedron plan`).",
-    ),
-    (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
-        "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
-        "without.",
-        "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
-        "calibration|A wrong file, unit, axis, sign or clock, or a calibration of too few rotations}.",
-        "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units, "
-        "with its right clock (--rate, --time-unit)}.",
-    ),
-    (Code.NOT_TESTED, "", WARNING): Words(
-        "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
-        "determine them.",
-        "Few orientations or rotations: an error of the calibration that shows in others passes.",
-        "Record 9 or more poses in different orientations, with rotations between them, and verify on that log.",
-    ),
-    **{
-        (Code.CALIBRATION_IMPRECISE, case, WARNING): Words(
-            f"The {error} is {{times:.2g}} times that of this log's own calibration, cross-validated, yet within the "
-            "uncertainty of the calibration (p = {p:.1g}).",
-            "A calibration of few poses, or one whose biases return within a wide range.",
-            "Use this log's own calibration, which is more certain: `trihedron calibrate LOG`.",
-        )
-        for case, error in (("static", "gravity error in static poses"), ("moves", "tilt error after a rotation"))
-    },
-    (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
-        "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the "
-        "scatter of the poses and the stated uncertainty allow: its bias has changed{is_alone:?|, and not it alone}.",
-        "A bias with the wrong sign or unit, of another sensor, or of another temperature.",
-        "{is_alone:?Do not subtract this bias; measure it in a static pose before use|Check that the file is of this "
-        "sensor, in the units of the log; if it is, calibrate again}.",
-    ),
-}
-
 _FORCE = "In quiet intervals the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
     (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
@@ -161,8 +106,8 @@ _USE = {
         "Check it on this log: `trihedron verify FILE LOG`.",
     ),
     (Code.STATIC_FORCE, "scatter", WARNING): Words(
-        f"{_FORCE} and differs from stretch to stretch by {{sigma_m_s2:.2g}} m/s² (1 σ); gravity is "
-        "{gravity_m_s2:.5g} m/s².",
+        "in quiet intervals the corrected |f| differs from stretch to stretch by {sigma_m_s2:.2g} m/s² (1 σ); its "
+        "mean is {norm_m_s2:.5g} m/s² and gravity {gravity_m_s2:.5g} m/s².",
         "The calibration is of another sensor or range, or the sensor was not still.",
         "Test it on this log: `trihedron verify FILE LOG`.",
         numbers=("share",),
@@ -301,7 +246,8 @@ _MANY_RECORDINGS = {
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
         "in {n} of {n_all} recordings by themselves {seen:clause}; these are the figures of {name}.",
         "What S and b of each recording leave, the common ones leave as well; their uncertainty is widened by it.",
-        "Run `trihedron diagnose ...`, which looks for what they share.",
+        "Run `trihedron diagnose ...`: it looks for what they share; `calibrate --extended` of one recording stores it "
+        "with S and b.",
     ),
     (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",
@@ -338,4 +284,4 @@ _MANY_RECORDINGS = {
     },
 }
 
-ENTRIES = {**_CALIBRATE, **_VERIFIED, **_USE, **_DIAGNOSE, **_MANY_RECORDINGS}
+ENTRIES = {**_CALIBRATE, **_USE, **_DIAGNOSE, **_MANY_RECORDINGS}

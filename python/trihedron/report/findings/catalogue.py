@@ -17,13 +17,18 @@ from trihedron.report.findings import (
     readings,
     reference,
     segment,
+    verify,
 )
 from trihedron.report.findings.entry import Code, Entry
 from trihedron.report.findings.wording import filled
 
+STAGES = (
+    *(read, clock, readings, accelerometer, gyroscope, kalman, noise),
+    *(api, filter_noise, reference, segment, verify),
+)
 ENTRIES: tuple[Entry, ...] = tuple(
     Entry(code=code, case=case, severity=severity, **vars(words))
-    for stage in (read, clock, readings, accelerometer, gyroscope, kalman, noise, api, filter_noise, reference, segment)
+    for stage in STAGES
     for (code, case, severity), words in stage.ENTRIES.items()
 )
 CATALOGUE: Mapping[tuple[Code, str], Entry] = MappingProxyType({(entry.code, entry.case): entry for entry in ENTRIES})

@@ -61,7 +61,8 @@ _TIMESTAMPS = {
         "The unit of the time column is uncertain: taken as {unit:unit}, its median interval of {step:.6g} makes "
         "{rate_hz:.4g} Hz{has_others:?; {others:&, } would be possible too|}.",
         "The interval alone does not determine the unit; every rate and every noise density depends on it.",
-        "Confirm {unit:unit} or correct it with --time-unit s, ms, us or ns; --rate HZ if the column counts rows.",
+        "Confirm that the time column is in {unit:unit}, which makes {rate_hz:.4g} Hz, or correct it: --time-unit s, "
+        "ms, us or ns; --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(

@@ -124,9 +124,9 @@ _MOVES = {
         numbers=("times",),
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
-        "the gyro's bias depends on gravity, by up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for force along "
-        "{force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. The "
-        "moves were fitted without it; S and b alone cannot correct it.",
+        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for "
+        "force along {force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. "
+        "The moves were fitted without it; S and b alone cannot correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
         "Separate g-sensitivity from a bias that differs from pose to pose: `trihedron diagnose LOG`; --extended fits "
         "g-sensitivity.",
@@ -212,8 +212,10 @@ _MOVES = {
         "to {per_g_rad_s:.2g °/s} per g|}.",
         "{is_by_gravity:?G-sensitivity of the gyro, which S and b cannot correct|The bias drifts in this log more than "
         "in the one that was calibrated (warm-up, temperature)}.",
-        "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted with --extended"
+        "{is_by_gravity:?See whether it is g-sensitivity: `trihedron diagnose LOG`; it is fitted by "
+        "`trihedron calibrate LOG --extended -o calibration.json`"
         "|Let the sensor warm up, or estimate the bias in use}.",
+        or_severity=SERIOUS,
     ),
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
@@ -225,8 +227,8 @@ _MOVES = {
         "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|"
         "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
-        "{is_far:?The file is of another sensor, unit or frame, or scales|Scales} and cross-axis terms have changed "
-        "since; else samples were lost or the gyro clipped}}}}.",
+        "{is_far:?The file is of another sensor, unit or frame, or scales|{is_beside:?A pose beside it was not still, "
+        "or scales|Scales}} and cross-axis terms have changed since; else samples were lost or the gyro clipped}}}}.",
         "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check --rate "
         "and the timestamps against a clock; if they are right, calibrate|{is_bias:?Let the sensor warm up, then "
         "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that file, sensor and "

@@ -4,16 +4,27 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _OF_AXES = {
     key: words
-    for case, name, error in (
-        ("axis", "Accelerometer {axis:axis}", "a reference attitude is wrong"),
-        ("norm", "Norm of gravity", "the axes are not linear"),
+    for case, name, error, remedy in (
+        (
+            "axis",
+            "Accelerometer {axis:axis}",
+            "a reference attitude is wrong",
+            "Check the reference attitudes{has_first:? from pose {first_pose} on|}; if they are right, identify the "
+            "noise anew",
+        ),
+        (
+            "norm",
+            "Norm of gravity",
+            "the axes are not linear",
+            "See what the readings have beside noise: `trihedron diagnose LOG`",
+        ),
     )
     for key, words in {
         (Code.INNOVATIONS_TOO_LARGE, case, WARNING): Words(
-            f"{name}: squared innovations are {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
-            "{nis_high:.2f}).",
+            f"{name}: squared innovations are {{nis_mean:.3g}} times what the noise model predicts"
+            "{has_first:?, first in pose {first_pose}|} (99 % limit {nis_high:.2f}).",
             f"The noise is larger than the model says, or {error}.",
-            "The uncertainties were multiplied by {widening:.2f} for it; identify the noise anew.",
+            f"{remedy}; until then the uncertainties are multiplied by {{widening:.2g}} for it.",
             numbers=("axis", "nis_low"),
         ),
         (Code.INNOVATIONS_TOO_SMALL, case, NOTE): Words(

@@ -68,7 +68,7 @@ _UNITS = {
         f"The gyro is in {{unit:unit}} {_SOURCE}, but {_TURNING}.",
         "A wrong unit; or, if the unit is right, each time interval lasts {factor:.3g} times as long as it was read.",
         "{has_fitting:?Read it with --gyro-unit {fitting}; or correct the clock (--time-unit, --rate)|Check the clock "
-        "(--time-unit, --rate): gyro scale is inversely proportional to the rate}.",
+        "(--time-unit, --rate): with the rate divided by {factor:.3g} the unit is right}.",
     ),
     (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
         f"No known gyro unit fits: {_TURNING}.",

@@ -16,7 +16,7 @@ ENTRIES = {
         "Take S and b as confirmed by the reference, not as measured; use the tracker's own poses to measure them.",
     ),
     (Code.REFERENCE_APART, "", WARNING): Words(
-        "The reference deviates from the remaining log in {n:# interval} from {start_s:.0f} to {end_s:.0f} s.",
+        "the reference deviates from the remaining log in {n:# interval} from {start_s:.0f} to {end_s:.0f} s.",
         "A tracker that lost its markers or was re-initialised, or a reference that turned on the body.",
         "Look at the reference's own quality flags from {start_s:.0f} to {end_s:.0f} s, or leave that part out.",
     ),
@@ -26,6 +26,13 @@ ENTRIES = {
         "It slipped, or its tracked body was defined anew.",
         "Cut the reference's file there, and give `calibrate` the log twice with `--reference BEFORE --reference "
         "AFTER`: each part has its mounting then.",
+        numbers=("sigma_rad",),
+    ),
+    (Code.REFERENCE_APART, "slipped-in-noise", WARNING): Words(
+        "the reference turned on the body by {angle_rad:.2g deg} at {at_s:.0f} s, which adds to its own error and so "
+        "to what is predicted, not to N; K is less certain by it.",
+        "It slipped, or its tracked body was defined anew.",
+        "Cut the reference's file at {at_s:.0f} s, and run `trihedron noise` with either part.",
         numbers=("sigma_rad",),
     ),
     (Code.REFERENCE_MISFIT, "", WARNING): Words(

@@ -26,7 +26,7 @@ ENTRIES = {
         "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
     (Code.POSE_UNSTEADY, "", WARNING): Words(
-        "The sensor moved or vibrated throughout {poses:# pose}: {which:first 8} (first at {first_s:.1f} s).",
+        "the sensor moved or vibrated throughout {poses:# pose} ({which:first 8}; first at {first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
         "Put the case on a firm support for a better result; the means of these poses count less.",
     ),
