@@ -20,7 +20,6 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.bias_process import BiasDrift
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant
-from trihedron.diagnose.effects.nonstationary_noise import NonstationaryNoise
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records, hypothesis
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves, residuals_before_after
@@ -53,8 +52,6 @@ MOSTLY_STILL = 0.6
 """Share of a log that must be static: in one that moves, slow motion would count as static."""
 EXACT = 1e-6
 """Relative prior σ of S, which converts sizes only."""
-OF_PIECES = NonstationaryNoise(), PeriodicInterference()
-"""Effects inside the pieces."""
 
 
 def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
@@ -64,24 +61,24 @@ def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: 
     """
     pieces = static_pieces(recording)
     sides: list[_Side] = []
-    within: list[tuple[DomainTest, list[AcceptedEffect]]] = []
+    within: list[tuple[DomainTest, AcceptedEffect | None]] = []
     tried = {effect.id: Candidate(effect.id, None, False, why_not("few-orientations")) for effect in catalogue()}
     if pieces is not None:
         obs = observe(recording, pieces.segments)
         sides = [_judged(obs, pieces, model, gravity_m_s2, k, alpha) for k in range(1 if obs.pose_rate is None else 2)]
-        within = [_within(sides[-1].plain, obs, alpha)]
-        of_pieces = [Candidate(effect.id, within[0][0].p_value, True) for effect in OF_PIECES]
-        tried |= {one.id: one for one in (*(c for side in sides for c in side.candidates), *of_pieces)}
+        within = [_lines(sides[-1].plain, obs, alpha)]
+        of_lines = Candidate("periodic-interference", within[0][0].p_value, True)
+        tried |= {one.id: one for one in (*(c for side in sides for c in side.candidates), of_lines)}
     effects = [
         *(effect for side in sides for effect in side.effects),
-        *(effect for _, found in within for effect in found),
+        *(line for _, line in within if line is not None),
     ]
     noise: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
                              "accelerometer_corner_s": None, "gyroscope_density": None,
                              "gyroscope_unit": "rad/s/sqrt(Hz)", "gyroscope_corner_s": None}  # fmt: skip
     for name, side in zip(("accelerometer", "gyroscope"), sides, strict=False):
         noise[f"{name}_density"] = side.plain.context.noise_density[GYRO].tolist()
-    calm = [replace(test, disagrees=False, where=Where()) if found else test for test, found in within]
+    calm = [test if line is None else replace(test, disagrees=False, where=Where()) for test, line in within]
     return Diagnosis(
         verdict="missing-physics" if effects else "not-testable",
         domains=(*(side.before for side in reversed(sides)), *(test for test, _ in within)),
@@ -265,18 +262,14 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
     return DomainTest(DOMAINS[sensor], chi2, float(x.size), p, disagrees, where, rms, unit)
 
 
-def _within(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, list[AcceptedEffect]]:
-    """The test of lines and of noise that differs between the pieces, and the effects that explain it."""
-    context = plain.context if obs.raw_rate is None else Context(replace(plain.fitted, obs=obs))
-    records = []
-    for effect in OF_PIECES:
-        found = effect.find(context)
-        if found is not None and found.p_value * len(catalogue()) < alpha / 2.0:
-            record = effect_record(
-                effect, found.parameters, found.statement, found.p_value, found.strength, found.held_out
-            )
-            records.append(replace(record, share=found.share))
-    return judge_within_poses(obs, alpha), records
+def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, AcceptedEffect | None]:
+    """Spectral lines of the pieces, and the test of noise that differs between pieces."""
+    test, effect = judge_within_poses(obs, alpha), PeriodicInterference()
+    found = effect.find(plain.context if obs.raw_rate is None else Context(replace(plain.fitted, obs=obs)))
+    if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
+        return test, None
+    record = effect_record(effect, found.parameters, found.statement, found.p_value, found.strength, found.held_out)
+    return test, replace(record, share=found.share)
 
 
 def static_pieces(recording: Recording) -> StaticPieces | None:

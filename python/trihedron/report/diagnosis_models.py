@@ -104,6 +104,7 @@ def relation_facts(relation: Relation) -> Facts:
     """An empirical relation with its coefficients, and what would confirm it."""
     shown = relation.coefficients[:MOST_COEFFICIENTS]
     words = [f"{variable_in_print(c.name)} {value_in_words(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
+    words = [said.removesuffix(" 1") for said in words]
     more = len(relation.coefficients) - len(shown)
     rows = [
         ("empirical relation", relation.statement),

@@ -6,10 +6,13 @@ from functools import lru_cache
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.quantiles import medians
 from trihedron.ranges import Range
+from trihedron.records.diagnosis import EffectParameter, Relation
+from trihedron.records.words import relation_experiment, relation_resembles, words
 
 FEWEST_POSES = 6
 """Fewer poses do not show which noise is usual."""
@@ -76,6 +79,26 @@ def noise_changes(obs: Observations) -> tuple[NoiseChange, ...]:
     moves = [[span] for span in obs.move_ranges]
     found = (_change(obs, sensor, poses, moves) for sensor in range(obs.readings.shape[1] // 3))
     return tuple(one for one in found if one is not None and one.score > 0.0)
+
+
+def noise_relations(obs: Observations) -> tuple[Relation, ...]:
+    """The changes as empirical relations of the noise to time."""
+    poses, t = obs.segments.poses, obs.time_s
+    out = []
+    for one in noise_changes(obs):
+        label, *_ = SENSORS[one.sensor]
+        begins_s, ends_s = float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])
+        each = zip(one.channels, one.ratio[one.changed], one.sigma[one.changed], strict=True)
+        ratios = tuple(EffectParameter(name, float(ratio), float(sigma), "1") for name, ratio, sigma in each)
+        said = words(
+            "relation-follows-noise", sensor=label, ratios=[ratio.value for ratio in ratios],
+            axes=[name[1] for name in one.channels], begins_s=begins_s, ends_s=ends_s,
+        )  # fmt: skip
+        out.append(Relation(
+            "gyroscope" if one.sensor else "accelerometer", ("time",), words("relation-form-noise"), ratios, one.share,
+            None, relation_resembles("noise"), relation_experiment("noise"), said,
+        ))  # fmt: skip
+    return tuple(out)
 
 
 def _change(obs: Observations, sensor: int, poses: list[list[Range]], moves: list[list[Range]]) -> NoiseChange | None:

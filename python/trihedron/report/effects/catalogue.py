@@ -97,6 +97,10 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             "record a static log of an hour: a histogram of means over a second has two peaks",
             ("burst noise (popcorn noise) of the readout",),
         ),
+        "noise": FamilyWords(
+            "record the same poses again with sources of interference (motors, radio, chargers) off, then on",
+            ("interference",),
+        ),
         "temperature": FamilyWords(
             "repeat a few poses while the temperature takes another course: up, down, and constant",
             ("a thermal bias of another shape",),

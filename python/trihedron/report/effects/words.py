@@ -178,14 +178,6 @@ SESSION = {
             "are missing): readings there come out one LSB higher or lower.",
         },
     ),
-    "nonstationary-noise": EffectWords(
-        "the noise of a sensor has another level for a while",
-        "record the same poses again with sources of interference (motors, radio, chargers) off, then on",
-        {"changes": "{changes:each; }; rotations meanwhile have it too."},
-        lines={
-            "changes": "Noise of the {v0} is {v1:all .2g} times ({v2:axes}) its usual level from {v3:.1f} to {v4:.1f} s"
-        },
-    ),
     "periodic-interference": EffectWords(
         "a spectral line in the static readings",
         "record a static log at another sampling rate: an aliased line moves, a true one stays",

@@ -68,6 +68,9 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "{depends:variables}: {share:.0f %} of the cross-validated misfit.",
         "relation-follows-world": "The gyro's bias follows a vector fixed in the world frame, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the cross-validated misfit.",
+        "relation-follows-noise": "Noise of the {sensor} is {ratios:all .2g} times ({axes:axes}) its usual level from "
+        "{begins_s:.1f} to {ends_s:.1f} s; rotations meanwhile have it too.",
+        "relation-form-noise": "standard deviation over the usual one in that interval",
         "relation-form": "reading of {axes:axes} grows by {terms:& + }",
         "relation-form-world": "bias = K Rᵀ m, m a unit vector fixed in the world frame",
         "angle-to-vertical": "angle to the vertical",
