@@ -3,6 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{N_BLOCKS, Poses, mean};
+use crate::order_statistics::median;
+
+/// Degrees of freedom of the heavy tails of motions: those of moves have as many (docs/model-session.md, 11.18a).
+const DEGREES: f64 = 4.0;
+/// Median of the sum of squares of two standard normal variables.
+const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
 
 /// Rotation of the sensor inside one pose.
 #[derive(Debug, Clone, Copy)]
@@ -25,36 +31,55 @@ pub(super) struct Seen {
     pub of_bias: f64,
 }
 
-/// Motion of all poses where the rate at their beginning has a variance and decays with a time constant.
-pub(super) fn motions(
-    poses: &Poses<'_>,
-    seen: Vec<Option<Seen>>,
-    spread: f64,
-    tau: f64,
-) -> Vec<PoseMotion> {
-    // Of a curve across the vertical: whatever its shape.
-    let excess = seen.iter().flatten().map(|one| {
-        let squares: f64 = one.curve.iter().map(Vector3::norm_squared).sum();
-        0.25 * squares - one.variance[1]
+/// Motion of all poses.
+pub(super) fn motions(poses: &Poses<'_>, seen: Vec<Option<Seen>>) -> Vec<PoseMotion> {
+    let lasts = |i: usize| {
+        let [first, last] = poses.spans[i];
+        last.saturating_sub(first).max(1) as f64 * poses.step
+    };
+    // Rotations over a whole pose: those of short and of long ones are alike.
+    let usual = [0, 1].map(|k| {
+        let each = seen.iter().enumerate();
+        let of_pose = |(i, one): (usize, &Option<Seen>)| {
+            let unit = if k == 0 { lasts(i).powi(2) } else { 1.0 };
+            one.as_ref()
+                .map(|one| unit * (one.square(k) / MEDIAN_OF_TWO - one.variance[k]))
+        };
+        let mut squares: Vec<f64> = each.filter_map(of_pose).collect();
+        if squares.is_empty() {
+            0.0
+        } else {
+            median(&mut squares).max(0.0)
+        }
     });
-    let of_curve = (excess.sum::<f64>() / seen.iter().flatten().count().max(1) as f64).max(0.0);
     let each = seen.into_iter().enumerate();
     each.map(|(i, seen)| {
-        let [first, last] = poses.spans[i];
-        let lasts = last.saturating_sub(first).max(1) as f64 * poses.step;
-        let of_rate = (spread * tau * (1.0 - (-lasts / tau).exp()) / lasts).powi(2);
-        // A pose without readings has the motion of any.
+        let lasts = lasts(i);
+        let prior = [usual[0] / (lasts * lasts), usual[1]];
+        // A pose without readings has the usual motion.
         let seen = seen.unwrap_or(Seen {
             rate: Vector3::zeros(),
             curve: [Vector3::zeros(); 2],
             variance: [f64::INFINITY; 2],
             of_bias: 0.0,
         });
-        let share = |prior: f64, k: usize| prior / (prior + seen.variance[k]);
+        // Heavy tails: the variance of a pose is drawn about the usual one, and its own motion tells of it.
+        let [of_rate, of_curve] = [0, 1].map(|k| {
+            let own = (seen.square(k) - 2.0 * seen.variance[k]).max(0.0);
+            (DEGREES * prior[k] + own) / (DEGREES + 2.0)
+        });
+        let share = |prior: f64, k: usize| {
+            if prior > 0.0 {
+                prior / (prior + seen.variance[k])
+            } else {
+                0.0
+            }
+        };
         let (rate, curve) = (share(of_rate, 0), share(of_curve, 1));
         let left = [of_rate * (1.0 - rate), of_curve * (1.0 - curve)];
         let turned = seen.rate * rate;
         // Time from the middle of the pose, s.
+        let [first, last] = poses.spans[i];
         let at = poses.edges[i].map(|k| {
             (k.clamp(first, last.max(first)) as f64 - first as f64) * poses.step - 0.5 * lasts
         });
@@ -71,6 +96,17 @@ pub(super) fn motions(
         }
     })
     .collect()
+}
+
+impl Seen {
+    /// Square of the rate, or mean square of the curve at both edges, both across the vertical.
+    fn square(&self, k: usize) -> f64 {
+        if k == 0 {
+            self.rate.norm_squared()
+        } else {
+            0.5 * (self.curve[0].norm_squared() + self.curve[1].norm_squared())
+        }
+    }
 }
 
 /// `None` where readings are missing, or have no noise.

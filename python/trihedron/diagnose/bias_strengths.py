@@ -17,7 +17,7 @@ from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, PART_NOISE, Bounds
 from trihedron.threads import side_by_side
 
 UNSEEN = 1.0
@@ -79,7 +79,8 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
 def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds:
     """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
-    return _bounded(obs, ANYTHING, {(s, walks) for s in range(2) for walks in (True, False)} - free)
+    every = {(s, walks) for s in range(2) for walks in (True, False)}
+    return _bounded(obs, (*ANYTHING[:2], PART_NOISE[2]), every - free)
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
