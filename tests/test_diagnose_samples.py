@@ -9,7 +9,6 @@ import trihedron
 from diagnosed_session import diagnosed, simulated, unit_of
 from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import observe
-from trihedron.records import FindingCode
 from trihedron.simulate import hand_session, simulate
 
 
@@ -80,15 +79,3 @@ def test_codes_that_never_occur_are_named_where_noise_spans_many():
     assert min(missing) > 40
     assert "never occur" in found.effects[0].statement
     assert diagnosed("", 4, 14).verdict == "consistent"
-
-
-def test_a_gap_is_told_as_lost_samples():
-    made, _ = simulated(seed=2, n_poses=14)
-    kept = np.ones(made.n_samples, dtype=bool)
-    kept[2000:2040] = False
-    log = trihedron.Recording.from_arrays(
-        made.time_s[kept], made.accelerometer[kept], made.gyroscope[kept],
-        accelerometer_unit=made.accelerometer_unit, gyroscope_unit=made.gyroscope_unit,
-    )  # fmt: skip
-    (gap,) = [one for one in log.findings if one.code is FindingCode.TIME_GAP]
-    assert gap.numbers["lost_samples"] == 40

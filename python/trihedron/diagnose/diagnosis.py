@@ -22,7 +22,7 @@ from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.noise_level import noise_relations
-from trihedron.diagnose.residuals.within_poses import judge_within_poses
+from trihedron.diagnose.residuals.within_poses import judge_within_poses, within_limit
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
@@ -99,7 +99,7 @@ def _diagnosed(
         prior = prior_of(obs, begin, is_weak=True)
     answer = _run(obs, start_state(obs, begin), prior, alpha, notify)
     model = answer.found.model
-    relations = (*records(answer.found.related), *noise_relations(answer.predicted.obs))
+    relations = (*records(answer.found.related), *noise_relations(answer.predicted.obs, within_limit(alpha)))
     seen = calibration.accelerometer.observability
     is_determined = calibration_is_given or seen is None or seen.rank >= seen.n_parameters
     verdict = verdict_of(answer, has_relations=bool(relations), is_determined=is_determined)

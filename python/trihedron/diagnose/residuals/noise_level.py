@@ -81,11 +81,11 @@ def noise_changes(obs: Observations) -> tuple[NoiseChange, ...]:
     return tuple(one for one in found if one is not None and one.score > 0.0)
 
 
-def noise_relations(obs: Observations) -> tuple[Relation, ...]:
-    """The changes as empirical relations of the noise to time."""
+def noise_relations(obs: Observations, limit: float) -> tuple[Relation, ...]:
+    """The changes that score more than ``limit``, as empirical relations of the noise to time."""
     poses, t = obs.segments.poses, obs.time_s
     out = []
-    for one in noise_changes(obs):
+    for one in (change for change in noise_changes(obs) if change.score > limit):
         label, *_ = SENSORS[one.sensor]
         begins_s, ends_s = float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])
         each = zip(one.channels, one.ratio[one.changed], one.sigma[one.changed], strict=True)

@@ -24,6 +24,9 @@ or white, and a pose on another support has 50 % more."""
 SHORTEST = 32
 """Readings of a piece of a pose in which a line is sought."""
 
+N_TESTS = 3.0
+"""Lines, noisy poses and changes of noise."""
+
 
 @dataclass(frozen=True)
 class Line:
@@ -124,6 +127,11 @@ def loud_poses(obs: Observations) -> FloatArray:
     return np.where(is_loud, np.minimum(scatter.p_value * scatter.p_value.size, 1.0), 1.0)
 
 
+def within_limit(alpha: float) -> float:
+    """Score (twice a log-likelihood) above which one of the three tests disagrees."""
+    return float(-2.0 * np.log(alpha / (N_TESTS * N_DOMAINS_TESTED)))
+
+
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     """Lines, noisy poses and changes of noise, as one domain; the p-value is the smallest, corrected for the number of
     tests."""
@@ -133,7 +141,7 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     changes = {one: float(np.exp(-0.5 * one.score)) for one in noise_changes(obs)}
-    p = min(1.0, 3.0 * min(p_scatter, p_line, *changes.values()))
+    p = min(1.0, N_TESTS * min(p_scatter, p_line, *changes.values()))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
     weight = scatter.dof * steady if steady.any() else scatter.dof
     chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=weight).mean())
