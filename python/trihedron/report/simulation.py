@@ -41,8 +41,8 @@ def simulation_report(
     )
     what = f"{poses} and {moves} of an instrument with {how_many(n, 'effect') if n else 'no effect'} {BEYOND}"
     if repeated:
-        what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits, with the S and "
-        what += "b of the calibration and no further effect"
+        what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits met, with the "
+        what += "S and b of the calibration and no further effect"
     verdict = verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED")
     # A serious one is in the verdict with its cause.
     doubts = [f for f in findings if f.code is FindingCode.STATIC_FORCE and f.severity is Severity.WARNING]
