@@ -246,7 +246,7 @@ _MANY_RECORDINGS = {
     ),
     (Code.CLIPPING, "of-recording", WARNING): Words(
         "in {name} {seen:clause}.",
-        "The motion left the measuring range; moves that are clipped are excluded.",
+        "The motion left the measuring range; clipped moves count less, or are excluded.",
         "Turn with rates below about half the range limit, move gently, or set a wider range.",
     ),
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
