@@ -7,8 +7,11 @@ import pytest
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
+from trihedron.channel_facts.limits import find_limits
+from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
 from trihedron.simulate import scenario_by_name, simulate, twin_scenario
+from trihedron.simulate.readout import Adc
 
 WINDOW = 128
 # Octaves of the spectrum of 128 samples, without the lowest lines, which the removal of the mean touches.
@@ -84,7 +87,8 @@ def test_the_twin_of_a_simulation_has_its_noise_and_poses():
     # White noise from some 10⁴ samples: 1 %, and what the flicker beside it takes or leaves.
     assert np.allclose(scenario.accelerometer.noise.N, truth.noise["accelerometer"]["N"], rtol=0.1)
     assert np.allclose(scenario.gyroscope.noise.N, truth.noise["gyroscope"]["N"], rtol=0.1)
-    assert (scenario.accelerometer.adc.lsb, scenario.gyroscope.adc.lsb) == (1.0, 1.0)
+    # An extreme that is read once is no range limit.
+    assert scenario.accelerometer.adc == scenario.gyroscope.adc == Adc(1.0)
     for pose in segments.poses:
         middle = (pose.start + pose.stop) // 2
         pair = again.specific_force_m_s2[middle], truth.specific_force_m_s2[middle]
@@ -103,3 +107,18 @@ def test_motion_near_half_the_sampling_rate_is_repeated():
     _, _, copy, _ = compare(recording, truth.gravity_m_s2)
     # Smoothed over more than a sample it would be missing: 283 counts rms.
     assert np.median(np.abs(copy.gyroscope[moving] - shaken[moving])) < 60.0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ends"),
+    # The channels reach -23810, -18945, -30974 and up to 31103.
+    [(-25000.0, 20000.0, (-25000.0, 25000.0)), (-25000.0, np.inf, (-25000.0, np.inf)), (-20000.0, np.inf, None)],
+)
+def test_a_limit_of_one_channel_is_that_of_all_unless_another_reads_beyond_it(low, high, ends):
+    recording, _ = simulate(scenario_by_name("hand-session"), seed=8)
+    readings = recording.gyroscope.copy()
+    readings[:, 2] = np.maximum(readings[:, 2], low)
+    readings = np.delete(readings, np.flatnonzero((readings > high).any(axis=1)), axis=0)
+    limits = find_limits(readings, np.full(3, 6.0), np.ones(3))
+    assert [(limit.axis, limit.value) for limit in limits] == [(2, low)]
+    assert ChannelFacts(np.ones(3), np.full(3, 6.0), limits).adc_range(readings) == ends

@@ -200,28 +200,18 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
     """Write the exact range limits of the recording's ADCs; returns the ids of effects that these replace.
 
-    A limit that no reading reached is taken as symmetric to the other one. Limits that differ between channels, or are
-    blurred by noise, are not of an ADC: those stay an effect.
+    Limits that are not of a common ADC stay an effect.
     """
     out = set()
     for effect, name in SENSOR.items():
-        if getattr(found.recording, name) is None:
+        readings = getattr(found.recording, name)
+        if readings is None:
             continue
-        facts = found.recording.facts.of(name)
         unit = str(tables[name].get("unit", getattr(given, name).unit.value))
-        if not facts.limits or any(limit.sigma > 0.0 for limit in facts.limits):
+        ends = found.recording.facts.of(name).adc_range(readings)
+        if ends is None or unit != getattr(found.recording, f"{name}_unit").value:
             continue
-        if unit != getattr(found.recording, f"{name}_unit").value:
-            continue
-        ends = {is_high: [one.value for one in facts.limits if one.is_high == is_high] for is_high in (False, True)}
-        if any(max(values) - min(values) > float(facts.step.max()) for values in ends.values() if values):
-            continue
-        # Two's complement: the lowest code is one further from 0 than the highest.
-        code = float(facts.step.max()) if any(one.is_word for one in facts.limits) else 0.0
-        low = min(ends[False], default=-max(ends[True], default=0.0) - code)
-        high = max(ends[True], default=-low - code)
-        if not low < high:
-            continue
+        low, high = ends
         out.add(effect)
         adc = getattr(given, name).adc
         if (adc.low, adc.high) != (low, high):

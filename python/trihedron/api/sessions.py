@@ -131,10 +131,13 @@ def calibrate_sessions(
 
 
 def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -> Iterator[Finding]:
-    """The gravest warning of every recording alone about what S and b leave: the common ones leave it as well."""
+    """Clipping of every recording, and its gravest warning about what S and b leave: the common ones leave it too."""
     doubted: dict[FindingCode, list[tuple[str, str, str]]] = {}
     for result, session in zip(results, sessions, strict=True):
         warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
+        if FindingCode.CLIPPING in warned:
+            seen = words("quoted", sentence=warned[FindingCode.CLIPPING])
+            yield Finding.of(FindingCode.CLIPPING, "of-recording", name=session.name, seen=seen)
         for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
             one = session.name, warned[code], as_arguments(result.recording.source)
             doubted.setdefault(code, []).append(one)

@@ -142,7 +142,7 @@ def simulate(
     from trihedron.files.log import truth_document
     from trihedron.report.simulation import simulation_report
 
-    document = simulation_report(recording, known, beside, findings)
+    document = simulation_report(recording, known, beside, findings, "" if truth is None else str(truth))
     write_report(document, lambda: truth_document(known), report, force=force)
     if serve is not None:
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)

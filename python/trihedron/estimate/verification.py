@@ -168,6 +168,8 @@ def _worse_than_none(
             rms_without=rms_of(bare),
             is_few=changed.is_few,
             shifted=changed.shifted,
+            is_common=changed.gyro_factor is not None,
+            common=changed.gyro_factor or 0.0,
         )
         for case, (with_it, bare) in pairs.items()
         if _is_larger(with_it, bare)

@@ -74,6 +74,27 @@ class ChannelFacts(Frozen):
         )
         return replace(self, limits=limits)
 
+    def adc_range(self, readings: FloatArray) -> tuple[float, float] | None:
+        """Lowest and highest code of one ADC behind all three channels of ``readings`` (n, 3).
+
+        The side that no reading reached is symmetric to the other one, or open where readings lie beyond that.
+        ``None`` without a limit, and where limits differ, are blurred by noise, or another channel reads beyond them:
+        those are not of a common ADC.
+        """
+        if any(limit.sigma > 0.0 for limit in self.limits):
+            return None
+        step, least, most = float(self.step.max()), float(np.nanmin(readings)), float(np.nanmax(readings))
+        lows, highs = ([one.value for one in self.limits if one.is_high is side] for side in (False, True))
+        # Two's complement: the lowest code is one further from 0 than the highest.
+        code = step if any(one.is_word for one in self.limits) else 0.0
+        low, high = min(lows, default=-np.inf), max(highs, default=np.inf)
+        if highs and not lows and -high - code <= least:
+            low = -high - code
+        if lows and not highs and -low - code >= most:
+            high = -low - code
+        is_common = max(lows, default=low) - least <= step and most - min(highs, default=high) <= step
+        return (low, high) if self.limits and is_common else None
+
     @property
     def common_step(self) -> float:
         """The resolution that all three channels share, 0 where they differ."""

@@ -16,8 +16,7 @@ ALL_NUMBERS = 9
 FEWEST_SETS = 2
 LEAST_WORTH = 0.01
 """Uncertainty of a scale from which an experiment adds little: data sheets state 1 to 3 % without one."""
-LITTLE = " A data sheet states 1 to 3 % without an experiment: more poses, turns that are larger or better known, "
-LITTLE += "or noise in another unit?"
+LITTLE = " A data sheet states 1 to 3 % without an experiment: "
 
 
 def plan_report(plan: ExperimentPlan) -> Document:
@@ -27,17 +26,23 @@ def plan_report(plan: ExperimentPlan) -> Document:
     enough = [one for one in plan.poses if one.rank == ALL_NUMBERS and not any(math.isinf(w.loss) for w in one.worth)]
     best = min(enough, key=lambda one: one.n_poses, default=None)
     angles = ", ".join(f"{angle:g}°" for angle in turns.angles_deg).replace("-", MINUS)
-    is_little = best is None or max(best.scale, turns.scale) > LEAST_WORTH
+    is_by_angle = plan.sigma_turn_rad > plan.gyroscope_density * math.sqrt(turns.duration_s)
+    known = f", known to {degrees_from_radians(plan.sigma_turn_rad):.2g}° only," if is_by_angle else ""
+    remedy = ""
+    if best is None or best.scale > LEAST_WORTH:
+        remedy = f"{LITTLE}more poses, or noise in another unit?"
+    elif turns.scale > LEAST_WORTH:
+        remedy = f"{LITTLE}turn further, {'or know the angles better.' if known else 'or is noise in another unit?'}"
     return Document(
         title="Plan of an experiment",
         subtitle=(
             f"gyro noise {plain_number(degrees_from_radians(plan.gyroscope_density), 2)} °/s/√Hz, accelerometer noise "
             f"{plain_number(1e3 * mg_from_m_s2(plan.accelerometer_density), 2)} µg/√Hz, poses of {plan.pose_s:g} s"
         ),
-        verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis give the gyro's "
-        f"scale to {_percent(turns.scale)}{_beside_moves(plan)}.{LITTLE if is_little else ''}",
+        verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis{known} give the "
+        f"gyro's scale to {_percent(turns.scale)}{_beside_moves(plan)}.{remedy}",
         is_trustworthy=True,
-        stated_level="usable" if is_little else "good",
+        stated_level="usable" if remedy else "good",
         headlines=tuple(_headlines(plan, best)),
         lead=_picture(plan.poses),
         next_step=_next_step(plan),

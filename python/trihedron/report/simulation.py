@@ -23,12 +23,12 @@ ON_A_FACE = 0.99
 
 
 def simulation_report(
-    recording: Recording, truth: Truth, repeated: str = "", findings: tuple[Finding, ...] = ()
+    recording: Recording, truth: Truth, repeated: str = "", findings: tuple[Finding, ...] = (), kept: str = ""
 ) -> Document:
     """Lay out a simulation: its motion, the effects switched on, the true parameters.
 
     ``repeated`` is the recording of which it is the digital twin, as an argument, ``findings`` those on that recording
-    and its calibration.
+    and its calibration, ``kept`` the file of the truth.
     """
     n = len(truth.effects)
     poses, moves = how_many(len(truth.poses), "pose"), how_many(len(truth.moves), "move")
@@ -41,9 +41,11 @@ def simulation_report(
     )
     what = f"{poses} and {moves} of an instrument with {how_many(n, 'effect') if n else 'no effect'} {BEYOND}"
     if repeated:
-        what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits, with the S and "
-        what += "b of the calibration and no further effect"
+        what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits met, with the "
+        what += "S and b of the calibration and no further effect"
     verdict = verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED")
+    if any(f.code is FindingCode.CLIPPING for f in findings):
+        verdict += f" Clipping is in {repeated}: motion beyond its range is extrapolated."
     # A serious one is in the verdict with its cause.
     doubts = [f for f in findings if f.code is FindingCode.STATIC_FORCE and f.severity is Severity.WARNING]
     caption = "The simulated log; shaded where the body was truly static."
@@ -54,11 +56,11 @@ def simulation_report(
         is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
-            *((Section("Findings", (findings_block(findings),)),) if findings else ()),
+            *((Section("Findings on the repeated recording", (findings_block(findings),)),) if findings else ()),
             Section("Effects", (_effects(truth.effects),)),
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
-        next_step=_next_step(truth, repeated),
+        next_step=_next_step(truth, repeated, kept or "the truth (--truth FILE keeps it)"),
         headlines=(
             Headline("poses", str(len(truth.poses)), "", moves),
             Headline("effects", str(n), "", ", ".join(truth.effects) or f"none {BEYOND}"),
@@ -67,15 +69,15 @@ def simulation_report(
     )
 
 
-def _next_step(truth: Truth, repeated: str) -> str:
+def _next_step(truth: Truth, repeated: str, kept: str) -> str:
     """What the log is for."""
     if repeated:
         place = f"--gravity {truth.gravity_m_s2:.7g}"
         return f"Compare the recording with its digital twin: `trihedron diagnose {repeated} --against LOG {place}`."
     if len(truth.poses) == len(truth.segments):
-        return "Identify the noise of the log: `trihedron allan LOG`; compare with the truth (--truth FILE keeps it)."
+        return f"Identify the noise of the log: `trihedron allan LOG`; compare with {kept}."
     asked = f"`trihedron calibrate LOG --gravity {truth.gravity_m_s2:.7g}{_of_faces(truth)} -o calibration.json`"
-    return f"Calibrate the log: {asked}; compare with the truth (--truth FILE keeps it)."
+    return f"Calibrate the log: {asked}; compare with {kept}."
 
 
 def _of_faces(truth: Truth) -> str:

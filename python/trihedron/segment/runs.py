@@ -241,17 +241,18 @@ def without_approaches(channels: Channels, steady: list[Run]) -> list[Run]:
     """The runs without the end of a slow move before a pose, or the start of one after it: these rotate steadily beside
     a longer run."""
     beside = channels.blocks(BUMP_S)
-    kept = []
-    for run in steady:
-        longer = [
-            near
-            for near in steady
-            if near.last - near.first > run.last - run.first
-            and 0 <= max(run.first - near.last, near.first - run.last) < beside
-        ]
-        if not any(turns_on(channels, run.first, run.last, run_mean(channels, near)[0]) for near in longer):
-            kept.append(run)
-    return kept
+    noise = _gyro_noise(channels, steady)
+
+    def approaches(run: Run, near: Run) -> bool:
+        gap = max(run.first - near.last, near.first - run.last)
+        if near.last - near.first <= run.last - run.first or not 0 <= gap < beside:
+            return False
+        bias, n_bias = run_mean(channels, near)
+        along, square, n = _line(channels, run.first, run.last, bias)
+        # The bias has noise too, and every run of the log is tested.
+        return along > max(ONE_WAY * square, _line_by_chance(noise, n, len(steady)) * (1.0 + n / n_bias))
+
+    return [run for run in steady if not any(approaches(run, near) for near in steady)]
 
 
 def turns_on(channels: Channels, first: int, last: int, bias: FloatArray, still: Sequence[Run] = ()) -> bool:
@@ -259,18 +260,34 @@ def turns_on(channels: Channels, first: int, last: int, bias: FloatArray, still:
 
     A hand that tries to hold still moves to and fro, beyond the noise of the ``still`` runs if given.
     """
+    along, square, n = _line(channels, first, last, bias)
+    noise = _gyro_noise(channels, still)
+    return along > max(ONE_WAY * (square - noise), _line_by_chance(noise, n))
+
+
+def _line(channels: Channels, first: int, last: int, bias: FloatArray) -> tuple[float, float, int]:
+    """Mean square of the gyro's rate in these blocks that a straight line in time explains, all of it, and the number
+    of blocks; the line is 0 where they have none."""
     gyro = channels.is_gyroscope
     is_valid = channels.is_valid[first:last]
     n = int(np.count_nonzero(is_valid))
     if not gyro.any() or n < 2:
-        return False
+        return 0.0, 0.0, 1
     rate = channels.mean[first:last][is_valid][:, gyro] - bias[gyro]
     t = np.flatnonzero(is_valid) - np.mean(np.flatnonzero(is_valid))
     along = float(np.sum(rate.mean(axis=0) ** 2) + np.sum((t @ rate) ** 2) / (np.sum(t**2) * n))
-    parts = [run.quiet_rows(channels.mean)[:, gyro] for run in still]
-    noise = float(np.median([part.var(axis=0).sum() for part in parts])) if parts else 0.0
-    is_seen = along > float(probability.chdtri(6, probability.FALSE_ALARM)) * noise / (3.0 * n)
-    return is_seen and along > ONE_WAY * (float(np.mean(np.sum(rate**2, axis=1))) - noise)
+    return along, float(np.mean(np.sum(rate**2, axis=1))), n
+
+
+def _line_by_chance(noise: float, n: int, n_tests: int = 1) -> float:
+    """What a line through ``n`` blocks explains of their ``noise`` (mean square, three axes) in a rare false alarm."""
+    return float(probability.chdtri(6, probability.FALSE_ALARM / n_tests)) * noise / (3.0 * n)
+
+
+def _gyro_noise(channels: Channels, still: Sequence[Run]) -> float:
+    """Variance of the gyro's block means inside static runs, sum of its axes; 0 without a run."""
+    parts = [run.quiet_rows(channels.mean)[:, channels.is_gyroscope] for run in still]
+    return float(np.median([part.var(axis=0).sum() for part in parts])) if parts else 0.0
 
 
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:

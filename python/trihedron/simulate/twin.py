@@ -52,7 +52,7 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         raw, step, S = _filled(getattr(recording, name)), recording.facts.of(name).common_step, matrix3(sensor.S)
         _, gain = sense_axes(S, name)
         noise, low_pass = noise_of_poses(raw / gain, poses, 1.0 / recording.rate_hz, step / gain)
-        adc = Adc(step, float(raw.min()), float(raw.max()))
+        adc = Adc(step, *(recording.facts.of(name).adc_range(raw) or ()))
         unit = getattr(recording, f"{name}_unit")
         return {"S": S, "b": triple(sensor.b), "unit": unit, "noise": noise, "noise_filter": low_pass, "adc": adc}
 

@@ -223,8 +223,9 @@ class DroppedSamples(DirectEffect):
                 for one in losses
             ),
         )
+        largest = sorted(losses, key=lambda loss: -loss.count)[:MOST_NAMED]
         statement = self.reported(
-            "losses", losses=[(loss.count, t[loss.sample]) for loss in losses[:MOST_NAMED]],
+            "losses", losses=[(loss.count, t[loss.sample]) for loss in largest],
             has_more=len(losses) > MOST_NAMED, more=len(losses) - MOST_NAMED,
         )  # fmt: skip
 

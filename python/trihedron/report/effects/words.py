@@ -186,7 +186,10 @@ SESSION = {
     "dropped-samples": EffectWords(
         "samples are missing while the timestamps are even",
         "lower the rate or the load of the link; the sensor's own sample counter shows every loss",
-        {"losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} more|}."},
+        {
+            "losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} "
+            "smaller|} (a loss inside a static pose does not show).",
+        },
         lines={"losses": "{v0} at {v1:.2f} s"},
     ),
     "timing-jitter": EffectWords(

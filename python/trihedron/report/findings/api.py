@@ -95,7 +95,8 @@ _USE = {
         "Log both sensors.",
     ),
     (Code.STATIC_FORCE, "", NOTE): Words(
-        f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²); gravity is {{gravity_m_s2:.5g}} m/s².",
+        f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²), which agrees with gravity ({{gravity_m_s2:.5g}} m/s²).",
+        action="Errors of every pose and move: `trihedron verify FILE LOG`.",
         numbers=("share",),
     ),
     (Code.STATIC_FORCE, "off", WARNING): Words(
@@ -242,6 +243,11 @@ _MANY_RECORDINGS = {
         "in {name} by itself {seen:clause}.",
         "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
         "Run `trihedron diagnose {path}`, which looks for the cause.",
+    ),
+    (Code.CLIPPING, "of-recording", WARNING): Words(
+        "in {name} {seen:clause}.",
+        "The motion left the measuring range; clipped moves count less, or are excluded.",
+        "Turn with rates below about half the range limit, move gently, or set a wider range.",
     ),
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
         "in {n} of {n_all} recordings by themselves {seen:clause}; these are the figures of {name}.",

@@ -73,7 +73,8 @@ _UNITS = {
     (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
         f"No known gyro unit fits: {_TURNING}.",
         "A time base or rate that is wrong by that factor, or a gyro in counts or a unit of its own.",
-        "State the gyro's unit (--gyro-unit, counts if it has none) and the clock (--time-unit, --rate).",
+        "Check the clock (--time-unit, --rate): with the rate divided by {factor:.3g} the gyro is in {unit:unit}; if "
+        "the clock is right, state the gyro's unit (--gyro-unit, counts if it has none).",
     ),
     (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
     (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit:unit}}: {_TURNING}."),

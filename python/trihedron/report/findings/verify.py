@@ -28,6 +28,7 @@ ENTRIES = {
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
+        numbers=("is_common", "common"),
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "reference", WARNING): Words(
         "The accelerometer is not improved: the gravity error in static poses is {rms_m_s2:.3g mm/s²} rms with this "
@@ -39,7 +40,9 @@ ENTRIES = {
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
-        "calibration|A wrong file, unit, axis, sign or clock, or a calibration of too few rotations}.",
+        "calibration|{is_common:?All gyro scales differ by one factor ({common:+.2g %}): the clock or rate of one of "
+        "the two logs is off by it, or the gyro's sensitivity has changed|A wrong file, unit, axis, sign or clock, or "
+        "a calibration of too few rotations}}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units, "
         "with its right clock (--rate, --time-unit)}.",
     ),
