@@ -251,7 +251,8 @@ def test_an_answer_that_poses_support_stands_though_moves_are_spoilt(real_data: 
     d = diagnosed(9.803, last=0.5, **paths)
     assert d.effects[0].id == "gyro-g-sensitivity"
     held = next(h for h in d.effects[0].held_out if h.domain == "static-gyro")
-    assert held.chi2_per_dof_before > 1.8 * held.chi2_per_dof_after
+    # Without the motion of a support that yields, which is larger about the vertical than the noise of the gyro.
+    assert held.rms_before > 1.2 * held.rms_after
     assert held.chi2_per_dof_after < 1.5
 
 
