@@ -123,20 +123,24 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
         .flat_map(|t| (0..=N_SIZES).flat_map(move |a| (0..=N_SIZES).map(move |b| (t, a, b))))
         .collect();
+    // With the rate at the beginning of poses and its time constant.
     let likeliest = |tables: &[Vec<Sums>]| {
-        let found = tried
-            .par_iter()
-            .map(|&(t, a, b)| log_likelihood(&tables[t], variance(a), variance(b)));
-        found.reduce(|| f64::NEG_INFINITY, f64::max)
+        let found = tried.par_iter().map(|&(t, a, b)| {
+            let value = log_likelihood(&tables[t], variance(a), variance(b));
+            (value, variance(b).sqrt(), SETTLES_S[t])
+        });
+        found.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
     };
-    let (support, bias) = (likeliest(&of_support), likeliest(&of_bias));
+    let (Some(support), Some(bias)) = (likeliest(&of_support), likeliest(&of_bias)) else {
+        return Ok(None);
+    };
     let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
     let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i, &colour)).collect();
     let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
-        score: score(support, scatter),
-        of_bias: score(bias, scatter).min(2.0 * of_bias),
-        motion: motions(poses, seen),
+        score: score(support.0, scatter),
+        of_bias: score(bias.0, scatter).min(2.0 * of_bias),
+        motion: motions(poses, seen, support.1, support.2),
     }))
 }
 

@@ -7,6 +7,8 @@ use crate::order_statistics::median;
 
 /// Degrees of freedom of the heavy tails of motions: those of moves have as many (docs/model-session.md, 11.18a).
 const DEGREES: f64 = 4.0;
+/// Standard errors by which the usual motion must exceed none.
+const CLEAR: f64 = 2.0;
 /// Median of the sum of squares of two standard normal variables.
 const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
 
@@ -31,31 +33,48 @@ pub(super) struct Seen {
     pub of_bias: f64,
 }
 
-/// Motion of all poses.
-pub(super) fn motions(poses: &Poses<'_>, seen: Vec<Option<Seen>>) -> Vec<PoseMotion> {
+/// Motion of all poses, of which the likeliest begins at the rate `spread` and decays with `tau`.
+pub(super) fn motions(
+    poses: &Poses<'_>,
+    seen: Vec<Option<Seen>>,
+    spread: f64,
+    tau: f64,
+) -> Vec<PoseMotion> {
     let lasts = |i: usize| {
         let [first, last] = poses.spans[i];
         last.saturating_sub(first).max(1) as f64 * poses.step
     };
-    // Rotations over a whole pose: those of short and of long ones are alike.
+    // Rotations over a whole pose (those of short and of long ones are alike), and bends; the errors of either.
     let usual = [0, 1].map(|k| {
+        let unit = |i: usize| if k == 0 { lasts(i).powi(2) } else { 1.0 };
         let each = seen.iter().enumerate();
-        let of_pose = |(i, one): (usize, &Option<Seen>)| {
-            let unit = if k == 0 { lasts(i).powi(2) } else { 1.0 };
-            one.as_ref()
-                .map(|one| unit * (one.square(k) / MEDIAN_OF_TWO - one.variance[k]))
-        };
-        let mut squares: Vec<f64> = each.filter_map(of_pose).collect();
+        let known = each.filter_map(|(i, one)| Some((unit(i), one.as_ref()?)));
+        let (mut squares, mut errors): (Vec<f64>, Vec<f64>) = known
+            .map(|(unit, one)| (unit, one.square(k) / MEDIAN_OF_TWO, one.variance[k]))
+            .map(|(unit, square, error)| (unit * (square - error), unit * error))
+            .unzip();
         if squares.is_empty() {
-            0.0
-        } else {
-            median(&mut squares).max(0.0)
+            return [0.0; 2];
         }
+        let error = CLEAR * median(&mut errors) / (squares.len() as f64).sqrt();
+        [median(&mut squares).max(0.0), error]
     });
+    // Rates that gravity shows less clearly than the gyro does are as large as is likeliest: a few large ones make that
+    // too large for all others.
+    let of_rates = |lasts: f64| {
+        let likeliest = (spread * tau * (1.0 - (-lasts / tau).exp())).powi(2);
+        let [square, error] = usual[0];
+        let rotation = if square > error {
+            square.min(likeliest)
+        } else {
+            likeliest
+        };
+        rotation / (lasts * lasts)
+    };
     let each = seen.into_iter().enumerate();
     each.map(|(i, seen)| {
         let lasts = lasts(i);
-        let prior = [usual[0] / (lasts * lasts), usual[1]];
+        let prior = [of_rates(lasts), usual[1][0]];
         // A pose without readings has the usual motion.
         let seen = seen.unwrap_or(Seen {
             rate: Vector3::zeros(),
