@@ -7,7 +7,7 @@ use crate::order_statistics::median;
 
 /// Degrees of freedom of the heavy tails of motions: those of moves have as many (docs/model-session.md, 11.18a).
 const DEGREES: f64 = 4.0;
-/// Standard errors by which the usual motion must exceed none.
+/// Standard errors from the usual motion to its upper limit.
 const CLEAR: f64 = 2.0;
 /// Median of the sum of squares of two standard normal variables.
 const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
@@ -59,16 +59,10 @@ pub(super) fn motions(
         let error = CLEAR * median(&mut errors) / (squares.len() as f64).sqrt();
         [median(&mut squares).max(0.0), error]
     });
-    // Rates that gravity shows less clearly than the gyro does are as large as is likeliest: a few large ones make that
-    // too large for all others.
+    // As large as is likeliest, which a few large ones make too large for all others, or as gravity shows at most.
     let of_rates = |lasts: f64| {
         let likeliest = (spread * tau * (1.0 - (-lasts / tau).exp())).powi(2);
-        let [square, error] = usual[0];
-        let rotation = if square > error {
-            square.min(likeliest)
-        } else {
-            likeliest
-        };
+        let rotation = likeliest.min(usual[0][0] + usual[0][1]);
         rotation / (lasts * lasts)
     };
     let each = seen.into_iter().enumerate();
