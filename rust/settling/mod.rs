@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::order_statistics::{median, quantile};
+use crate::order_statistics::median;
 pub use motion::PoseMotion;
 use motion::{Seen, motions, seen};
 
@@ -19,9 +19,6 @@ const SETTLES_S: [f64; 4] = [0.7, 1.4, 2.8, 5.6];
 const N_SIZES: usize = 31;
 const SMALLEST: f64 = 0.1;
 const LARGEST: f64 = 1e4;
-/// Quantile over the poses at which they are quiet, and that of the size of a standard normal variable.
-const QUIET: f64 = 0.3;
-const QUIET_NORMAL: f64 = 0.385_320_466;
 /// Variance of a tilt about the vertical, of the largest, that is rounding.
 const LEVEL: f64 = 1e-9;
 
@@ -32,7 +29,7 @@ pub struct Poses<'a> {
     pub readings: [&'a [[f64; 3]]; 2],
     /// SI per raw unit of both.
     pub scale: [Matrix3<f64>; 2],
-    /// Standard errors of the means of every pose by white noise, of both.
+    /// Standard errors of the means of every pose if their parts are independent, of both.
     pub noise: [&'a [[f64; 3]]; 2],
     /// Vertical in the body.
     pub up: &'a [[f64; 3]],
@@ -91,8 +88,7 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     {
         return Err(Error::bad_input("every pose has a vertical and noise"));
     }
-    let colour = [0, 1].map(|sensor| colour(poses, sensor));
-    let all: Vec<Parts> = (0..n).filter_map(|i| parts(poses, i, &colour)).collect();
+    let all: Vec<Parts> = (0..n).filter_map(|i| parts(poses, i)).collect();
     if all.len() < fewest {
         return Ok(None);
     }
@@ -135,7 +131,7 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
         return Ok(None);
     };
     let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
-    let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i, &colour)).collect();
+    let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i)).collect();
     let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
         score: score(support.0, scatter),
@@ -144,32 +140,8 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     }))
 }
 
-/// Ratio of slow to white noise in the quiet poses of a session, axis by axis: slow noise is in all poses alike, a motion
-/// is larger in some. From the difference between the halves of a pose.
-fn colour(poses: &Poses<'_>, sensor: usize) -> Vector3<f64> {
-    let half = |i: usize, first: usize, last: usize| {
-        let n = (last - first) / 2;
-        let means = [first, last - n].map(|start| mean(&poses.readings[sensor][start..start + n]));
-        let noise = Vector3::from(poses.noise[sensor][i]);
-        (means[1] - means[0]).component_div(&noise).abs() / 2.0
-    };
-    let spans = poses.spans.iter().enumerate();
-    let seen: Vec<Vector3<f64>> = spans
-        .filter(|(_, span)| span[1] >= span[0] + 2 * N_BLOCKS)
-        .map(|(i, span)| half(i, span[0], span[1]))
-        .filter(|change| change.iter().all(|value| value.is_finite()))
-        .collect();
-    Vector3::from_fn(|axis, _| {
-        let mut of_axis: Vec<f64> = seen.iter().map(|change| change[axis]).collect();
-        if of_axis.is_empty() {
-            return 1.0;
-        }
-        (quantile(&mut of_axis, QUIET) / QUIET_NORMAL).max(1.0)
-    })
-}
-
 /// `None` where readings are missing, or have no noise.
-fn parts(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> Option<Parts> {
+fn parts(poses: &Poses<'_>, i: usize) -> Option<Parts> {
     let [first, last] = poses.spans[i];
     if last < first + 2 * N_BLOCKS {
         return None;
@@ -183,7 +155,7 @@ fn parts(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> Option<Part
     };
     // Covariance of the mean of a part.
     let spread = |sensor: usize| {
-        let noise = Vector3::from(poses.noise[sensor][i]).component_mul(&colour[sensor]);
+        let noise = Vector3::from(poses.noise[sensor][i]);
         let own = poses.scale[sensor] * Matrix3::from_diagonal(&noise);
         own * own.transpose() * N_BLOCKS as f64
     };

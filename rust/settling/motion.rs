@@ -123,14 +123,14 @@ impl Seen {
 }
 
 /// `None` where readings are missing, or have no noise.
-pub(super) fn seen(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> Option<Seen> {
+pub(super) fn seen(poses: &Poses<'_>, i: usize) -> Option<Seen> {
     let [first, last] = poses.spans[i];
     let n = last.checked_sub(first).filter(|n| *n >= 2 * N_BLOCKS)?;
     let up = Vector3::from(poses.up[i]);
     let across = Matrix3::identity() - up * up.transpose();
     let turning = -up.cross_matrix() / poses.gravity * poses.scale[1];
     let [of_rate, of_tilt] = [0, 1].map(|sensor| {
-        let noise = Vector3::from(poses.noise[sensor][i]).component_mul(&colour[sensor]);
+        let noise = Vector3::from(poses.noise[sensor][i]);
         let by = if sensor == 0 {
             across * poses.scale[0]
         } else {
@@ -175,6 +175,7 @@ pub(super) fn seen(poses: &Poses<'_>, i: usize, colour: &[Vector3<f64>; 2]) -> O
             rate,
             curve,
             variance: [
+                // Of a slope of even noise; of the bends of the gyro's integral, 6/5 less the 1 of its mean.
                 12.0 * of_tilt / (lasts * lasts) + 0.2 * of_rate,
                 of_rate * lasts * lasts / 12.0,
             ],

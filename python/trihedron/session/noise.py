@@ -177,10 +177,25 @@ def coloured_variance(
     (poses, 3) the mean of every pose's second half minus that of its first, ``density`` (3,) white noise per √Hz; raw.
     """
     white = density / np.sqrt(pose_duration_s)[:, None]
-    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * ndtri(0.5 + 0.5 * QUIET))) ** 2
+    quiet = _quiet(halves, white) ** 2
     pooled = medians((pose_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     return np.outer(move_duration_s, (colour - 1.0) * density**2)
+
+
+def _quiet(halves: FloatArray, white: FloatArray) -> FloatArray:
+    """(3,) ratio of slow to white noise in the quiet poses, from changes ``halves`` (poses, 3) between the halves of
+    a pose and the standard errors ``white`` (poses, 3) of its mean."""
+    return np.asarray(quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * ndtri(0.5 + 0.5 * QUIET)))
+
+
+def quiet_errors(readings: FloatArray, spans: IntArray, white: FloatArray) -> FloatArray:
+    """(poses, 3) standard errors of the means over ``spans`` (poses, 2): those by white noise alone, ``white``, with
+    the slow noise that the quiet poses have: a motion is larger in some."""
+    long = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
+    if not long.any():
+        return white
+    return white * np.maximum(_quiet(_steps(readings, spans[long], np.eye(3)[None], 2)[:, 0], white[long]), 1.0)
 
 
 # Bias scatter from pose to pose by 1/f noise, estimated from inside the poses (docs/model-session.md, 11.12d).

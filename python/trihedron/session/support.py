@@ -11,7 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Pose
 from trihedron.session.joints import STRONG
-from trihedron.session.noise import FEWEST_POSES, SessionNoise
+from trihedron.session.noise import FEWEST_POSES, SessionNoise, quiet_errors
 from trihedron.session.rounding import UNIFORM, undithered_axes
 
 
@@ -63,18 +63,14 @@ def support_of(
     edges = spans.copy()
     for before, start, stop in moves:
         edges[before, 1], edges[before + 1, 0] = start, stop
-    step_s, facts = 1.0 / recording.rate_hz, recording.facts
-    quantum = facts.of("gyroscope").step, facts.of("accelerometer").step
-    n = np.maximum(spans[:, 1] - spans[:, 0], 1)
-    of_mean = [
-        np.sqrt(
-            density**2 / (n * step_s)[:, None]
-            + np.where(undithered_axes(q, density / np.sqrt(step_s)), UNIFORM, 0.0) * q**2
-        )
-        for density, q in zip((noise.rate_density, noise.force_density), quantum, strict=True)
-    ]
+    step_s, n = 1.0 / recording.rate_hz, np.maximum(spans[:, 1] - spans[:, 0], 1)
+    readings, errors = (recording.gyroscope, recording.accelerometer), []
+    steps = (recording.facts.of(name).step for name in ("gyroscope", "accelerometer"))
+    for raw, step, density in zip(readings, steps, (noise.rate_density, noise.force_density), strict=True):
+        rounding = UNIFORM * step**2 * undithered_axes(step, density / np.sqrt(step_s))
+        errors.append(quiet_errors(raw, spans, np.sqrt(density**2 / (n * step_s)[:, None] + rounding)))
     found = _core.settling_of_poses(
-        (recording.gyroscope, recording.accelerometer), near[:2], (of_mean[0], of_mean[1]), near[2],
+        readings, near[:2], (errors[0], errors[1]), near[2],
         (spans, np.sort(edges, axis=1)), gravity_m_s2=gravity_m_s2, step_s=step_s, fewest=FEWEST_POSES,
     )  # fmt: skip
     return None if found is None else Support(*found)
