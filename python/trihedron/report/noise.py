@@ -41,7 +41,7 @@ def noise_report(
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
         facts.append(("excluded", f"{how_many(len(noise.excluded_s), 'interval')}, {duration(total)}"))
-    facts += _coloured(noise)
+    facts += _filtered(noise)
     groups = _groups(noise)
     tables = [table for unit, axes in groups for table in (_terms_table(axes, unit), _answers_table(axes, unit))]
     return Document(
@@ -145,7 +145,7 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
     return (*noise.findings, *named)
 
 
-def _coloured(noise: Noise) -> list[tuple[str, str]]:
+def _filtered(noise: Noise) -> list[tuple[str, str]]:
     """Upper end of the fit band, where a low-pass filter limits it."""
     limits = [
         f"{axis_in_print(axis.name)} {plain_number(axis.highest_hz, 3)} Hz"
