@@ -113,7 +113,7 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
         cut_rows=n_cut,
         beyond_rows=n_beyond,
         lost_rows=int(np.sum(~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1))),
-        is_interpolated=variance < FAITHFUL or rate[name] < rate[own] / FASTER,
+        is_resampled=variance < FAITHFUL or rate[name] < rate[own] / FASTER,
         rate_ratio=rate["gyroscope"] / rate["accelerometer"],
         rows_left_out=n_cut + n_beyond,
     )

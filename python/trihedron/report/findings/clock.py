@@ -146,7 +146,7 @@ _CLOCKS = {
         "{variance_factor:.3g %} of its white-noise variance; {cut_rows} rows outside the overlap were cut, and "
         "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} have no reading.",
         "Each sensor was logged with its own timestamps.",
-        "{is_interpolated:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
+        "{is_resampled:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
         numbers=("rate_ratio", "rows_left_out"),
         or_severity=WARNING,
     ),
