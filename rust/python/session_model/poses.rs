@@ -108,8 +108,11 @@ impl SessionMoves {
             &before,
             &unresolved,
         )?;
-        if leans.shape() != [pose_time_s.as_array().len(), 2, 3] {
-            return Err(PyValueError::new_err("every pose leans at both ends"));
+        let h = pose_time_s.as_array().len();
+        if leans.shape() != [h, 2, 3] {
+            return Err(PyValueError::new_err(format!(
+                "leans must have shape ({h}, 2, 3)"
+            )));
         }
         let leans = leans.as_array();
         let leaning = |pose: usize, end: usize| Vector3::from_fn(|i, _| leans[[pose, end, i]]);

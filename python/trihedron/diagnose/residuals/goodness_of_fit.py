@@ -44,7 +44,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
             continue
         residual = fitted.system.residual[rows]
         if label in (MOVES, DYNAMICS):
-            # The noise of moves was widened to their residuals: the test uses the noise predicted before.
+            # Their excess was fitted to these residuals: the test uses the noise predicted without it.
             residual = fitted.core.moves_over_predicted()[:, slice(0, 2) if label == MOVES else slice(2, 5)]
         chi2 = float((residual**2).sum())
         per_dof = chi2 / dof
