@@ -18,7 +18,6 @@ from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
-from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.recording import as_arguments, distinct_names
@@ -217,13 +216,12 @@ def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> 
 
 
 def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:
-    """One calibration as parameters, its covariance widened where cross-validated errors exceed their prediction."""
+    """One calibration as parameters with their covariance."""
     calibration = in_frame(result.calibration, "lower")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
     jacobian = numbers_jacobian(accel.S, accel.b, S_g, b_g)
-    widened = np.repeat([_excess(accel), 1.0 if gyro is None else _excess(gyro)], 12)[: jacobian.shape[1]]
-    covariance = jacobian @ (calibration.covariance * np.sqrt(np.outer(widened, widened))) @ jacobian.T
+    covariance = jacobian @ calibration.covariance @ jacobian.T
     recording = result.recording
     temperature, low, high, branch = _temperature(result)
     return Session(
@@ -247,19 +245,6 @@ def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
     if quality is None or quality.held_out_rms is None or not quality.floor > 0.0:
         return math.nan, math.nan
     return quality.held_out_rms, quality.held_out_rms / quality.floor
-
-
-def _excess(sensor: SensorCalibration) -> float:
-    """Cross-validated variance over predicted, at least 1 (docs/diagnosis-method.md, section 9).
-
-    By the median: a disturbed pose or a clipped move, which the fit weights down, must not count here.
-    """
-    quality = sensor.quality
-    if quality is None or quality.held_out is None or quality.held_out_sigma is None:
-        return 1.0
-    z = (quality.held_out / quality.held_out_sigma).ravel()
-    z = z[np.isfinite(z)]
-    return max(1.0, float(np.median(z**2)) / MEDIAN_CHI2[1]) if len(z) > 3 else 1.0
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

@@ -13,7 +13,6 @@ from trihedron.errors import InputError
 from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.records.domains import Domain, DomainTest
 from trihedron.session.noise import between_sessions
 from trihedron.units import si_of
 
@@ -89,20 +88,15 @@ def model_of_calibration(calibration: Calibration) -> FittedModel:
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
-    """The fit of a recording, with its accepted effects or without, its covariance widened by the remaining misfit.
+    """The fit of a recording, with its accepted effects or without.
 
     Bias change between two sessions: twice the floor of the Allan variance, or what the biases of the poses show
     where that is more (eq. 9.2, 9.3).
     """
     fit = diagnosis.extended if with_effects else diagnosis.baseline
-    tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
         raise InputError("a diagnosis is compared by its covariance, and this one carries none")
     covariance = np.array(fit.covariance)
-    widened = np.ones(len(covariance))
-    widened[:12] = np.sqrt(_excess(tests, "static-accel"))
-    widened[12:21] = np.sqrt(max(_excess(tests, "moves"), _excess(tests, "dynamics")))
-    covariance *= np.outer(widened, widened)
     of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
     accelerometer, gyroscope = (
         None if side is None else FittedSensor(np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]), drift)
@@ -110,15 +104,6 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     )
     assert accelerometer is not None
     return FittedModel(accelerometer, gyroscope, covariance)
-
-
-def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:
-    """χ² per degree of freedom of the remaining misfit, at least 1 (Birge), whether or not the domain disagrees.
-
-    With sixteen degrees of freedom only values above 2 count as disagreement: small bias scatter would make the
-    uncertainties a third too small.
-    """
-    return next((max(test.chi2_per_dof, 1.0) for test in tests if test.domain == domain), 1.0)
 
 
 def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:
