@@ -50,10 +50,6 @@ if TYPE_CHECKING:
 Method = Literal["joint", "separate", "faces"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
-MOST_SETTLING = 0.05
-"""Fraction of poses with detected settling that is allowed, since more settle undetected: with one of 18 on a support
-that yields, a fifth of the elements of the gyro's S were outside their 95 % interval."""
-
 Found = tuple[Finding, ...]
 
 
@@ -166,7 +162,7 @@ def calibrate(
         calibration = on_stated_turns(calibration, recording, segments, turns_deg)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
+    findings = (*said, *recording.findings, *segments.findings, *_of_fit(calibration, recording, segments))
     calibration = with_static_rate(calibration, segments)
     return _result(calibration, _with_doubtful_columns(findings), segments, recording)
 
@@ -222,15 +218,6 @@ def _timed(found: Finding, recording: Recording, segments: Segments) -> Finding:
         start_s=float(recording.time_s[move.start]),
         residual_deg=found.numbers["residual_deg"], times=found.numbers["times"],
     )  # fmt: skip
-
-
-def _as_they_weigh(segments: Segments) -> Found:
-    """Findings of the segmentation; settling is serious where more than ``MOST_SETTLING`` of the poses show it."""
-
-    def is_grave(one: Finding) -> bool:
-        return one.code is FindingCode.POSE_SETTLING and one.numbers["poses"] > MOST_SETTLING * segments.n_poses
-
-    return tuple(replace(one, severity=Severity.SERIOUS) if is_grave(one) else one for one in segments.findings)
 
 
 def _by_poses(

@@ -9,7 +9,6 @@ ENTRIES = {
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, record shorter poses, or put it on a firmer support.",
         numbers=("worst_pose",),
-        or_severity=SERIOUS,
     ),
     (Code.BIAS_SETTLING, "", WARNING): Words(
         "The accelerometer settles after rotations: {x_percent:.3f}, {y_percent:.3f}, {z_percent:.3f} % (each ± "
