@@ -19,8 +19,9 @@ from trihedron.records import Calibration, Finding, FindingCode, Segments
 from trihedron.sensor_model import correct, in_frame
 from trihedron.transforms import directions_of
 
-NONLINEARITY = 2e-3
-"""Fraction of the range: data sheets of consumer accelerometers state 0.1 to 0.5 %."""
+NONLINEARITY = 1e-3
+"""Bend at 1 g, of |g|: data sheets of consumer accelerometers state 0.1 to 0.5 % of a range of ±2 g or more, of which a
+parabola has a quarter at half the range."""
 TAIL_DOF = 4.0
 """Degrees of freedom of the half-t prior of a strength: finite variance, and tails that allow many times the scale."""
 STRENGTHS = np.geomspace(1e-5, 0.1, 17)
