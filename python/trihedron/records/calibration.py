@@ -168,7 +168,7 @@ class Calibration(Judged, Presented):
         Effects and temperature models beside S and b (``calibrate --extended``).
     averaging : float
         0 for a sensor that samples points, 1 for one that averages over its sample interval (docs/model-session.md,
-        11.6d); fractions between them are estimates from the rotations.
+        11.6d), more for one with a low-pass filter; it is estimated from the rotations.
 
     Examples
     --------

@@ -2,8 +2,10 @@
 motion faster than the samples (eq. 8.2a).
 
 A mean m over the interval T differs from the value in its middle by T²/24 of the second derivative:
-ω = m - a/24 (m₋ - 2 m + m₊), a = 1 for a sensor that averages, 0 for one that samples points. For the angle of a move
-about one axis, a sum of means, a does not matter; for rotations that do not commute it does, and moves determine it.
+ω = m - a/24 (m₋ - 2 m + m₊), a = 1 for a sensor that averages, 0 for one that samples points. A filter adds twelve
+times the variance of its impulse response in sample intervals: 7.6 by a first-order low-pass with its corner at 0.2 of
+the rate, 0 by a Butterworth. For the angle of a move about one axis a does not matter; for rotations that do not
+commute it does, and moves determine it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,14 +18,15 @@ from trihedron.session.rounding import UNIFORM
 
 GAP = 1.5
 """A step longer than this many usual ones has lost samples, as in the session model (its ``gaps``)."""
-EITHER = 0.5
-"""Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
+EITHER, OF_FILTERS = 0.5, 4.0
+"""Prior mean of ``a``, between a sensor that averages and one that does not, and its standard deviation: low-pass
+filters with a corner at 0.2 of the rate or above are within two."""
 BLOCK = 1 << 16
 """Rows processed together, to bound the memory of intermediate arrays in a long log."""
 
 
 def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatArray:
-    """(n, 3) readings at the middle of their interval, with averaging ``share`` (a) between 0 and 1."""
+    """(n, 3) readings at the middle of their interval, with averaging ``share`` (a)."""
     if share == 0.0:
         return readings
     steps = np.diff(time_s)

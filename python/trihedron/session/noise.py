@@ -191,11 +191,14 @@ def _quiet(halves: FloatArray, white: FloatArray) -> FloatArray:
 
 def quiet_errors(readings: FloatArray, spans: IntArray, white: FloatArray) -> FloatArray:
     """(poses, 3) standard errors of the means over ``spans`` (poses, 2): those by white noise alone, ``white``, with
-    the slow noise that the quiet poses have: a motion is larger in some."""
+    the slow noise that the quiet poses have: a motion is larger in some. At least that of all axes together: a quantile
+    of few poses is uncertain, and noise below a filter's corner exceeds that of the samples on all axes alike."""
     long = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
     if not long.any():
         return white
-    return white * np.maximum(_quiet(_steps(readings, spans[long], np.eye(3)[None], 2)[:, 0], white[long]), 1.0)
+    halves, white_long = _steps(readings, spans[long], np.eye(3)[None], 2)[:, 0], white[long]
+    of_all = _quiet(halves.reshape(-1, 1), white_long.reshape(-1, 1))
+    return white * np.maximum(np.maximum(_quiet(halves, white_long), of_all), 1.0)
 
 
 # Bias scatter from pose to pose by 1/f noise, estimated from inside the poses (docs/model-session.md, 11.12d).

@@ -41,7 +41,7 @@ class Observations(SessionReadings):
     ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
     rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
-    ``averaging`` is the share of the sample interval that the sensors average over (0 to 1).
+    ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
     """
 
     recording: Recording

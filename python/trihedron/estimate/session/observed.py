@@ -10,7 +10,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
-from trihedron.session.averaging import EITHER, sharpened
+from trihedron.session.averaging import EITHER, OF_FILTERS, sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
 from trihedron.session.rounding import UNIFORM
@@ -131,7 +131,8 @@ def arranged(
         before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
         force_effect=effects[0], rate_effect=effects[1],
         effect_sigma=np.array([
-            *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
+            *measured.quantum[coarse] * np.sqrt(UNIFORM), OF_FILTERS,
+            *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
         effect_time_s=np.concatenate([pose_time_s, measured.time_s[kept]]), pose_lasts_s=lasts_s,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
