@@ -142,6 +142,8 @@ pub struct Session {
     pub force: StaticMeans,
     /// Gyro in static poses.
     pub rate: Option<StaticMeans>,
+    /// Change of either sensor between the halves of every pose, raw, and the matrix that whitens it; `None`: unused.
+    pub change: [Option<Vec<(Vector3<f64>, Matrix3<f64>)>>; 2],
     /// Moves between neighbouring poses.
     pub moves: Arc<Vec<Move>>,
     /// Noise of the moves' samples.
@@ -229,6 +231,12 @@ impl Session {
             )));
         }
         let sizes = [self.time_s.len(), self.force.sigma.len()];
+        let changes = self.change.iter().flatten();
+        if changes.into_iter().any(|change| change.len() != h) {
+            return Err(Error::bad_input(format!(
+                "{h} poses need as many changes between their halves"
+            )));
+        }
         let rate_sizes = self
             .rate
             .as_ref()

@@ -23,6 +23,10 @@ pub enum Domain {
     Dynamics = 3,
     /// Priors that keep undetermined directions finite.
     Prior = 4,
+    /// Change of the accelerometer between the halves of a pose.
+    ForceChange = 5,
+    /// Change of the gyro between the halves of a pose.
+    RateChange = 6,
 }
 
 /// Process to which a row belongs.
@@ -213,11 +217,11 @@ impl Session {
     ) -> Result<Vec<DMatrix<f64>>> {
         let k = distortion.k;
         for given in [&distortion.force, &distortion.rate].into_iter().flatten() {
-            if given.len() != self.n_points() * 3 * k {
+            let n = self.n_points();
+            if ![n, n + self.n_poses()].contains(&(given.len() / (3 * k).max(1))) {
                 return Err(Error::bad_input(format!(
-                    "an effect of {k} parameters at {} points needs {} numbers, got {}",
-                    self.n_points(),
-                    self.n_points() * 3 * k,
+                    "an effect of {k} parameters at {n} points needs {} numbers, got {}",
+                    n * 3 * k,
                     given.len()
                 )));
             }
@@ -252,6 +256,15 @@ impl Session {
                             &weight,
                             &mut out,
                         );
+                    }
+                }
+                Domain::ForceChange | Domain::RateChange => {
+                    let s = usize::from(group.domain == Domain::RateChange);
+                    let side = [&distortion.force, &distortion.rate][s].as_ref();
+                    if let Some(change) = &self.change[s] {
+                        let point = self.n_points() + group.segment;
+                        let weight = &change[group.segment].1;
+                        rest_columns(side, k, point, [&force, &rate][s], weight, &mut out);
                     }
                 }
                 _ => {

@@ -8,7 +8,8 @@ use super::{LOWER, N_MODEL, N_POSE_SCATTER};
 /// Effects in the corrected readings, linear in their parameters.
 #[derive(Debug, Clone, Default)]
 pub struct Distortion {
-    /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move.
+    /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move, then, where the effect
+    /// changes inside poses, the change of the mean between the halves of every pose.
     pub force: Option<Vec<f64>>,
     /// The same of the rate.
     pub rate: Option<Vec<f64>>,

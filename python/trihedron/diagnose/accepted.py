@@ -84,8 +84,14 @@ class Answer:
         explained = sum(max(d.excess - left[d.domain], 0.0) for d in self.domains if d.domain in left)
         if sum(left[d.domain] for d in self.remaining if d.disagrees) > explained:
             return False
-        # An arm and Earth rate are no faults that would stand in for what the instrument does.
-        of_instrument = sum(gain for effect, gain, _ in self.gains if not (effect.is_of_motion or effect.of_session))
+        # An arm and Earth rate are no faults that would stand in for what the instrument does; the strength of a bias
+        # process states a size, not a cause.
+        sizes = {one.effect.id for one in self.biases}
+        of_instrument = sum(
+            gain
+            for effect, gain, _ in self.gains
+            if not (effect.is_of_motion or effect.of_session or effect.id in sizes)
+        )
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
         beside = {one.effect.id for one in self.seen if not one.reobserves}

@@ -23,6 +23,9 @@ from trihedron.threads import side_by_side
 UNSEEN = 1.0
 """Scatter from pose to pose, in standard errors of a pose mean, of 1/f noise below the white noise of the poses: none
 shows it."""
+DRIFT_CORNER_S = 2.0 * NOISE_CORNER_S
+"""Corner time of a walk that twenty poses in some minutes do not show: half an error of a pose. A smooth drift of 12
+errors is likely as a walk with the corner time of the noisiest parts; that it exceeds 1/f noise its size shows:"""
 LEAST_TIMES = 2.0
 """Rms of a drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise
 drifts too, up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
@@ -84,8 +87,11 @@ def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
-    """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains."""
-    return _bounded(model.obs, model.within, {(effect.sensor, effect.walks)})
+    """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains, that of
+    a walk to what poses do not show."""
+    corner, scatter, excess = _bounded(model.obs, model.within, {(effect.sensor, effect.walks)})
+    accel, gyro = (max(c, DRIFT_CORNER_S) if effect.walks and s == effect.sensor else c for s, c in enumerate(corner))
+    return (accel, gyro), scatter, excess
 
 
 def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:

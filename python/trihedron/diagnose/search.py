@@ -196,14 +196,18 @@ class _Search:
     def _beside_relations(
         self, model: Hypothesis, without: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
-        """Relations without a mechanism; an effect goes where those that are found without it score more."""
+        """Relations without a mechanism; an effect goes where those that are found without it score more, and one of
+        another sensor where it is not needed beside them."""
         best = related(model, self.limit)
         sensors = {one.effect.sensor for one in best.relations}
-        for term, fewer in zip(model.terms, without, strict=True):
+        for k, (term, fewer) in enumerate(zip(model.terms, without, strict=True) if sensors else ()):
             sides = (term.distortion.force, term.distortion.rate)
             # What a relation could stand for has left something on its sensor.
-            if not any(sides[one] is not None for one in sensors):
-                continue
-            if related(fewer, self.limit, best.relations).score > best.score:
+            if any(sides[one] is not None for one in sensors):
+                is_needless = related(fewer, self.limit, best.relations).score > best.score
+            else:
+                beside = again(best.model, [*best.model.terms[:k], *best.model.terms[k + 1 :]])
+                is_needless = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost < self.limit
+            if is_needless:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best

@@ -109,7 +109,7 @@ fn columns_of(
     hypotheses: &[Candidate<'_>],
 ) -> PyResult<Vec<(Distortion, Vec<f64>)>> {
     let each = hypotheses.iter().map(|(force, rate, sizes)| {
-        let effects = distortion(force.as_ref(), rate.as_ref(), session.n_points())?;
+        let effects = distortion(force.as_ref(), rate.as_ref(), session)?;
         sizes_fit(sizes, effects.k)?;
         Ok((effects, sizes.clone()))
     });

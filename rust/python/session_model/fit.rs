@@ -195,7 +195,7 @@ impl SessionFit {
         force: Option<Array3<'py>>,
         rate: Option<Array3<'py>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
+        let effects = distortion(force.as_ref(), rate.as_ref(), &self.session)?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
         // Takes tenths of a millisecond: a thread of its own would take longer to start.

@@ -7,7 +7,7 @@ mod read_out;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use numpy::{
     PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods, ToPyArray,
@@ -27,6 +27,7 @@ use poses::{SessionMoves, SessionPoses, SessionState};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
+type Change<'py> = (Array2<'py>, Array3<'py>);
 /// A value for the accelerometer and one for the gyro.
 type Pair = (f64, f64);
 /// Corner times s, scatter, departure from the line between poses, excess of moves: accelerometer and gyro (gravity and
@@ -54,12 +55,13 @@ struct SessionModel {
 fn distortion(
     force: Option<&Array3<'_>>,
     rate: Option<&Array3<'_>>,
-    n_points: usize,
+    session: &Session,
 ) -> PyResult<Distortion> {
+    let n_points = session.n_points();
     let flat = |name: &str, array: Option<&Array3<'_>>| -> PyResult<Option<(Vec<f64>, usize)>> {
         let Some(array) = array else { return Ok(None) };
         let shape = array.shape();
-        if shape[0] != n_points || shape[1] != 3 {
+        if ![n_points, n_points + session.n_poses()].contains(&shape[0]) || shape[1] != 3 {
             return Err(PyValueError::new_err(format!(
                 "{name} must have shape ({n_points}, 3, k), got ({}, {}, {})",
                 shape[0], shape[1], shape[2]
@@ -90,6 +92,16 @@ fn distortion(
         k,
         sizes: Vec::new(),
     })
+}
+
+/// Changes of one sensor with the matrices that whiten them.
+fn changes_of(given: &Change<'_>) -> PyResult<Vec<(Vector3<f64>, Matrix3<f64>)>> {
+    let (change, white) = (rows3("changes", &given.0)?, given.1.as_array());
+    if white.shape() != [change.len(), 3, 3] {
+        return Err(PyValueError::new_err("changes need as many (3, 3) matrices"));
+    }
+    let whitened = |(i, one)| (one, Matrix3::from_fn(|r, c| white[[i, r, c]]));
+    Ok(change.into_iter().enumerate().map(whitened).collect())
 }
 
 fn strengths_of(given: AllStrengths) -> Strengths {
@@ -135,7 +147,12 @@ impl SessionModel {
     /// `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter that is
     /// expected from its noise inside poses, 0 where there is none.
     #[new]
-    #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter))]
+    /// `change`: of either sensor between the halves of every pose, `(h, 3)` raw, and `(h, 3, 3)` matrices that whiten it.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "named, and a thin seam: each is one part of the session"
+    )]
+    #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter, change=(None, None)))]
     fn new(
         py: Python<'_>,
         gravity: Pair,
@@ -144,6 +161,7 @@ impl SessionModel {
         noise: Pair,
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
         scatter: Option<(Array2<'_>, f64)>,
+        change: (Option<Change<'_>>, Option<Change<'_>>),
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
@@ -171,6 +189,12 @@ impl SessionModel {
             time_s: poses.time_s.clone(),
             force: poses.force.clone(),
             rate: poses.rate.clone(),
+            change: [change.0, change.1]
+                .map(|one| one.as_ref().map(changes_of).transpose())
+                .into_iter()
+                .collect::<PyResult<Vec<_>>>()?
+                .try_into()
+                .unwrap_or([None, None]),
             moves: Arc::clone(&moves.moves),
             noise,
             prior,
@@ -203,7 +227,7 @@ impl SessionModel {
         let mut effects = distortion(
             force_effect.as_ref(),
             rate_effect.as_ref(),
-            self.session.n_points(),
+            &self.session,
         )?;
         if start.effect.len() != effects.k {
             return Err(PyValueError::new_err(format!(

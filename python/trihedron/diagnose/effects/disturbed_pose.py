@@ -97,10 +97,10 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
     dof = np.maximum(np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF)
     out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * dof
-    for halves, sigma in zip(obs.half_means, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
-        if halves is not None and sigma is not None:
+    for change, sigma in zip(obs.half_changes, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
+        if change is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
-            out |= (np.abs(halves[:, 1] - halves[:, 0]) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
+            out |= (np.abs(change) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
     before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
     out[np.intersect1d(before, after)] = True
     return out

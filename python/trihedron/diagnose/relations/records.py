@@ -7,8 +7,9 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.hypothesis import held_out_records
+from trihedron.diagnose.relations.rotations import NOT_TURNED
 from trihedron.diagnose.relations.search import Follows, Related
-from trihedron.diagnose.relations.signals import NOT_TURNED, WORLD_VECTOR
+from trihedron.diagnose.relations.signals import WORLD_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.words import relation_experiment, relation_resembles, words
@@ -34,29 +35,35 @@ def records(found: Related) -> tuple[Relation, ...]:
 
 
 def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
-    effect, sigma = one.effect, sigmas_of(covariance)
-    axes = tuple(one.term.variant.label)
-    # The column of poses without a known previous rotation is no coefficient of the relation.
-    told = [k for k, name in enumerate(effect.names) if name != NOT_TURNED]
-    size, error = (x.reshape(len(axes), -1)[:, told] for x in (value, sigma))
-    names, out = tuple(effect.names[k] for k in told), SENSORS[effect.sensor].unit
-    units = [out if effect.units[k] == "1" else f"({out})/({effect.units[k]})" for k in told]
+    effect, variant, sigma = one.effect, one.term.variant, sigmas_of(covariance)
+    out = SENSORS[effect.sensor].unit
+    coefficients: list[EffectParameter] = []
+    names: list[str] = []
+    axes: list[str] = []
+    for name, size, error, unit in zip(variant.names, value, sigma, variant.units, strict=True):
+        axis, _, variable = name.rpartition(": ")
+        # The column of poses without a known previous rotation is no coefficient of the relation.
+        if variable == NOT_TURNED:
+            continue
+        per = out if unit == "1" else f"({out})/({unit})"
+        coefficients.append(EffectParameter(name, float(size), float(error), per))
+        names.append(variable)
+        axes += [axis] if axis else AXES
+    names, axes = list(dict.fromkeys(names)), list(dict.fromkeys(axes))
+    for shape, (size, unit) in variant.shape.items():
+        coefficients.append(EffectParameter(shape, size, variant.shape_sigma, unit))
     return Relation(
         sensor="gyroscope" if effect.sensor else "accelerometer",
-        depends_on=names,
+        depends_on=tuple(names),
         form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)]),
-        coefficients=tuple(
-            EffectParameter(f"{axis}: {name}", float(size[i, j]), float(error[i, j]), units[j])
-            for i, axis in enumerate(axes)
-            for j, name in enumerate(names)
-        ),
+        coefficients=tuple(coefficients),
         share=share,
         held_out=None,
         resembles=relation_resembles(effect.family),
         experiment=relation_experiment(effect.family),
         statement=words(
             "relation-follows", sensor=SENSORS[effect.sensor].label, is_static=not effect.is_motion, axes=axes,
-            depends=names, share=share,
+            depends=tuple(names), share=share,
         ),
     )  # fmt: skip
 

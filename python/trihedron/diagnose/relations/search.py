@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from trihedron.diagnose.candidates import candidates_beside, with_best
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
-from trihedron.diagnose.relations.signals import Dependence, dependences
+from trihedron.diagnose.relations.dependence import Dependence
+from trihedron.diagnose.relations.signals import dependences
 from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
 from trihedron.records.domains import Domain
 

@@ -8,7 +8,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.relations.signals import Dependence
+from trihedron.diagnose.relations.dependence import Dependence
 from trihedron.diagnose.session.observations import Observations
 
 TELEGRAPH = "telegraph"

@@ -13,12 +13,15 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
+from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
-from trihedron.session.model import Prior, SessionReadings, SessionState
+from trihedron.session.model import Change, Prior, SessionReadings, SessionState
 from trihedron.session.noise import along_gradient, measure_noise
 from trihedron.session.support import Support, support_of
 
+FAR = 3.0
+"""Usual errors beyond which a change inside a pose is a disturbance by hand, not noise."""
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
 have an uncertainty of a fifth."""
@@ -41,6 +44,7 @@ class Observations(SessionReadings):
     ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
     rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
+    ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
     ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
     """
 
@@ -50,6 +54,7 @@ class Observations(SessionReadings):
     time_s: FloatArray
     raw_force: FloatArray
     raw_rate: FloatArray | None
+    half_changes: tuple[FloatArray, FloatArray | None]
     move_ranges: tuple[tuple[int, int], ...]
     move_poses: npt.NDArray[np.intp]
     jitter_s: float = 0.0
@@ -118,28 +123,31 @@ class Observations(SessionReadings):
         poses = self.segments.poses
         ranges = [span for pose in poses for span in pose.undisturbed()]
         owner = [i for i, pose in enumerate(poses) for _ in pose.undisturbed()]
-        return self._means(samples, ranges, owner, len(poses)).reshape(-1, *samples.shape[1:])
-
-    @cached_property
-    def half_means(self) -> tuple[FloatArray, FloatArray | None]:
-        """(poses, 2, 3) raw means over the first and the second half of every pose, accelerometer and gyro."""
-        middles = [(pose.start, (pose.start + pose.stop + 1) // 2, pose.stop) for pose in self.segments.poses]
-        halves = [span for a, b, c in middles for span in ((a, b), (b, c))]
-
-        def of(raw: FloatArray) -> FloatArray:
-            return self._means(raw, halves, range(len(halves)), len(halves)).reshape(-1, 2, 3)
-
-        return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
-
-    @staticmethod
-    def _means(values: FloatArray, ranges: Sequence[tuple[int, int]], owner: Sequence[int], n: int) -> FloatArray:
-        flat = np.ascontiguousarray(values.reshape(len(values), -1))
-        return _core.column_means(flat, np.array(ranges), np.array(owner), n)
+        means = _means(samples, ranges, owner, len(poses))
+        return np.asarray(means.reshape(-1, *samples.shape[1:]))
 
     def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
         """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""
         timing_s = float(self.jitter_s), 1.0 / self.recording.rate_hz
         return self.core_model(gravity_m_s2, self.core_moves, timing_s, prior, is_scatter_free=is_scatter_free)
+
+    @cached_property
+    def changes(self) -> tuple[Change | None, Change | None]:
+        """Of an accelerometer along the vertical: a support that yields rotates gravity across it; of a gyro none where
+        the support yields."""
+        up, (of_force, of_rate) = self.force_up, self.half_changes
+        spread = 2.0 / np.sqrt(np.maximum(self.segments.duration_s, TINY))[:, None]
+        accel: Change | None = None
+        gyro: Change | None = None
+        if up is not None:
+            along = np.nan_to_num(up[0])
+            change = (np.nan_to_num(of_force) * along).sum(axis=1)[:, None]
+            white = _whitening(change, spread * np.sqrt(along**2 @ self.force_density**2)[:, None])
+            accel = change * along, white[:, :, None] * along[:, :, None] * along[:, None, :]
+        if of_rate is not None and self.rate_density is not None and self.support is None:
+            change = np.nan_to_num(of_rate)
+            gyro = change, _whitening(change, spread * self.rate_density)[:, :, None] * np.eye(3)
+        return accel, gyro
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
@@ -161,6 +169,30 @@ class Observations(SessionReadings):
             unresolved=np.array(unresolved).reshape(-1, 4, 3),
             leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
         )
+
+
+def _whitening(change: FloatArray, white: FloatArray) -> FloatArray:
+    """(poses, k) inverse errors of the changes inside the poses, 0 of a missing one: white noise, times what the poses
+    show where that is more, so that they have no more weight than their number; a pose beyond it was disturbed."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        z = np.nan_to_num(np.abs(change / white), posinf=0.0)
+    usual = np.maximum(np.median(z, axis=0) / np.sqrt(MEDIAN_CHI2[1]), 1.0)
+    shown = np.sqrt((np.minimum(z, FAR * usual) ** 2).mean(axis=0))
+    error = white * np.maximum(np.maximum(shown, 1.0), z / FAR)
+    return np.divide(1.0, error, out=np.zeros_like(error), where=z > 0.0)
+
+
+def _means(values: FloatArray, ranges: Sequence[tuple[int, int]], owner: Sequence[int], n: int) -> FloatArray:
+    flat = np.ascontiguousarray(values.reshape(len(values), -1))
+    return _core.column_means(flat, np.array(ranges), np.array(owner), n)
+
+
+def _half_changes(values: FloatArray, segments: Segments) -> FloatArray:
+    """(poses, 3) mean over the second half of every pose less that over the first."""
+    middles = [(pose.start, (pose.start + pose.stop + 1) // 2, pose.stop) for pose in segments.poses]
+    halves = [span for a, b, c in middles for span in ((a, b), (b, c))]
+    means = _means(values, halves, range(len(halves)), len(halves)).reshape(-1, 2, 3)
+    return np.asarray(means[:, 1] - means[:, 0])
 
 
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
@@ -207,6 +239,10 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
+        half_changes=(
+            _half_changes(recording.accelerometer, segments),
+            None if raw_rate is None else _half_changes(raw_rate, segments),
+        ),
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
         **vars(noise),
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),

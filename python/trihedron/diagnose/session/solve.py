@@ -36,7 +36,8 @@ FOLDS = 8
 class Distortion:
     """What effects add to the corrected readings, linear in their parameters: SI, body frame.
 
-    ``force`` and ``rate`` (points, 3, K) or None, at the points of ``Trajectory`` (poses, then move samples).
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of ``Trajectory`` (poses, then move samples). Where
+    they change inside poses, (poses, 3, K) more: the mean over the second half of each less that over the first.
     """
 
     force: FloatArray | None
@@ -64,12 +65,14 @@ def stacked(parts: list[Distortion]) -> Distortion:
 
     def side(name: str) -> FloatArray | None:
         given = [getattr(p, name) for p in parts]
-        present = next((g for g in given if g is not None), None)
-        if present is None:
+        if all(g is None for g in given):
             return None
-        shape = present.shape[:2]
-        blocks = [np.zeros((*shape, p.n_parameters)) if g is None else g for p, g in zip(parts, given, strict=True)]
-        return np.concatenate(blocks, axis=2)
+        n, first = max(len(g) for g in given if g is not None), np.cumsum([0, *(p.n_parameters for p in parts)])
+        out = np.zeros((n, 3, int(first[-1])))
+        for g, a, b in zip(given, first[:-1], first[1:], strict=True):
+            if g is not None:
+                out[: len(g), :, a:b] = g
+        return out
 
     return Distortion(side("force"), side("rate"))
 

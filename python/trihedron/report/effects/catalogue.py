@@ -93,6 +93,10 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             "reach one pose by turns of either sign, small and large, waiting unlike times",
             ("play or slip in a mounting", "memory of the readout"),
         ),
+        "decaying rotation": FamilyWords(
+            "turn by 90° at a time, both ways, and wait half a minute in every pose",
+            ("creep of the sensing element or its mounting", "self-heating"),
+        ),
         "telegraph": FamilyWords(
             "record a static log of an hour: a histogram of means over a second has two peaks",
             ("burst noise (popcorn noise) of the readout",),
@@ -114,7 +118,8 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
             "turn about a level and about a vertical axis at the same rate", ("a drive frame bent by weight",)
         ),
         "scale": FamilyWords(
-            "repeat the session with a warm sensor, and log its temperature", ("a scale that follows the temperature",)
+            "repeat the session with a warm sensor, and log its temperature and its supply voltage",
+            ("a scale that follows temperature or supply", "a mounting that slips"),
         ),
     }
 )
