@@ -98,7 +98,9 @@ fn distortion(
 fn changes_of(given: &Change<'_>) -> PyResult<Vec<(Vector3<f64>, Matrix3<f64>)>> {
     let (change, white) = (rows3("changes", &given.0)?, given.1.as_array());
     if white.shape() != [change.len(), 3, 3] {
-        return Err(PyValueError::new_err("changes need as many (3, 3) matrices"));
+        return Err(PyValueError::new_err(
+            "changes need as many (3, 3) matrices",
+        ));
     }
     let whitened = |(i, one)| (one, Matrix3::from_fn(|r, c| white[[i, r, c]]));
     Ok(change.into_iter().enumerate().map(whitened).collect())
@@ -224,11 +226,7 @@ impl SessionModel {
         sizes: Option<Vec<f64>>,
     ) -> PyResult<SessionFit> {
         let start = self.checked(state)?;
-        let mut effects = distortion(
-            force_effect.as_ref(),
-            rate_effect.as_ref(),
-            &self.session,
-        )?;
+        let mut effects = distortion(force_effect.as_ref(), rate_effect.as_ref(), &self.session)?;
         if start.effect.len() != effects.k {
             return Err(PyValueError::new_err(format!(
                 "{} effect parameters came with {} columns",

@@ -7,53 +7,44 @@ import numpy as np
 from trihedron.arrays import AXES, TINY, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, acting_on
-from trihedron.diagnose.relations.dependence import ALL_AXES, Column, Dependence
+from trihedron.diagnose.relations.dependence import Column, Dependence
 
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
 """Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
-TIME_CONSTANTS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
+TIME_CONSTANTS_S = (1.0, 2.5, 6.0, 15.0)
 """Faster decays are over before a pose is static; slower ones retain the rotation for all of it."""
 LONGEST = 200.0
 """Longest move in time constants that is integrated at once: the exponential of more would overflow."""
 
 
 class Decaying(Dependence):
-    """Dependence on rotations that are forgotten exponentially: ``y' = ω − y / τ``, along the sensor's own axes, or any
-    axis by any other; on their size alike, ``y' = |ω| − y / τ``.
+    """Dependence of every axis on its own rotations, which are forgotten exponentially: ``y' = ω − y / τ``; or on their
+    size, ``y' = |ω| − y / τ``.
 
     The columns are those of the points, then the change between the halves of every pose (eq. 11.2b).
     """
 
     def __init__(self, sensor: int, names: Sequence[str]) -> None:
-        none = np.zeros(0)
-        super().__init__(sensor, "decaying rotation", [(name, none, "rad") for name in names], axes=(ALL_AXES,))
+        super().__init__(sensor, "decaying rotation", [(name, np.zeros(0), "rad") for name in names])
 
     def variants(self, context: Context) -> list[Variant]:
-        return [one for tau_s in TIME_CONSTANTS_S for one in self._at(context, tau_s)]
+        return [self._at(context, tau_s) for tau_s in TIME_CONSTANTS_S]
 
-    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
-        value = float(np.clip(value, 0.5 * TIME_CONSTANTS_S[0], 2.0 * TIME_CONSTANTS_S[-1]))
-        return next(one for one in self._at(context, value) if one.names == variant.names)
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
+        return self._at(context, float(np.clip(value, 0.5 * TIME_CONSTANTS_S[0], 2.0 * TIME_CONSTANTS_S[-1])))
 
-    def _at(self, context: Context, tau_s: float) -> list[Variant]:
+    def _at(self, context: Context, tau_s: float) -> Variant:
         rate = context.axis_rate
         values = forgotten(context, rate if len(self.names) > 1 else np.linalg.norm(rate, axis=1)[:, None], tau_s)
         values[: context.n_points] -= values[: context.obs.n_poses].mean(axis=0)
-        k, own = len(self.names), context.gyro_axes if self.sensor else context.accel_axes
-        whole = acting_on(self.sensor, np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1))
-        parts = [tuple(range(3 * k)), *([tuple(range(0, 3 * k, k + 1))] if k > 1 else [])]
+        columns = context.on_axes(self.sensor, np.broadcast_to(values, (len(values), 3)))
+        names = tuple(f"{axis}: {self.names[k % len(self.names)]}" for k, axis in enumerate(AXES))
         shape = {"time_constant": (tau_s, "s")}
-        return [
-            Variant(
-                whole.of(part), tuple(f"{AXES[i // k]}: {self.names[i % k]}" for i in part), ("rad",) * len(part),
-                shape, f"{len(part)} of {tau_s:.3g} s", part_of=(whole, part),
-            )
-            for part in parts
-        ]  # fmt: skip
+        return Variant(acting_on(self.sensor, columns), names, ("rad",) * 3, shape, f"{tau_s:.3g} s")
 
 
 def decaying(sensor: int) -> list[Dependence]:
-    """Rotations that a sensor forgets: by axis (of a gyro), and their size."""
+    """Rotations that a sensor forgets: their size, and of a gyro its own."""
     out: list[Dependence] = [Decaying(sensor, ["size of the last rotations, decaying"])]
     return out + ([Decaying(1, [f"last rotations about {axis}, decaying" for axis in AXES])] if sensor else [])
 

@@ -13,7 +13,7 @@ from trihedron.diagnose.relations.dependence import Dependence
 KINDS = ((0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (4, 7))
 """Columns that compete: one axis, all axes, all alike, the triad turned (of a gyro: gravity does not show that of an
 accelerometer)."""
-MOST_STEPS = 12
+MOST_STEPS = 8
 """Places of a step that are tried: one that is half a place away still has most of its evidence."""
 
 

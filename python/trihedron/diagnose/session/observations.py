@@ -179,7 +179,7 @@ def _whitening(change: FloatArray, white: FloatArray) -> FloatArray:
     usual = np.maximum(np.median(z, axis=0) / np.sqrt(MEDIAN_CHI2[1]), 1.0)
     shown = np.sqrt((np.minimum(z, FAR * usual) ** 2).mean(axis=0))
     error = white * np.maximum(np.maximum(shown, 1.0), z / FAR)
-    return np.divide(1.0, error, out=np.zeros_like(error), where=z > 0.0)
+    return np.where(z > 0.0, 1.0 / np.maximum(error, TINY), 0.0)
 
 
 def _means(values: FloatArray, ranges: Sequence[tuple[int, int]], owner: Sequence[int], n: int) -> FloatArray:

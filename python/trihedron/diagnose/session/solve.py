@@ -49,8 +49,10 @@ class Distortion:
         return 0 if given is None else int(given.shape[2])
 
     def of(self, part: Sequence[int]) -> Distortion:
-        """Some of its columns."""
-        force, rate = (None if side is None else side[:, :, list(part)] for side in (self.force, self.rate))
+        """Some of its columns; neighbouring ones without a copy."""
+        at = list(part)
+        which = slice(at[0], at[-1] + 1) if at == list(range(at[0], at[-1] + 1)) else at
+        force, rate = (None if side is None else side[:, :, which] for side in (self.force, self.rate))
         return Distortion(force, rate)
 
 

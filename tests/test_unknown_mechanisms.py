@@ -1,0 +1,79 @@
+"""Mechanisms outside the catalogue: unexplained, with a relation that locates them, and no other mechanism's name."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import trihedron
+from diagnosed_session import simulated, with_scatter
+from trihedron.segment import segment_recording
+
+DEG = 131.0
+"""Counts of the gyro per °/s."""
+
+
+@cache
+def session():
+    """A recording with gyro readings about their static mean, its truth, and its poses."""
+    recording, truth = simulated(seed=4)
+    poses = segment_recording(recording).poses
+    still = np.concatenate([recording.gyroscope[p.start : p.stop] for p in poses]).mean(axis=0)
+    return recording, truth, poses, recording.gyroscope - still
+
+
+def found_with(*, force=0.0, rate=0.0, scatter=0.0):
+    recording, truth, poses, _ = session()
+    recording = with_scatter(recording, poses, scatter) if scatter else recording
+    changed = replace(recording, accelerometer=recording.accelerometer + force, gyroscope=recording.gyroscope + rate)
+    return trihedron.diagnose(changed, gravity_m_s2=truth.gravity_m_s2)
+
+
+def test_a_gyro_that_creeps_after_rotations_is_said_so_though_its_bias_differs_from_pose_to_pose():
+    recording, _, _, turning = session()
+    creep, step, tau = np.zeros_like(turning), 1.0 / recording.rate_hz, 3.0
+    for k in range(1, len(creep)):
+        creep[k] = creep[k - 1] * (1.0 - step / tau) + turning[k] * step
+    found = found_with(rate=0.01 * creep, scatter=0.01 * DEG)
+    assert found.verdict == "unexplained"
+    assert {one.id for one in found.effects} <= {"gyro-bias-repeatability"}
+    (relation,) = found.relations
+    assert relation.depends_on == tuple(f"last rotations about {axis}, decaying" for axis in "xyz")
+    *shares, constant = relation.coefficients
+    assert all(abs(one.value - 0.01) < 4.0 * one.std for one in shares)
+    assert constant.value == pytest.approx(tau, rel=0.3)
+
+
+def test_a_scale_of_the_accelerometer_that_steps_is_no_bias_that_differs_from_pose_to_pose():
+    recording, _, _, _ = session()
+    at = 0.45 * recording.time_s[-1]
+    found = found_with(force=recording.accelerometer * [0.0, 0.002, 0.0] * (recording.time_s > at)[:, None])
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    (relation,) = found.relations
+    (size,) = relation.coefficients
+    place = float(relation.depends_on[0].removeprefix("u_y after ").removesuffix(" s"))
+    assert abs(place - at) < recording.time_s[-1] / 8
+    assert abs(size.value) == pytest.approx(0.002 * 9.81, rel=0.2)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_gyro_scale_that_follows_an_unlogged_voltage_has_no_other_name(seed):
+    recording, _, _, turning = session()
+    x, rng = recording.time_s / recording.time_s[-1], np.random.default_rng(seed)
+    course = sum(rng.normal() / k * np.cos(np.pi * k * x + rng.uniform(0.0, 6.0)) for k in range(1, 5))
+    found = found_with(rate=turning * (0.005 * course / np.abs(course).max())[:, None])
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert {one.domain for one in found.remaining if one.disagrees} >= {"moves"}
+    assert found.relations[0].depends_on[0].startswith("w by a slow curve")
+
+
+def test_a_smooth_drift_of_twelve_errors_of_a_pose_is_a_drift():
+    recording, _, poses, turning = session()
+    middle = [a.stop for a, _ in pairwise(poses)]
+    error = np.median([turning[p.start : p.stop].std(axis=0) / np.sqrt(p.stop - p.start) for p in poses], axis=0)
+    assert len(middle) > 15
+    parabola = (2.0 * recording.time_s / recording.time_s[-1] - 1.0) ** 2
+    found = found_with(rate=12.0 * np.outer(parabola, error))
+    assert [one.id for one in found.effects] == ["gyro-bias-drift"]
