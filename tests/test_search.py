@@ -114,6 +114,7 @@ def test_a_relation_beside_the_place_and_the_motion_alone_is_unexplained(named, 
         gains=gains,
         shares=[0.8],
         seen=(),
+        biases=(),
     )
     assert Answer.says_why.fget(answer) is is_explained
 
