@@ -185,18 +185,15 @@ impl SessionModel {
             jitter_s,
             nominal_step_s,
         };
+        let [force_change, rate_change] =
+            [change.0, change.1].map(|one| one.as_ref().map(changes_of).transpose());
         let session = Session {
             gravity: gravity.0,
             earth_up: gravity.1,
             time_s: poses.time_s.clone(),
             force: poses.force.clone(),
             rate: poses.rate.clone(),
-            change: [change.0, change.1]
-                .map(|one| one.as_ref().map(changes_of).transpose())
-                .into_iter()
-                .collect::<PyResult<Vec<_>>>()?
-                .try_into()
-                .unwrap_or([None, None]),
+            change: [force_change?, rate_change?],
             moves: Arc::clone(&moves.moves),
             noise,
             prior,

@@ -45,8 +45,8 @@ class Decaying(Dependence):
 
 def decaying(sensor: int) -> list[Dependence]:
     """Rotations that a sensor forgets: their size, and of a gyro its own."""
-    out: list[Dependence] = [Decaying(sensor, ["size of the last rotations, decaying"])]
-    return out + ([Decaying(1, [f"last rotations about {axis}, decaying" for axis in AXES])] if sensor else [])
+    out: list[Dependence] = [Decaying(sensor, ["size of decaying rotations"])]
+    return out + ([Decaying(1, [f"decaying rotations about {axis}" for axis in AXES])] if sensor else [])
 
 
 def forgotten(context: Context, rate: FloatArray, tau_s: float) -> FloatArray:

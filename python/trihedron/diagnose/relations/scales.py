@@ -58,6 +58,6 @@ def scales_in_time(context: Context, sensor: int) -> list[Dependence]:
     curve = np.cos(np.pi * np.outer(x, COSINES))
     return [
         ScaleInTime(sensor, "over time", [(["over time"], x[:, None])]),
-        ScaleInTime(sensor, "by a slow curve", [([f"by a slow curve, cosine {k}" for k in COSINES], curve)]),
+        ScaleInTime(sensor, "by a slow curve", [([f"times cosine {k} of time" for k in COSINES], curve)]),
         ScaleInTime(sensor, "by a step", steps),
     ]
