@@ -118,6 +118,9 @@ impl StaticMeans {
     }
 }
 
+/// Change of a raw mean from the first to the second half of a pose, and the matrix that whitens it.
+pub type Change = (Vector3<f64>, Matrix3<f64>);
+
 /// Prior of the linear models.
 #[derive(Debug, Clone)]
 pub struct Prior {
@@ -142,8 +145,8 @@ pub struct Session {
     pub force: StaticMeans,
     /// Gyro in static poses.
     pub rate: Option<StaticMeans>,
-    /// Change of either sensor between the halves of every pose, raw, and the matrix that whitens it; `None`: unused.
-    pub change: [Option<Vec<(Vector3<f64>, Matrix3<f64>)>>; 2],
+    /// Of either sensor in every pose; `None`: unused.
+    pub change: [Option<Vec<Change>>; 2],
     /// Moves between neighbouring poses.
     pub moves: Arc<Vec<Move>>,
     /// Noise of the moves' samples.

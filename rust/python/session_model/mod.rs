@@ -21,13 +21,14 @@ use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;
 use crate::session_model::strength_search::Within;
 use crate::session_model::strengths::tune;
-use crate::session_model::{Distortion, N_MODEL, Prior, Session, Strengths};
+use crate::session_model::{Change, Distortion, N_MODEL, Prior, Session, Strengths};
 use fit::SessionFit;
 use poses::{SessionMoves, SessionPoses, SessionState};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
-type Change<'py> = (Array2<'py>, Array3<'py>);
+/// Changes `(h, 3)` of one sensor inside its poses, and `(h, 3, 3)` matrices that whiten them.
+type Changes<'py> = (Array2<'py>, Array3<'py>);
 /// A value for the accelerometer and one for the gyro.
 type Pair = (f64, f64);
 /// Corner times s, scatter, departure from the line between poses, excess of moves: accelerometer and gyro (gravity and
@@ -95,7 +96,7 @@ fn distortion(
 }
 
 /// Changes of one sensor with the matrices that whiten them.
-fn changes_of(given: &Change<'_>) -> PyResult<Vec<(Vector3<f64>, Matrix3<f64>)>> {
+fn changes_of(given: &Changes<'_>) -> PyResult<Vec<Change>> {
     let (change, white) = (rows3("changes", &given.0)?, given.1.as_array());
     if white.shape() != [change.len(), 3, 3] {
         return Err(PyValueError::new_err(
@@ -163,7 +164,7 @@ impl SessionModel {
         noise: Pair,
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
         scatter: Option<(Array2<'_>, f64)>,
-        change: (Option<Change<'_>>, Option<Change<'_>>),
+        change: (Option<Changes<'_>>, Option<Changes<'_>>),
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
