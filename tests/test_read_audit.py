@@ -1,14 +1,17 @@
 """The audit finds what was put into a log, at its place; every row of a file is a reading or in a finding."""
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
 
+import trihedron
+from hand_made_sessions import motion
 from small_session import rows_of as table_of
 from small_session import simulated
 from test_read import HEADER, codes, finding, readings, write
-from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.estimate.gyroscope.common_scale import scale_findings
 from trihedron.read import ReadError, read_recording
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
@@ -245,19 +248,37 @@ def test_a_time_that_is_not_understood_is_refused_instead_of_a_rate_assumed(tmp_
     assert read_recording(path, columns="time=none", rate_hz=50).rate_hz == 50
 
 
+def read_in(unit):
+    return replace(simulated(hand_session(n_poses=2, pose_s=1.0)), gyroscope_unit=unit)
+
+
 def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     S = np.diag([1.74e-4, 1.75e-4, 1.76e-4])
-    (found,) = scale_findings(S, RateUnit.DEG_S)
+    (found,) = scale_findings(S, read_in(RateUnit.DEG_S))
     assert found.severity is Severity.SERIOUS
     assert found.numbers["scale_ratio"] == pytest.approx(0.01, rel=0.01)
-    assert list(scale_findings(100.0 * S, RateUnit.DEG_S)) == []
-    assert list(scale_findings(S, RateUnit.COUNTS)) == []
+    assert list(scale_findings(100.0 * S, read_in(RateUnit.DEG_S))) == []
+    assert list(scale_findings(S, read_in(RateUnit.COUNTS))) == []
+
+
+def test_a_clock_at_half_speed_is_named_once_with_the_options_that_mend_it(tmp_path):
+    """The fit knows the factor better than the reader: one finding, whose options give a log without it."""
+    time_s, force, rate = motion(n_poses=14)
+    table = np.column_stack([time_s / 2.0, force, rate])
+    path = write(tmp_path / "log.csv", table, "t [s],ax,ay,az,gx [rad/s],gy [rad/s],gz [rad/s]\n")
+    found = trihedron.calibrate(read_recording(path), gravity_m_s2=9.80665).findings
+    (said,) = [one for one in found if "right_hz" in one.numbers]
+    assert said.code is FindingCode.SCALE_NOT_NOMINAL
+    assert 'columns="time=none" rate_hz' in said.action
+    mended = read_recording(path, columns="time=none", rate_hz=said.numbers["right_hz"])
+    found = trihedron.calibrate(mended, gravity_m_s2=9.80665).findings
+    assert {FindingCode.SCALE_NOT_NOMINAL, FindingCode.UNIT_CONTRADICTED}.isdisjoint(one.code for one in found)
 
 
 def test_three_gyro_scales_off_by_one_factor_are_a_matter_of_the_timestamps():
     for factor, scatter, n in ((1.1, (0.5, -0.5, 0.2), 1), (1.1, (9.0, -5.0, 1.0), 0), (1.02, (0.1, -0.1, 0.0), 0)):
         S = np.diag(factor * (1.0 + 0.01 * np.array(scatter)))
-        found = list(scale_findings(S, RateUnit.RAD_S))
+        found = list(scale_findings(S, read_in(RateUnit.RAD_S)))
         assert [one.severity for one in found] == [Severity.WARNING] * n
 
 

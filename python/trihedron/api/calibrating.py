@@ -18,7 +18,7 @@ from trihedron.estimate.accelerometer.face_poses import faces_up, shared_roundin
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gravity_circle import opposite_headings
-from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
 from trihedron.estimate.gyroscope.lost_samples import missing_samples
 from trihedron.estimate.gyroscope.measurements import GAP_STEPS
 from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
@@ -162,7 +162,8 @@ def calibrate(
         calibration = on_stated_turns(calibration, recording, segments, turns_deg)
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
-    findings = (*said, *recording.findings, *segments.findings, *_of_fit(calibration, recording, segments))
+    of_fit = _of_fit(calibration, recording, segments)
+    findings = (*said, *without_first_scale(recording.findings, of_fit), *segments.findings, *of_fit)
     calibration = with_static_rate(calibration, segments)
     return _result(calibration, _with_doubtful_columns(findings), segments, recording)
 
@@ -196,12 +197,11 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     fitted = tuple(_timed(one, recording, segments) for one in with_shapes(calibration, segments))
     if gyro is None:
         return fitted
-    relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
-    missing = tuple(missing_samples(recording, segments, median(relative)))
-    of_gyro = (*scale_findings(gyro.S, recording.gyroscope_unit), *sense_findings(calibration, recording, segments))
-    if missing:
-        # Losses detected in the motion are not also possible ones of the fit.
-        fitted = tuple(one for one in fitted if one.code is not FindingCode.LOSSES_POSSIBLE)
+    sigma_scale = median(np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0))
+    missing = tuple(missing_samples(recording, segments, sigma_scale))
+    of_gyro = (*scale_findings(gyro.S, recording), *sense_findings(calibration, recording, segments))
+    # Losses detected in the motion are not also possible ones of the fit.
+    fitted = tuple(one for one in fitted if not (missing and one.code is FindingCode.LOSSES_POSSIBLE))
     return (*fitted, *of_gyro, *missing)
 
 

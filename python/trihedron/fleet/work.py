@@ -15,6 +15,8 @@ from trihedron.records.checked import WrongTypeError
 Row = dict[str, Any]
 REJECTED: tuple[type[Exception], ...] = (*INPUT_ERRORS, WrongTypeError, OSError)
 """Exceptions that mean an unusable log, file or option, not a defect."""
+MISREAD = ("unit-contradicted", "scale-not-nominal")
+"""Findings, where serious, about the unit or clock of a log, whose action reads it again."""
 
 
 def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
@@ -76,7 +78,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         "diagnosis": diagnosis,
         "warnings": sorted(f.code.value for f in findings if f.severity.value == "warning"),
         "serious": sorted(f.code.value for f in findings if f.severity.value == "serious"),
-        "reread": " ".join(f.action for f in findings if f.code.value == "unit-contradicted"),
+        "reread": " ".join(f.action for f in findings if f.severity.value == "serious" and f.code.value in MISREAD),
     }
 
 

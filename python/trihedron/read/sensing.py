@@ -162,6 +162,7 @@ def judge_gyroscope(
                 is_given=given is not None,
                 unit=unit.value,
                 factor=turning.factor(unit),
+                right_hz=turning.rate_hz / turning.factor(unit),
                 percent=turning.percent,
                 correlation=turning.correlation,
             )
@@ -187,6 +188,7 @@ def judge_gyroscope(
             "gyro-no-unit",
             unit=unit.value,
             factor=factor,
+            right_hz=turning.rate_hz / factor,
             percent=percent,
             correlation=correlation,
         )

@@ -52,7 +52,7 @@ class Turning:
     gravity's change with the gyro's prediction, and the number of blocks. ``odd_part`` (from 1; 0: none) of ``PARTS``
     fits only with other axes; ``odd_correlation`` is that with its own axes and that with those of the whole log.
     ``motionless`` (from 0) are gyro axes that read nothing while gravity rotates about them. ``clock_is_weighed``: the
-    unit of whole-numbered timestamps was inferred, not stated."""
+    unit of whole-numbered timestamps was inferred, not stated; ``rate_hz``: the rate at which the log was read."""
 
     scale: float
     sigma: float
@@ -62,6 +62,7 @@ class Turning:
     odd_correlation: tuple[float, float] = (0.0, 0.0)
     motionless: tuple[int, ...] = ()
     clock_is_weighed: bool = False
+    rate_hz: float = math.nan
 
     @property
     def candidates(self) -> tuple[RateUnit, ...]:
@@ -121,7 +122,8 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     is_noise = np.nanstd(w, axis=0) < _STILL * np.nanstd(np.diff(w, axis=0), axis=0) / math.sqrt(2.0)
     # A body's acceleration lasts as long as a move: blocks in succession are one observation of the error.
     starts = np.flatnonzero(np.diff(np.flatnonzero(usable), prepend=-2) > 1)
-    return _fitted(mean_a[usable], mean_w[usable], seen[usable], starts, is_noise, length / rate_hz)
+    found = _fitted(mean_a[usable], mean_w[usable], seen[usable], starts, is_noise, length / rate_hz)
+    return None if found is None else replace(found, rate_hz=rate_hz)
 
 
 @dataclass(frozen=True)

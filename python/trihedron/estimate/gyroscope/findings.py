@@ -11,7 +11,7 @@ from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc, stdtrit
+from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
 from trihedron.records import (
     PARAMETER_NAMES,
     Finding,
@@ -24,12 +24,7 @@ from trihedron.records import (
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import order_and_reversed
 from trihedron.session.noise import NOISE_DOF
-from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
-
-MAX_SCALE_RATIO = 1.5
-"""Ratio to the nominal scale above which the unit or the rate is wrong: MEMS gyros are within 10 % of data sheets."""
-ONE_FACTOR = 0.01
-"""Probability that three scales which differ from axis to axis by chance look like one factor."""
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 
 def findings_of(
@@ -65,29 +60,6 @@ def findings_of(
     # A random walk of b is part of the model; a curve says that b of this log is not b of the next.
     is_curve = solution.has_gyro_drift and _is_material(np.ptp(measured.bias, axis=0), measured)
     yield from drift_findings("drifts" if is_curve else "poses", measured.bias, measured.bias_excess, S)
-
-
-def scale_findings(S: FloatArray, raw_unit: RateUnit) -> Iterator[Finding]:
-    """Finding for a common scale that contradicts the unit of the log: unit, sampling rate or timestamps are wrong."""
-    nominal = rate_to_si(raw_unit)
-    if nominal is None:
-        return
-    each = np.log(np.linalg.norm(S, axis=0) / nominal)
-    common, spread = float(np.mean(each)), float(np.std(each, ddof=1))
-    if not np.isfinite(common):
-        return
-    if abs(common) > np.log(MAX_SCALE_RATIO):
-        yield Finding.of(FindingCode.SCALE_NOT_NOMINAL, "gyro", scale_ratio=np.exp(common), unit=raw_unit.value)
-    # Sensitivities differ from axis to axis; what all three have in common and data sheets exclude may be the time.
-    elif abs(common) > WEAK and abs(common) > -stdtrit(2, ONE_FACTOR / 2.0) * spread / np.sqrt(3.0):
-        yield Finding.of(
-            FindingCode.SCALE_NOT_NOMINAL,
-            "gyro-common",
-            excess=np.expm1(common),
-            spread=spread,
-            nominal=WEAK,
-            unit=raw_unit.value,
-        )
 
 
 def handedness(S: FloatArray, S_accelerometer: FloatArray, recording: Recording | None = None) -> Iterator[Finding]:

@@ -51,9 +51,12 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro", SERIOUS): Words(
-        "The common scale of all gyro axes is {scale_ratio:.4g} although the log is in {unit:unit}.",
-        "The log's time base or rate is wrong by that factor, or its unit is another one.",
-        "Check --time-unit, --rate and --gyro-unit.",
+        "The common scale of all gyro axes, read in {unit:unit}, is {scale_ratio:.4g} (1 where unit and clock are "
+        "right).",
+        "A wrong unit; or, if the unit is right, each time interval lasts {scale_ratio:.4g} times as long as it was "
+        "read.",
+        "{has_fitting:?Read it with --gyro-unit {fitting}; or|Check the clock:} with --columns time=none --rate "
+        "{right_hz:.3g} the scale is 1.",
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro-common", WARNING): Words(
         "all three gyro scales are {excess:+.2g %} off in {unit:unit}; they agree within {spread:.1g %} (1 σ), and "
@@ -229,11 +232,11 @@ _MOVES = {
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
         "{is_far:?The file is of another sensor, unit or frame, or scales|{is_beside:?A pose beside it was not still, "
         "or scales|Scales}} and cross-axis terms have changed since; else samples were lost or the gyro clipped}}}}.",
-        "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check --rate "
-        "and the timestamps against a clock; if they are right, calibrate|{is_bias:?Let the sensor warm up, then "
-        "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?Check that file, sensor and "
-        "unit belong together; if they do, calibrate|See what differs: `trihedron diagnose LOG --calibration FILE`; or "
-        "calibrate}}}}} again near the conditions of use.",
+        "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check the "
+        "clocks of both logs (--columns time=none --rate HZ states a rate); if they are right, calibrate|{is_bias:?Let "
+        "the sensor warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?"
+        "Check that file, sensor and unit belong together; if they do, calibrate|See what differs: `trihedron diagnose "
+        "LOG --calibration FILE`; or calibrate}}}}} again near the conditions of use.",
         or_severity=SERIOUS,
     ),
 }

@@ -10,6 +10,7 @@ _TURNING = (
     "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit:unit} "
     "(1 where the unit is right; correlation {correlation:.2f})"
 )
+_CLOCK = "with --columns time=none --rate {right_hz:.3g}"
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
 _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings are missing."
@@ -67,14 +68,13 @@ _UNITS = {
     (Code.UNIT_CONTRADICTED, "gyro-by-turning", SERIOUS): Words(
         f"The gyro is in {{unit:unit}} {_SOURCE}, but {_TURNING}.",
         "A wrong unit; or, if the unit is right, each time interval lasts {factor:.3g} times as long as it was read.",
-        "{has_fitting:?Read it with --gyro-unit {fitting}; or correct the clock (--time-unit, --rate)|Check the clock "
-        "(--time-unit, --rate): with the rate divided by {factor:.3g} the unit is right}.",
+        f"{{has_fitting:?Read it with --gyro-unit {{fitting}}; or|Check the clock:}} {_CLOCK} the unit is right.",
     ),
     (Code.UNIT_CONTRADICTED, "gyro-no-unit", SERIOUS): Words(
         f"No known gyro unit fits: {_TURNING}.",
         "A time base or rate that is wrong by that factor, or a gyro in counts or a unit of its own.",
-        "Check the clock (--time-unit, --rate): with the rate divided by {factor:.3g} the gyro is in {unit:unit}; if "
-        "the clock is right, state the gyro's unit (--gyro-unit, counts if it has none).",
+        f"Check the clock: {_CLOCK} the gyro is in {{unit:unit}}; if the clock is right, state the gyro's unit "
+        "(--gyro-unit, counts if it has none).",
     ),
     (Code.UNIT_DETECTED, "gyro-counts", NOTE): Words("The gyro's readings are whole numbers and were taken as counts."),
     (Code.UNIT_DETECTED, "gyro-by-turning", NOTE): Words(f"The gyro's unit is {{unit:unit}}: {_TURNING}."),
