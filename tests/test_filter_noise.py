@@ -17,8 +17,8 @@ from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_l
 from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
-from trihedron.estimate.filter_noise.left_over import of_temperature
-from trihedron.estimate.filter_noise.strengths import Prior, _slope, fit, height, most_likely
+from trihedron.estimate.filter_noise.left_over import PARTS, drawn_errors, mean_square, of_temperature
+from trihedron.estimate.filter_noise.strengths import Prior, _slope, bounded, fit, height, most_likely
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, errors_over, parts_of_walk, walked
 from trihedron.estimate.filter_noise.stretches import bias_steps, velocity_stretches
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
@@ -369,3 +369,15 @@ def test_tilt_errors_far_above_their_prediction_make_static_values_untrustworthy
     assert not list(too_sure(TiltCheck(20, 3.0, 2e-4, 1e-4)))
     (found,) = too_sure(TiltCheck(20, 3.0, 13e-4, 1e-4))
     assert found.severity is Severity.SERIOUS
+
+
+def test_a_parameter_error_that_noise_explains_has_an_upper_limit_and_no_share():
+    """Squares of estimates of nothing add up to more than nothing; an error of five sigma is seen."""
+    rng, sigma, step = np.random.default_rng(6), 0.02, np.eye(9)[None, :3]
+    cov = sigma**2 * np.eye(9)
+    limits = [
+        bounded(mean_square(step, drawn_errors(size * sigma + sigma * rng.normal(size=9), cov, PARTS))).is_limit
+        for size in [0.0] * 20 + [5.0] * 5
+    ]
+    assert sum(limits[:20]) >= 19
+    assert not any(limits[20:])

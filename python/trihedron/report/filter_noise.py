@@ -195,7 +195,7 @@ def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
     rows = tuple((CAUSE_WORDS[s.cause][0], *(_percent(by[s.cause, h]) for h in horizons)) for s in ranked)
     head = (f"share of the {one.sensor}'s error", *(f"{plain_number(h)} s [%]" for h in horizons))
     # Measures that reduce the three largest shares.
-    named = (CAUSE_WORDS[share.cause] for share in ranked[:3])
+    named = (CAUSE_WORDS[share.cause] for share in ranked[:3] if share.share.upper > 0.0)
     advice = Facts(tuple((f"less {cause}", action) for cause, action in named))
     caption = f"Shares of the mean square error with 95 % intervals, the largest over {ranked[0].horizon_s:g} s first; "
     caption += "each is estimated by itself: they need not add up to 100 %"
@@ -203,6 +203,8 @@ def _shares(one: SensorFilterNoise) -> tuple[Table, Facts]:
 
 
 def _percent(one: Bounded) -> str:
+    if one.upper == 0.0:
+        return "none"
     value, lower, upper = (plain_number(100 * share, 2) for share in (one.value, one.lower, one.upper))
     return f"below {upper}" if one.is_limit else f"{value} ({lower} … {upper})"
 

@@ -16,10 +16,11 @@ from trihedron.session.drift import LEAST_SWING_K
 
 Left = dict[float, dict[Cause, FloatArray]]
 """Mean squares (k,) [rad²] by horizon and cause."""
-SIZES = np.geomspace(1e-5, 0.1, 33)
-"""Sizes tried for the error of the elements of S."""
+SIZES = np.append(0.0, np.geomspace(1e-5, 0.1, 33))
+"""Sizes tried for the error of the elements of S; without 0 the draws of an error that noise explains would exclude 0,
+as squares add up."""
 G_SENSITIVITY = "gyro-g-sensitivity"
-PARTS = np.geomspace(1e-2, 10.0, 33)
+PARTS = np.append(0.0, np.geomspace(1e-2, 10.0, 33))
 """Sizes tried for the g-sensitivity, in units of the data sheets' typical value."""
 FLAT = 1e-2
 """Fraction of the prior's information that stays when a prior is removed, so that the covariance is invertible."""
