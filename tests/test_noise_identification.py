@@ -11,6 +11,7 @@ from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.selection import binned
+from trihedron.estimate.noise.slow_changes import warm_up
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.files.noise import noise_figures
 from trihedron.records.finding import FindingCode, Severity
@@ -144,9 +145,19 @@ def test_a_unit_that_is_turned_over_during_the_log_is_named_with_the_stretch_to_
     (said,) = [one for one in identify_noise(x, 10.0, **named).findings if one.code is FindingCode.LOG_TURNED]
     stop_s = said.numbers["stop_s"]
     assert 1150.0 < stop_s <= 1200.0
-    assert said.action.endswith(f"with --exclude {stop_s:.0f}:.")
+    assert said.action.endswith(f"--exclude {stop_s:.0f}:`.")
     whole = identify_noise(x, 10.0, **named, exclude_s=[(stop_s, np.inf)])
     assert whole.has_slow_noise_only
+
+
+def test_a_warm_up_hundreds_of_times_the_noise_leaves_no_walk():
+    """A time constant that is off by per cents, as between two that are tried, would leave many times the flicker."""
+    rng = np.random.default_rng(3)
+    t = np.arange(36_000) / 10.0
+    for time_s in (372.0, 403.0):
+        found = warm_up(rng.normal(size=len(t)) - 100.0 * np.exp(-t / time_s), 10.0)
+        assert found.time_s == pytest.approx(time_s, rel=2e-3)
+        assert found.size == pytest.approx(100.0, rel=2e-3)
 
 
 def test_a_log_too_short_for_what_its_filter_leaves_is_refused_with_a_length():

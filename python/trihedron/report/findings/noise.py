@@ -49,8 +49,8 @@ _LOG = {
         "The unit was turned by {turn_rad:.2g !deg}°, and B, K and R contain the turn; the longest interval "
         "in one direction is {start_s:.0f} to {stop_s:.0f} s.",
         "it was turned over, or its support tilted, during a log that should be static.",
-        "For B, K and R take one direction alone, with"
-        "{is_first:?| --exclude :{start_s:.0f}}{is_last:?| --exclude {stop_s:.0f}:}.",
+        "For B, K and R take one direction alone: `trihedron allan LOG"
+        "{is_first:?| --exclude :{start_s:.0f}}{is_last:?| --exclude {stop_s:.0f}:}`.",
     ),
     (Code.TWO_LEVELS, "", WARNING): Words(
         "The level switches between two values: {axes:each; }. B, K and R describe the switching, no noise of theirs.",
@@ -150,7 +150,8 @@ _TERMS = {
         "The level changes by {drift:.3g} {unit:unit} with a time constant of {time_s:.3g} s"
         f"{_HEATED}; that was subtracted.",
         "warming up.",
-        f"The terms are those of the sensor once warm; leave off the first minutes{_OR_LOGGED}.",
+        "N is that of the sensor; B and K contain what the curve leaves of the warm-up. For those of the warm sensor "
+        f"leave off three time constants (`trihedron allan LOG --exclude :SECONDS`){_OR_LOGGED}.",
     ),
     (Code.LOG_DRIFT, "wave", WARNING): Words(
         "The slow changes are a wave of period {period_s:.3g} s, amplitude {amplitude:.2g} {unit:unit}, which was "
