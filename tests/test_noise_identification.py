@@ -150,6 +150,15 @@ def test_a_unit_that_is_turned_over_during_the_log_is_named_with_the_stretch_to_
     assert whole.has_slow_noise_only
 
 
+def test_a_move_at_the_end_is_excluded_from_the_axes_that_show_less_of_it(quiet):
+    moved = np.column_stack([quiet, quiet[::-1]])
+    moved[-300:, 0] += 0.1 * np.random.default_rng(4).normal(size=300)
+    moved[-200:, 1] += 0.1 * np.random.default_rng(5).normal(size=200)
+    alone, both = identify_noise(moved[:, 1], RATE), identify_noise(moved, RATE)
+    assert both.excluded_s[-1][0] < alone.excluded_s[-1][0]
+    assert both.axes[1].n_samples == both.axes[0].n_samples < alone.axes[0].n_samples
+
+
 def test_a_warm_up_hundreds_of_times_the_noise_leaves_no_walk():
     """A time constant that is off by per cents, as between two that are tried, would leave many times the flicker."""
     rng = np.random.default_rng(3)

@@ -204,3 +204,16 @@ def test_the_gyros_scale_by_rotating_gravity_is_exact_for_quick_turns_and_its_un
         z.append((found.scale / np.cbrt(np.linalg.det(own)) - 1.0) / (found.sigma / found.scale))
     # Errors of the uncalibrated accelerometer are one per unit, not one per block.
     assert np.sqrt(np.mean(np.square(z))) < 2.0
+
+
+def test_the_one_move_of_a_static_log_decides_no_unit():
+    """Where a body is picked up the accelerometer shows its acceleration, too: no other move confirms the scale."""
+    rng, n = np.random.default_rng(2), 30_000
+    rate = np.zeros((n, 3))
+    rate[-150:, 1] = np.sin(np.linspace(0.0, np.pi, 150))
+    angle = np.cumsum(rate[:, 1]) / RATE_HZ
+    a = 9.81 * np.column_stack([np.sin(2.8 * angle), np.zeros(n), np.cos(2.8 * angle)]) + 0.01 * rng.normal(size=(n, 3))
+    w = -rate + 1e-3 * rng.normal(size=(n, 3))
+    found = turning_of(a, w, RATE_HZ)
+    assert found.correlation > 0.5
+    assert not found.is_clear

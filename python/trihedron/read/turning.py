@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.units import RateUnit, rate_to_si
 
 USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
@@ -29,6 +29,8 @@ PARTS, _FEWEST, _FEWEST_CHANGES = 4, 50, 9.0
 that hold its changes of gravity, which are to determine nine elements: with a single one other axes fit as well."""
 _AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
 """A part has other axes if they correlate so well, and the axes of the whole log leave 4 times the unexplained part."""
+_MOST_SIGMA = 0.25
+"""Largest relative σ of a scale that tells units a factor 17 apart: four of it and ``TOLERANCE`` are a factor 3.4."""
 _STILL, _ONE_SIDED = 2.0, 4.0
 """A channel is motionless if its blocks scatter less than twice as much as their differences imply, and of the change
 of gravity that the others leave, 4 times as much is a rotation about its axis as is not."""
@@ -71,8 +73,11 @@ class Turning:
 
     @property
     def is_clear(self) -> bool:
-        """Whether both sensors measured the same rotation: correlation above 0.5 and above five standard errors."""
-        return self.correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(self.n, 1)))
+        """Whether both sensors measured the same rotation, in more than one move: correlation above 0.5 and above five
+        standard errors, and a scale known well enough to tell units."""
+        return self.correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(self.n, 1))) and (
+            self.sigma < _MOST_SIGMA * self.scale
+        )
 
     @property
     def percent(self) -> float:
@@ -194,8 +199,10 @@ def _fitted(
     turning, axes = found
     predicted = step_s * np.cross(a, w @ axes.T)
     left = seen - turning.scale * predicted
-    of_moves = np.add.reduceat(np.sum(predicted * left, axis=1), starts)
-    spread = float(np.linalg.norm(of_moves) / np.sum(predicted**2))
+    power, along = (np.add.reduceat(np.sum(predicted * other, axis=1), starts) for other in (predicted, seen))
+    # Jackknife: what one move alone determines, the others do not confirm.
+    without = (along.sum() - along) / np.maximum(power.sum() - power, TINY)
+    spread = float(np.std(without) * math.sqrt(len(power) - 1))
     turning = replace(turning, sigma=max(turning.sigma, spread))
     still = [k for k in range(3) if is_noise[k] and len(a) >= _FEWEST and _turns_about(axes[:, k], a, left)]
     turning = replace(turning, motionless=tuple(still))

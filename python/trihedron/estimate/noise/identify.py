@@ -110,12 +110,24 @@ def identify_noise(
     if repeated > 0.001:
         findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
 
-    def screened(c: int) -> _Screened:
-        return _screen(readings[:, c], rate_hz, excluded, (names[c], units[c]), heat, automatic=automatic)
+    def undisturbed(c: int) -> _Undisturbed:
+        column = np.array(readings[:, c], dtype=np.float64)
+        _leave_out(column, excluded)
+        if not np.any(np.isfinite(column)):
+            raise InputError(f"{names[c]} holds no finite reading outside the excluded stretches")
+        return _without_events(column, rate_hz, units[c]) if automatic else _Undisturbed(column, [], [], [])
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
+        quiet = list(pool.map(undisturbed, range(channels)))
+        cuts = merged([*excluded, *(cut for one in quiet for cut in one.cuts)])
+        # What moves one axis of a body disturbs the others, less visibly: an interval is excluded from all.
+        for one in quiet:
+            _leave_out(one.column, cuts)
+
+        def screened(c: int) -> _Screened:
+            return _screen(quiet[c], rate_hz, (names[c], units[c]), heat, automatic=automatic)
+
         seen = list(pool.map(screened, range(channels)))
-        cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
         if cuts:
             total = sum(b - a for a, b in cuts)
             findings.append(
@@ -143,13 +155,22 @@ def identify_noise(
 
 
 @dataclass(frozen=True, eq=False)
+class _Undisturbed:
+    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings."""
+
+    column: FloatArray
+    cuts: list[tuple[int, int]]
+    steps: list[Event]
+    findings: list[Finding]
+
+
+@dataclass(frozen=True, eq=False)
 class _Screened:
-    """One channel with excluded intervals and events as NaN, the automatic ``cuts``, the ``steps`` of its level, and
-    the share of its slow changes that the temperature explains."""
+    """One channel with excluded intervals as NaN, the ``steps`` of its level, and the share of its slow changes that
+    the temperature explains."""
 
     column: FloatArray
     blank: NoiseAxis
-    cuts: list[tuple[int, int]]
     steps: list[Event]
     share_of_heat: float
 
@@ -167,42 +188,35 @@ def _heat(temperature: FloatArray, n: int) -> FloatArray | None:
     return np.interp(np.arange(n), there, temperature[there, 0]) if len(there) else None
 
 
+def _leave_out(column: FloatArray, stretches: Sequence[tuple[int, int]]) -> None:
+    for start, stop in stretches:
+        column[start:stop] = np.nan
+
+
+def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturbed:
+    """A channel's impacts and intervals of vibration, to be excluded, and its steps."""
+    steps, impacts = steps_and_impacts(bridged(column))
+    calm = column.copy() if impacts else column
+    _leave_out(calm, [(impact.start, impact.stop) for impact in impacts])
+    shocks = shaken(calm, rate_hz)
+    # Steps during shaking are part of it.
+    steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
+    findings = list(remarks.events(steps, impacts, shocks, rate_hz, unit))
+    cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
+    share = sum(stop - start for start, stop in cuts) / len(column)
+    if share > MOST_DISTURBED:
+        # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
+        findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
+        steps, cuts = [], []
+    return _Undisturbed(column, cuts, steps, findings)
+
+
 def _screen(
-    readings: FloatArray,
-    rate_hz: float,
-    excluded: Sequence[tuple[int, int]],
-    named: tuple[str, str],
-    heat: FloatArray | None,
-    *,
-    automatic: bool,
+    quiet: _Undisturbed, rate_hz: float, named: tuple[str, str], heat: FloatArray | None, *, automatic: bool
 ) -> _Screened:
     """A channel, ``named`` by its name and unit, beside the logged temperature (n,)."""
     name, unit = named
-    column = np.array(readings, dtype=np.float64)
-    for start, stop in excluded:
-        column[start:stop] = np.nan
-    if not np.any(np.isfinite(column)):
-        raise InputError(f"{name} holds no finite reading outside the excluded stretches")
-    steps: list[Event] = []
-    cuts: list[tuple[int, int]] = []
-    findings: list[Finding] = []
-    if automatic:
-        steps, impacts = steps_and_impacts(bridged(column))
-        calm = column.copy() if impacts else column
-        for impact in impacts:
-            calm[impact.start : impact.stop] = np.nan
-        shocks = shaken(calm, rate_hz)
-        # Steps during shaking are part of it.
-        steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
-        findings += remarks.events(steps, impacts, shocks, rate_hz, unit)
-        cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
-        share = sum(stop - start for start, stop in cuts) / len(column)
-        if share > MOST_DISTURBED:
-            # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
-            findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
-            steps, cuts = [], []
-        for start, stop in cuts:
-            column[start:stop] = np.nan
+    column, steps, findings = quiet.column, quiet.steps, quiet.findings
     breaks = [0.5 * (e.start + e.stop) for e in steps]
     share = 0.0 if heat is None else share_of_temperature(column, heat, breaks)
     if automatic and not steps and share <= MOSTLY:
@@ -211,7 +225,7 @@ def _screen(
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
-    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), cuts, steps, share)
+    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, share)
 
 
 def _level(column: FloatArray, rate_hz: float, unit: str, heat: FloatArray | None) -> list[Finding]:
