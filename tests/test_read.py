@@ -189,6 +189,10 @@ def test_a_rate_in_the_preamble_is_used_and_a_contradicting_clock_is_said(tmp_pa
     assert recording.rate_hz == pytest.approx(100, rel=1e-9)
     assert FindingCode.RATE_CONTRADICTED in codes(recording)
     assert read_recording(path, rate_hz=120, columns="time=none").rate_hz == pytest.approx(120, rel=1e-9)
+    # So is a unit that makes a rate which no sensor has.
+    said = finding(read_recording(path, time_unit="ms"), FindingCode.RATE_CONTRADICTED)
+    assert "100000 Hz" in said.seen
+    assert said.severity is Severity.SERIOUS
 
 
 @pytest.mark.parametrize(

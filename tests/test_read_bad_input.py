@@ -67,6 +67,7 @@ CASES = {
     "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
     "json": (b'{"accel": [[1, 2, 3]]}', "this JSON.*from Python"),
     "json-list": (b'[{"t": 0}]', "this JSON"),
+    "json-matrix": (b'{"acc": {"S": [[1, 2, 3], [0, 1, 2], [0, 0, 1]], "b": [1, 2, 3]}}', "this JSON is no log"),
     "video": (b"\x00\x00\x00\x18ftypmp42" + bytes(500), "a video.*GPMF"),
     "7z": (b"7z\xbc\xaf\x27\x1c" + bytes(500), "7-Zip archive.*unpack"),
     "xml": (b"<?xml version='1.0'?><a/>", "XML"),

@@ -286,8 +286,10 @@ def require_poses(recording: Recording, segments: Segments) -> None:
         grave = next((one for one in (*of_log, *segments.findings) if one.severity is not Severity.NOTE), None)
         is_count = grave is not None and grave.code in COUNTS_OF_POSES
         why = [] if is_count else [f"Poses found: {segments.n_poses}."]
-        why += [] if grave is None else [grave.seen, *([grave.action] if of_log else [])]
-        raise InputError(
-            f"{recording.source}: {' '.join(why)} Hold the sensor still for 3 to 5 seconds in each of 18 or more "
-            "different poses; `trihedron segment LOG` shows what was seen."
-        )
+        if grave is not None:
+            why += [grave.seen, grave.action] if of_log else [grave.seen]
+            why += [grave.cause] if grave.code is FindingCode.NOT_STATIC else []
+        if grave is None or grave.code is not FindingCode.RATE_CONTRADICTED:
+            why.append("Hold the sensor still for 3 to 5 seconds in each of 18 or more different poses;")
+            why.append("`trihedron segment LOG` shows what was seen.")
+        raise InputError(f"{recording.source}: {' '.join(why)}")

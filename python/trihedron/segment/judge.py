@@ -139,8 +139,13 @@ def judge_log(
     found: list[Finding] = []
     duration = recording.duration_s
     if not runs:
-        found.append(Finding.of(FindingCode.NOT_STATIC, duration_s=duration, poses=0, least_s=LEAST_POSE_S))
-        return found
+        is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in recording.findings)
+        is_short = duration < POSES_FOR_NINE * LEAST_POSE_S
+        said = Finding.of(
+            FindingCode.NOT_STATIC, rows=recording.n_samples, duration_s=duration, poses=0, least_s=LEAST_POSE_S,
+            is_assumed=is_assumed, is_short=is_short,
+        )  # fmt: skip
+        return [said]
     # Shorter ranges are the ends of moves.
     turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(LEAST_POSE_S)]
     if turns:

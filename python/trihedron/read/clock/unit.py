@@ -93,7 +93,9 @@ def time_unit(
 ) -> str:
     """Unit of timestamps (n,) in order: given, named, from their date, or the most likely, stated as a finding."""
     if given is not None:
-        return parse_time_unit(given)
+        unit = parse_time_unit(given)
+        _weigh_given(raw, unit, named, findings)
+        return unit
     if named and named != TICKS:
         return named
     n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
@@ -125,6 +127,19 @@ def time_unit(
     tick_s = {"weighed_tick_s": SECONDS[choice]} if choice != "s" and not dated else {}
     findings.append(_statement(usual, choice, sure, possible, tick_s))
     return choice
+
+
+def _weigh_given(raw: FloatArray, unit: str, named: str, findings: list[Finding]) -> None:
+    """A finding where the unit that was given makes a rate that no sensor has."""
+    span_s = float(raw[-1] - raw[0]) * seconds_of(unit)
+    rate_hz = (len(raw) - 1) / span_s if span_s > 0.0 else 0.0
+    if rate_hz and not PLAUSIBLE_HZ[0] <= rate_hz <= PLAUSIBLE_HZ[1]:
+        is_named = bool(named) and named != unit
+        said = Finding.of(
+            FindingCode.RATE_CONTRADICTED, "time-unit", unit=unit, rows=len(raw), span_s=span_s, rate_hz=rate_hz,
+            is_named=is_named, named=named if is_named else "s",
+        )  # fmt: skip
+        findings.append(said)
 
 
 def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness) -> dict[str, float]:

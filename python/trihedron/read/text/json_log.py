@@ -14,6 +14,8 @@ from trihedron.arrays import AXES
 from trihedron.read.errors import ReadError
 from trihedron.read.text.dialect import Rewritten
 
+_FEWEST_ROWS = 4
+"""Three rows of three are a matrix of a calibration."""
 _TIMESTAMPS = ("timestamp", "time", "t")
 
 
@@ -38,10 +40,10 @@ def of_json(path: Path, text: str) -> Rewritten:
     except RecursionError:
         raise ReadError(f"{path}: this JSON nests too deep to be a log.") from None
     names = list(dict.fromkeys(name for row in rows for name in row))
-    if len(rows) < 2 or len(names) < 3:
+    if len(rows) < _FEWEST_ROWS or len(names) < 3:
         raise ReadError(
-            f"{path}: this JSON contains no rows of readings known here; write them as one object per line, or "
-            "pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
+            f"{path}: this JSON is no log: it contains no rows of readings known here (parameters and matrices are "
+            "none); write them as one object per line, or pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
         )
     body = [",".join(_cell(row.get(name)) for name in names) for row in rows]
     numbers = list(range(1, len(rows) + 1)) if lines is None else lines

@@ -65,6 +65,12 @@ _TIMESTAMPS = {
         "ms, us or ns; --rate HZ if the column counts rows.",
         numbers=("rate_hz",),
     ),
+    (Code.RATE_CONTRADICTED, "time-unit", SERIOUS): Words(
+        "Read in {unit:unit} as given, the time column makes {rows:# row} in {span_s:.3g} s, {rate_hz:.6g} Hz"
+        "{is_named:?, though its name says {named:unit}|}.",
+        "A wrong --time-unit.",
+        "Drop --time-unit, or give the unit in which the rate is that of the sensor.",
+    ),
     (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(
         "SampleTimeFine increases by {step:.6g}, so it counts microseconds, as Movella DOT does."
     ),

@@ -38,9 +38,10 @@ ENTRIES = {
         "used}.",
     ),
     (Code.NOT_STATIC, "", SERIOUS): Words(
-        "No pose of {least_s:.2g} s or more in {duration_s:.1f} s of log.",
-        "The sensor was moving, or held in the hand, all the time; or the log is too short, as a table of means of "
-        "poses is: the readings themselves are needed.",
+        "No pose of {least_s:.2g} s or more in {rows:# row}, {duration_s:.1f} s of log{is_assumed:? at an assumed rate "
+        "(no time column)|}.",
+        "{is_short:?The log is too short, as a table of means of poses is: the readings themselves are needed|The "
+        "sensor was moving, or held in the hand, all the time}.",
         "Log again: put the case down for several seconds in each pose.",
         numbers=("poses",),
     ),
