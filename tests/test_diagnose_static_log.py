@@ -84,6 +84,19 @@ def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
     assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
 
 
+def test_a_warm_up_is_a_curve_in_counts_as_in_si():
+    """The size of a count is unknown: its drift is neither implausible nor a walk for it."""
+    t, accelerometer, gyroscope = still(30000, 10.0, 49)
+    gyroscope[:, 1] += 0.02 * np.exp(-t / 350.0)
+    log = Recording.from_arrays(t, accelerometer, np.rint(gyroscope / 1e-4), gyroscope_unit="counts")
+    d = trihedron.diagnose(log, gravity_m_s2=9.8)
+    (effect,) = d.effects
+    assert effect.statement.startswith("The gyro bias drifts smoothly")
+    held = next(one for one in effect.held_out if one.domain == "static-gyro")
+    assert held.rms_after < 0.1 * held.rms_before
+    assert not any(one.disagrees for one in d.remaining)
+
+
 def test_a_hum_in_a_static_log_is_named():
     t, accelerometer, gyroscope = still(15000, 100.0, 47)
     gyroscope[:, 0] += 0.04 * DEG * np.sin(2.0 * np.pi * 17.3 * t)

@@ -120,22 +120,24 @@ def _judged(
 ) -> _Side:
     plain = _session(obs, pieces, model, gravity_m_s2, sensor)
     kinds = [by_id()[f"{SENSORS[sensor].prefix}-{name}"] for name in ("thermal-bias", "bias-drift")]
-    found = search(plain, alpha, [_aside(one, sensor, pieces) for one in kinds])
+    unit, drift = _unit(obs.recording, model, sensor), kinds[1]
+    assert isinstance(drift, BiasDrift)
+    # The size of a count is unknown: that with which the biases change as those of a usual part do.
+    changes = plain.fitted.obs.pose_rate
+    count = drift.typical / max(rms_of(changes), TINY) if unit == "counts" and changes is not None else 1.0
+    found = search(plain, alpha, [_aside(one, sensor, pieces, count) for one in kinds])
     known, terms = found.model, found.model.terms
     # What a curve of temperature or time leaves changes slowly too: no further cause is named for it.
     processes = [] if terms else bias_strengths(known, alpha)[0]
     walks = [one for one in processes if one.effect.sensor == GYRO and one.effect.walks]
     every = residuals_before_after(plain.fitted, known.fitted, {GYRO} if walks else ())
     shown = next(one for one in every if one.domain == DOMAINS[GYRO])
-    unit = _unit(obs.recording, model, sensor)
     explained = float(np.clip(1.0 - (shown.after**2).sum() / (shown.before**2).sum(), 0.0, 1.0))
     gains = [*found.gains, *(one.gain for one in walks)]
     candidates = [tried_candidate(one, found.against.get(key), "") for key, one in found.tried.items()]
     candidates += [Candidate(key, None, False, reason) for key, reason in found.missing.items()]
     made = [_of_term(found, k, obs, shown, unit) for k in range(len(terms))]
     candidates += [Candidate(one.id, p, True, "", one.delta_bic, size) for one, p, size in made]
-    drift = kinds[1]
-    assert isinstance(drift, BiasDrift)
     records = [*(one for one, *_ in made), *(_of_walk(known, one, drift, shown, unit) for one in walks)]
     named = [
         _of_sensor(one, sensor, unit, explained * gain / max(sum(gains), TINY))
@@ -202,8 +204,9 @@ def _session(
     return hypothesis(aside, aside.at_means(gravity_m_s2, of_gravity, np.zeros(3), of_sensor), prior)
 
 
-def _aside(effect: Effect, sensor: int, pieces: StaticPieces) -> Effect:
-    """An effect whose columns, about their mean in every orientation, are those of the sensor in the gyro's place."""
+def _aside(effect: Effect, sensor: int, pieces: StaticPieces, count: float) -> Effect:
+    """An effect whose columns, about their mean in every orientation, are those of the sensor in the gyro's place; a
+    unit of its readings is ``count`` in SI."""
     kind: Any = type(effect)
 
     def turned(variant: Variant | None) -> Variant | None:
@@ -213,11 +216,12 @@ def _aside(effect: Effect, sensor: int, pieces: StaticPieces) -> Effect:
         assert columns is not None
         return replace(variant, distortion=Distortion(None, pieces.about_orientations(columns)))
 
-    def is_plausible(self: Effect, variant: Variant, *fitted: FloatArray) -> bool:
+    def is_plausible(self: Effect, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         own = variant.distortion if sensor == GYRO else Distortion(variant.distortion.rate, None)
-        return bool(kind.is_plausible(self, replace(variant, distortion=own), *fitted))
+        return bool(kind.is_plausible(self, replace(variant, distortion=own), count * value, count**2 * covariance))
 
     own = {
+        "sizes": lambda self, context, variant: kind.sizes(self, context, variant) / count,
         "variants": lambda self, context: [turned(one) for one in kind.variants(self, context)],
         "reshaped": lambda self, context, variant, value: turned(kind.reshaped(self, context, variant, value)),
         "is_plausible": is_plausible,
@@ -253,7 +257,9 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
 
     A bias that walks is no disagreement by itself: without an effect nothing contradicts the model.
     """
-    z = x / shown.sigma_before[:, None]
+    # Flicker and walk make neighbouring pieces differ by more than white noise: no missing effect.
+    beside = np.sqrt(0.5 * np.mean(np.diff(shown.after, axis=0) ** 2, axis=0))
+    z = x / np.maximum(shown.sigma_before[:, None], beside)
     chi2 = float(np.mean(z**2))
     p = float(np.exp(-1.5 * max(chi2 - 1.0, 0.0))) if is_named else 1.0
     where = Where(("ag"[sensor] + AXES[int(z.std(axis=0).argmax())],)) if is_named else Where()
