@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.channel_facts.quiet import look
 from trihedron.errors import InputError
 from trihedron.estimate.gravity_error import static_force
@@ -152,7 +152,8 @@ def _static_force(force: FloatArray | None, rate_hz: float, known: Calibration) 
     norm = math.nan if force is None else static_norm(force, windows)
     if windows is None or not math.isfinite(norm):
         return ()
-    return (static_force(known, norm, windows.quiet_mean("accelerometer")),)
+    noise = rms_of(windows.quiet_noise("accelerometer")) / math.sqrt(windows.length)
+    return (static_force(known, norm, windows.quiet_mean("accelerometer"), noise),)
 
 
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:

@@ -115,7 +115,7 @@ ENTRIES = {
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
         "{is_offset:?Gravity or the unit is another here, or all scales have changed (temperature, supply)|{is_far:?"
         "The file is of another sensor, range or unit, or biases|Biases} and scales have changed since (temperature, "
-        "shock, supply)}}}}.",
+        "shock, supply){is_far:?|, or the file is of another device}}}}}.",
         "{is_single:?Look at pose {worst_pose}; if it was static, calibrate|{is_bias:?Let the sensor warm up, then "
         "calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_offset:?Check gravity (--gravity, "
         "--latitude) and unit; if both are right, calibrate|{is_far:?Check that file, sensor and unit belong together; "

@@ -7,7 +7,7 @@ ENTRIES = {
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
         "both uncertainties and the bias drift in this log allow, {first:ids} by {times_sigma:.0f} σ; log − file: "
         "{parameters:each}.",
-        "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
+        "A calibration shift between sessions (temperature, shock, bias repeatability), or a file of another device.",
         "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
         "each.",
         numbers=("n_others",),
