@@ -14,6 +14,7 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
+from trihedron.arrays import TINY, rms_of
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
@@ -26,6 +27,7 @@ from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 BYS: tuple[By, ...] = get_args(By)
 LEFT_BY_S_AND_B = (
@@ -140,6 +142,13 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
         for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
             one = session.name, warned[code], as_arguments(result.recording.source)
             doubted.setdefault(code, []).append(one)
+    stated = {FindingCode.CLIPPING, *doubted}
+    also = [
+        (session.name, list(dict.fromkeys(f.code.value for f in result.findings if _is_other(f, stated))))
+        for result, session in zip(results, sessions, strict=True)
+    ]
+    if any(codes for _, codes in also):
+        yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "others", recordings=[one for one in also if one[1]])
     for said in doubted.values():
         name, warning, path = said[0]
         seen = words("quoted", sentence=warning)
@@ -149,6 +158,10 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
             yield Finding.of(
                 FindingCode.CALIBRATION_DOUBTED, "of-recordings", n=len(said), n_all=len(results), name=name, seen=seen
             )
+
+
+def _is_other(finding: Finding, stated: set[FindingCode]) -> bool:
+    return finding.severity is Severity.WARNING and finding.code not in {*stated, FindingCode.GRAVITY_DEFAULTED}
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
@@ -236,6 +249,8 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         branch,
         recording.sha256,
         *_gravity_error(accel),
+        *_tilt_error(gyro),
+        *_moves(gyro),
     )
 
 
@@ -245,6 +260,27 @@ def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
     if quality is None or quality.held_out_rms is None or not quality.floor > 0.0:
         return math.nan, math.nan
     return quality.held_out_rms, quality.held_out_rms / quality.floor
+
+
+def _tilt_error(sensor: SensorCalibration | None) -> tuple[float, float]:
+    """Cross-validated rms after a rotation [deg], and over noise alone, without excluded moves."""
+    quality = None if sensor is None else sensor.quality
+    if quality is None or quality.held_out_angle_deg is None:
+        return math.nan, math.nan
+    told = np.isfinite(quality.held_out_angle_deg)
+    if quality.weights is not None and len(quality.weights) == len(told):
+        told &= quality.weights > 0.0
+    if not told.any():
+        return math.nan, math.nan
+    noise = degrees_from_radians(rms_of(np.linalg.norm(quality.sigma[told], axis=1)) / STANDARD_GRAVITY_M_S2)
+    rms = rms_of(quality.held_out_angle_deg[told])
+    return rms, rms / max(noise, TINY)
+
+
+def _moves(sensor: SensorCalibration | None) -> tuple[int, int]:
+    """Excluded moves, and all."""
+    weights = None if sensor is None or sensor.quality is None else sensor.quality.weights
+    return (0, 0) if weights is None else (int(np.sum(weights == 0.0)), len(weights))
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

@@ -60,7 +60,15 @@ FINDINGS = {
 }
 """Warnings in words, where the code is no phrase of the field."""
 IN_FULL = (
-    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
+    *(
+        "calibration-doubted",
+        "clipping",
+        "few-poses",
+        "left-handed",
+        "pose-at-range-limit",
+        "pose-unsteady",
+        "poses-vibrate",
+    ),
     *("innovations-too-large", "reference-apart", "scale-not-nominal", "static-force", "turntable"),
 )
 """Warnings whose first clause says in a few words which axis or value it is."""

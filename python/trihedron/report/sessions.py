@@ -25,7 +25,7 @@ from trihedron.report.document import USE_IT, Block, Document, Facts, Headline, 
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
-from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_sigma
 from trihedron.report.segments import if_rate_is_right
 from trihedron.report.verification import USES
 
@@ -94,13 +94,20 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _worst(model: SessionsModel) -> str:
-    """The largest gravity error of a recording: recordings may agree and be wrong."""
+    """The largest gravity and tilt error of a recording: recordings may agree and be wrong."""
     known = [one for one in model.sessions if math.isfinite(one.times_noise)]
     if not known:
         return ""
     worst = max(known, key=lambda one: one.gravity_error_m_s2)
     size = f"{in_mm_s2(worst.gravity_error_m_s2)} ({plain_number(worst.times_noise, 2)} times noise alone)"
-    return f"; gravity error in static poses up to {size}, cross-validated"
+    tilts = [one for one in known if math.isfinite(one.tilt_times_noise)]
+    if tilts:
+        most = max(tilts, key=lambda one: one.tilt_error_deg)
+        size += f", tilt error after a rotation up to {plain_number(most.tilt_error_deg)}°"
+        size += f" ({plain_number(most.tilt_times_noise, 2)} times)"
+    said = f"; gravity error in static poses up to {size}, cross-validated"
+    out = [f"{one.n_excluded} of {how_many(one.n_moves, 'move')} of {one.name}" for one in tilts if one.n_excluded]
+    return f"{said}, {listed(out)} excluded" if out else said
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:

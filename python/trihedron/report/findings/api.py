@@ -255,6 +255,11 @@ _MANY_RECORDINGS = {
         "Run `trihedron diagnose ...`: it looks for what they share; `calibrate --extended` of one recording stores it "
         "with S and b.",
     ),
+    (Code.CALIBRATION_DOUBTED, "others", NOTE): Words(
+        "Further warnings of single recordings: {recordings:each; }.",
+        action="`trihedron calibrate` of that recording says where and why.",
+        lines={"recordings": "{v0}: {v1:ids}"},
+    ),
     (Code.FEW_SESSIONS, "", NOTE): Words(
         "Only {n_groups} {kind}: the spreads are uncertain by a factor of several, as their intervals show.",
         "A standard deviation of few values is uncertain whatever is done with them.",
