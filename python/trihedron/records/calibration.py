@@ -74,6 +74,17 @@ class FitQuality(Frozen):
     static_rate_rms: float | None = None
     static_rate_floor: float | None = None
 
+    @property
+    def lone_pose(self) -> int | None:
+        """The pose (from 0) whose cross-validated error is most of the sum of squares while it is within three σ of
+        its prediction: the others do not determine it, and the rms is no measure of them."""
+        error, sigma = self.held_out, self.held_out_sigma
+        if error is None or sigma is None or error.ndim > 1 or not np.isfinite(error).any():
+            return None
+        k = int(np.nanargmax(np.abs(error)))
+        is_most = error[k] ** 2 > 0.5 * np.nansum(error**2)
+        return k if is_most and abs(error[k]) < 3.0 * sigma[k] and sigma[k] > 3.0 * np.nanmedian(sigma) else None
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SensorCalibration(Frozen):

@@ -144,8 +144,11 @@ def _kind(quality: FitQuality, *, is_held: bool) -> str:
 def errors_in_words(calibration: Calibration) -> str:
     """Cross-validated errors, and how many times the noise they are, and what is not tested; empty without any."""
     errors = [one for one in errors_of(calibration) if one[1] < 1.0 / TINY]
+    lone = None if calibration.accelerometer.quality is None else calibration.accelerometer.quality.lone_pose
+    mostly = "" if lone is None else f", most of it in pose {lone + 1}, which the others hardly determine"
     said = [
-        f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise)"
+        f"{line.what} {with_unit(line.value, line.unit)} ({plain_number(times, 2)} times the noise"
+        f"{mostly if line is errors[0][0] else ''})"
         for line, times, is_held in errors
         if is_held
     ]

@@ -56,6 +56,8 @@ def residual_findings(
         drift_m_s2=drift_m_s2,
         has_temperature=has_temperature,
         widening=np.sqrt(scale),
+        is_lone=quality.lone_pose is not None,
+        lone=0 if quality.lone_pose is None else quality.lone_pose + 1,
     )
 
 

@@ -18,12 +18,15 @@ ENTRIES = {
     (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
         "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
-        "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom). "
-        "{is_joint:?The bias differs between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per axis{is_drift:?, "
-        "with a drift of {drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|"
+        "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom)"
+        "{is_lone:?, most of it in pose {lone}, which the other poses hardly determine|}. {is_joint:?The bias differs "
+        "between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per axis{is_drift:?, with a drift of "
+        "{drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|"
         "All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
         "{is_drift:?The sensor warmed up, or its supply drifted|" + _UNQUIET + "}.",
-        _LOOK,
+        "{is_lone:?Record again with more poses near pose {lone} and in other directions (`trihedron plan`).|"
+        + _LOOK
+        + "}",
     ),
     (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
