@@ -109,7 +109,7 @@ def test_the_documents_list_the_catalogue_as_it_is():
         ("{x:.2g mg}", 9.80665e-3, "1 mg"),
         ("{x:.2g ms}", 0.0021, "2.1 ms"),
         ("{x:.2g cm}", 0.15, "15 cm"),
-        ("{x:.2g deg}", 0.5 * np.pi, "90 deg"),
+        ("{x:.2g deg}", 0.5 * np.pi, "90°"),
         ("{x:abs .1f °/s}", -np.pi / 180.0, "1.0 °/s"),
         ("{x:all .1f mg}", (9.80665e-3, 0.0196133), "1.0, 2.0 mg"),
         ("{x:# pose}", 1, "1 pose"),

@@ -210,4 +210,4 @@ def amount_of(change: Change) -> Words:
     name = change.names[k]
     if change.kind == "scatter":
         return words("amount-of-scatter", value=value * factor, unit=unit, name=name)
-    return words("amount-of-change", value=value * factor, std=std * factor, unit=unit, name=name)
+    return words("amount-of-change", change=(value * factor, std * factor, unit), name=name)

@@ -77,7 +77,8 @@ def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if not candidate.applicable:
             missing.setdefault(candidate.reason, []).append(id_in_print(candidate.id))
     rows = tuple((f"not applicable, {reason}", listed(names)) for reason, names in missing.items())
-    return (candidates_table(diagnosis), *((Facts(rows),) if rows else ()))
+    tried = (candidates_table(diagnosis),) if any(one.applicable for one in diagnosis.candidates) else ()
+    return (*tried, *((Facts(rows),) if rows else ()))
 
 
 def candidates_table(diagnosis: Diagnosis) -> Table:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MINUS = "−"
-BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|°/|m?m/s|rad/s|mrad)")
+BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|°/|m?m/s|rad/s|mrad|(?:[km]?Hz|[mµ]?s|min|h|[mµ]?g|°C|σ|counts?)\b)")
 """The space between a number and its unit, at which no line breaks."""
 
 

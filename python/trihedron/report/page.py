@@ -39,6 +39,7 @@ SHORT = 12
 _ASIDE = re.compile(r" \([^)]*\)")
 MOST_OTHERS = 2
 """Findings listed on the first screen after the foremost; the others are counted."""
+_OPTION = re.compile(r'<span class="whole">--[^<]*</span>')
 _DASHED = re.compile(r"(?<![\w-])-{1,2}[A-Za-z][\w/+-]*")
 _NOT_SHOWN = (Picture, FindingList, Code)
 
@@ -85,7 +86,11 @@ def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:
 def unbroken(text: str) -> Markup:
     """HTML in which options (``--extended``), directions (``-X/+Y``) and ``5 mm/s²`` do not break; code is marked."""
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", BEFORE_UNIT.sub("\u00a0", str(escape(text))))
-    return Markup(_DASHED.sub(r'<span class="whole">\g<0></span>', text))
+    text = _DASHED.sub(r'<span class="whole">\g<0></span>', text)
+    # Options of a sentence are as those of a command, which is code as a whole.
+    parts = re.split(r"(<code>.*?</code>)", text)
+    parts[::2] = [_OPTION.sub(r"<code>\g<0></code>", part) for part in parts[::2]]
+    return Markup("".join(parts))
 
 
 def stacked(text: str) -> Markup:

@@ -110,7 +110,7 @@ def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
         raise InputError(f"readings must have shape (n, 3), got {a.shape}")
     n = len(a)
     if n < N_PARAMETERS:
-        raise InputError(f"{n} poses give {n} equations for nine unknowns: record at least nine, better eighteen")
+        raise InputError(f"nine unknowns need nine poses or more, better eighteen; got {n}")
     if not np.all(np.isfinite(a)):
         raise InputError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
     return a

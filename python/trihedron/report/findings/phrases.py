@@ -88,7 +88,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "this-container": "This {kind}",
         "unit-with-rate": "{unit:unit} ({rate_hz:.4g} Hz)",
         "amount-of-scatter": "{value:.3g} {unit:unit} in {name:axis}",
-        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit:unit} in {name:axis}",
+        "amount-of-change": "{change:quantity} in {name:axis}",
         # the text of an exception, a finding or an effect as a clause of another sentence
         "because": "{sentence:clause}",
         "quoted": "{sentence}",

@@ -156,7 +156,7 @@ def _number(value: float, how: str) -> str:
         return _digits(value, digits)
     if unit.startswith("!"):
         return _digits(UNITS[unit[1:]](value), digits)
-    return f"{_digits(UNITS[unit](value), digits)} {unit}"
+    return with_unit(_digits(UNITS[unit](value), digits), "°" if unit == "deg" else unit)
 
 
 def _digits(value: float, digits: str) -> str:
