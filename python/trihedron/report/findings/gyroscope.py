@@ -223,8 +223,8 @@ _MOVES = {
     (Code.HELD_OUT_WORSE, "verify-moves", WARNING): Words(
         "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
         "; largest for its uncertainty in move {worst_move} ({worst_deg:.3g}°){is_beside:?, beside the unsteady pose "
-        "{unsteady:first 2}|}{is_single:?, without which they are as expected|}, χ²/dof {chi2_per_dof:.2g} with each move weighted by its "
-        "uncertainty.",
+        "{unsteady:first 2}|}{is_single:?, without which they are as expected|}, χ²/dof {chi2_per_dof:.2g} with each "
+        "move weighted by its uncertainty.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
         "{is_common:?All gyro scales differ by one factor ({common:+.2g %}): the clock or the rate of one of the two "
         "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|"
