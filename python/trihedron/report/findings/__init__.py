@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, Severity
-from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, begins_with, concerns_whole
+from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, concerns_whole
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import IN_FULL, warnings_in_print
 from trihedron.report.numbers import MINUS, capital, listed
@@ -76,7 +76,7 @@ def beyond_headline(finding: Finding, document: Document, above: str = f"{STATED
     rest = finding.seen[len(clause) :].lstrip(" .;")
     is_stated = clause.lower() in document.verdict.lower()
     seen = f"{above}{capital(rest)}".rstrip() if is_stated else finding.seen
-    is_next = begins_with(document.what_next, finding.action)
+    is_next = bool(finding.action) and finding.action[1:].partition("`")[0] in document.what_next
     cause = "" if likely(finding.cause) in document.verdict else finding.cause
     return replace(finding, seen=seen, cause=cause, action="" if is_next else finding.action)
 

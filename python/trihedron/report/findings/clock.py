@@ -95,7 +95,7 @@ _RATES = {
     (Code.RATE_CONTRADICTED, "", WARNING): Words(
         "The rate was given as {given_hz:.6g} Hz but the time column runs at {clock_hz:.6g} Hz; the column was used.",
         "A nominal rate, or a clock that is wrong.",
-        "To use the given rate, read with --columns time=none --rate {given_hz:.6g}.",
+        "To use the given rate, read with `--columns time=none --rate {given_hz:.6g}`.",
     ),
     (Code.RATE_STATED, "", NOTE): Words(
         "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as given|as the file states above its data or "

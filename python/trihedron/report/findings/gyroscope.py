@@ -55,8 +55,8 @@ _MOVES = {
         "right).",
         "A wrong unit; or, if the unit is right, each time interval lasts {scale_ratio:.4g} times as long as it was "
         "read.",
-        "{has_fitting:?Read it with --gyro-unit {fitting}; or|Check the clock:} with --columns time=none --rate "
-        "{right_hz:.3g} the scale is 1.",
+        "{has_fitting:?Read it with --gyro-unit {fitting}; or|Check the clock:} with `--columns time=none --rate "
+        "{right_hz:.3g}` the scale is 1.",
     ),
     (Code.SCALE_NOT_NOMINAL, "gyro-common", WARNING): Words(
         "all three gyro scales are {excess:+.2g %} off in {unit:unit}; they agree within {spread:.1g %} (1 σ), and "

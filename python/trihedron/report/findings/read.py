@@ -10,7 +10,7 @@ _TURNING = (
     "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit:unit} "
     "(1 where the unit is right; correlation {correlation:.2f})"
 )
-_CLOCK = "with --columns time=none --rate {right_hz:.3g}"
+_CLOCK = "with `--columns time=none --rate {right_hz:.3g}`"
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
 _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings are missing."

@@ -44,7 +44,7 @@ ENTRIES = {
         "the two logs is off by it, or the gyro's sensitivity has changed|A wrong file, unit, axis, sign or clock, or "
         "a calibration of too few rotations}}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units, "
-        "with its right clock (--time-unit, or --columns time=none --rate HZ)}.",
+        "with its right clock (--time-unit, or `--columns time=none --rate HZ`)}.",
     ),
     (Code.NOT_TESTED, "", WARNING): Words(
         "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
