@@ -130,7 +130,7 @@ _COLUMNS = {
     (Code.COLUMNS_ASSUMED, "unnamed-gyro", WARNING): Words(
         "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",
         "A gyro under a name that does not say so.",
-        "If it is one, read with --columns {mapping}.",
+        "If these are a gyro, read with --columns {mapping}.",
     ),
     (Code.COLUMNS_ASSUMED, "header-ignored", WARNING): Words(
         "The line '{line}' above the numbers does not name their {n_columns} columns, so it was skipped.",
