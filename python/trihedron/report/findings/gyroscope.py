@@ -231,8 +231,8 @@ _MOVES = {
         "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"
         "{is_far:?The file is of another sensor, unit or frame, or scales|{is_beside:?A pose beside that move was not "
-        "still, or scales|Scales}} and cross-axis terms have changed since{is_far:?|, or the file is of another device}; "
-        "else samples were lost or the gyro clipped}}}}.",
+        "still, or scales|Scales}} and cross-axis terms have changed since{is_far:?|, or the file is of another device}"
+        "; else samples were lost or the gyro clipped}}}}.",
         "{is_single:?Look at move {worst_move}; if the poses around it were static, calibrate|{is_common:?Check the "
         "clocks of both logs (--columns time=none --rate HZ states a rate); if they are right, calibrate|{is_bias:?Let "
         "the sensor warm up, then calibrate|{is_few:?Check {shifted:ids} in the file; if right, calibrate|{is_far:?"
