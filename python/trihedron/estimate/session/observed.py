@@ -1,5 +1,7 @@
 """Input of the session model: pose means, moves and their noise, centred, in raw units."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,6 +53,12 @@ class Observed(SessionReadings):
     n_hidden: int
     n_drift: int = 0
     prior: Prior | None = None
+
+    def behind_filters(self) -> Observed:
+        """The session of sensors with low-pass filters, which smooth more than a mean over the interval does."""
+        sigma = self.effect_sigma.copy()
+        sigma[self.n_hidden] = OF_FILTERS
+        return replace(self, effect_sigma=sigma)
 
     def model(self) -> _core.SessionModel:
         """The Rust model; bias repeatability from pose to pose is not bounded, but determined by the evidence."""
@@ -131,8 +139,7 @@ def arranged(
         before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
         force_effect=effects[0], rate_effect=effects[1],
         effect_sigma=np.array([
-            *measured.quantum[coarse] * np.sqrt(UNIFORM), OF_FILTERS,
-            *np.ones(measured.shared_errors.shape[2]), DELAY_S,
+            *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
         effect_time_s=np.concatenate([pose_time_s, measured.time_s[kept]]), pose_lasts_s=lasts_s,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),

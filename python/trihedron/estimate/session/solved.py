@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
+from trihedron.channel_facts.static_axes import find_low_passes
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.verdict import residual_findings
@@ -24,6 +25,7 @@ from trihedron.estimate.session.observed import Near, with_prior
 from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.session.averaging import EITHER
 
 
 def calibrate_moves(
@@ -93,6 +95,10 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     measured = measure_moves(log.recording, log.segments, log.accelerometer)
     near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _fitted(log, measured, near)
+    # Nonlinearities and delays would be taken for filters: that there is one the noise at rest must show.
+    if found.solution.averaging > EITHER and _has_low_pass(log.recording):
+        log = replace(log, is_filtered=True)
+        found = _fitted(log, measured, near)
     solution, seen = found.solution, found.seen
     left_out = held_out(found.shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
@@ -123,6 +129,13 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     return SolvedSession(
         solution, covariance, gyroscope, left_out, (*said, *losses.findings(own_sigma))
     )  # fmt: skip
+
+
+def _has_low_pass(recording: Recording) -> bool:
+    """Whether the gyro's noise at rest shows a low-pass."""
+    assert recording.gyroscope is not None
+    found = find_low_passes({"gyroscope": recording.gyroscope}, recording.rate_hz)
+    return any(one.corner_hz is not None for axes in found.values() for one in axes)
 
 
 def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:

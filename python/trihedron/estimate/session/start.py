@@ -31,18 +31,20 @@ USUAL_RAD = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Input of a session's fit; an accelerometer that ``is_given`` is fixed."""
+    """Input of a session's fit; an accelerometer that ``is_given`` is fixed, sensors that are ``is_filtered`` have a
+    low-pass."""
 
     recording: Recording
     segments: Segments
     accelerometer: SensorCalibration
     gravity_m_s2: float
     is_given: bool
+    is_filtered: bool = False
 
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
         """The session with the moves ``used`` (m,)."""
         out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, used, near)
-        return with_prior(out, *near, is_given=self.is_given)
+        return with_prior(out.behind_filters() if self.is_filtered else out, *near, is_given=self.is_given)
 
     def anchors_s(self, measured: MoveMeasurements) -> FloatArray:
         """(m, 2) times of the middles of the poses before and after each move [s]."""
