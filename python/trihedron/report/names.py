@@ -40,7 +40,7 @@ FINDINGS = {
     "filter-noise-unsettled": "search not settled",
     "gravity-defaulted": "gravity not given",
     "held-out-worse": "tilt error after rotations above noise",
-    "log-drift": "slow change over the log",
+    "log-drift": "warm-up or slow change of the bias",
     "log-jump": "jumps of the level",
     "log-motion": "motion or vibration in the log",
     "non-finite": "rows without time",

@@ -19,7 +19,7 @@ from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 _NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with \
 --gyro-lsb and --accel-lsb."""
 LINES = "(section Kalibr, in `... --full` and in --report)"
-NEXT = f"Take N, B, K into a filter {LINES}; average for no longer than the best averaging time."
+NEXT = f"Take N and K into a filter {LINES}; average for no longer than the best averaging time."
 LONGER = "Record a static log of an hour or more for B and K; of this one take N alone."
 SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
@@ -92,7 +92,7 @@ def _next(noise: Noise) -> str:
     if (actions := [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]) or longer:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
     has_walk = any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes)
-    return NEXT if has_walk else f"Take N and B into a filter {LINES}, for K its upper limit: a longer log measures it."
+    return NEXT if has_walk else f"Take N into a filter {LINES}, for K its upper limit: a longer log measures it."
 
 
 def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:

@@ -43,7 +43,8 @@ def of_json(path: Path, text: str) -> Rewritten:
     if len(rows) < _FEWEST_ROWS or len(names) < 3:
         raise ReadError(
             f"{path}: this JSON is no log: it contains no rows of readings known here (parameters and matrices are "
-            "none); write them as one object per line, or pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
+            "none). Give the log itself; JSON rows are one object per line, or pass arrays from Python: "
+            "trihedron.read({'t': ..., 'ax': ...})."
         )
     body = [",".join(_cell(row.get(name)) for name in names) for row in rows]
     numbers = list(range(1, len(rows) + 1)) if lines is None else lines

@@ -8,8 +8,8 @@ ENTRIES = {
         "both uncertainties and the bias drift in this log allow, {first:ids} by {times_sigma:.0f} σ; log − file: "
         "{parameters:each}.",
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a file of another device.",
-        "See the table of parameters in the whole report; calibrate several sessions together for the repeatability of "
-        "each.",
+        "Check that the file is of this sensor (table of parameters in the whole report); several sessions calibrated "
+        "together give the repeatability of each.",
         numbers=("n_others",),
         lines={"parameters": "{v0:ids} {v1:quantity}"},
     ),
