@@ -132,10 +132,10 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
 
 
 def _has_low_pass(recording: Recording) -> bool:
-    """Whether the gyro's noise at rest shows a low-pass."""
+    """Whether the gyro's noise at rest shows a low-pass, on all axes, as one filter has."""
     assert recording.gyroscope is not None
     found = find_low_passes({"gyroscope": recording.gyroscope}, recording.rate_hz)
-    return any(one.corner_hz is not None for axes in found.values() for one in axes)
+    return bool(found) and all(one.corner_hz is not None for one in found["gyroscope"])
 
 
 def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
