@@ -6,6 +6,7 @@ the session determines them. Few poses may not show one: both hypotheses then sh
 (docs/model-session.md, 11.12e).
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,6 +99,8 @@ def _columns(curve: FloatArray, sensor: int) -> tuple[FloatArray | None, FloatAr
     return (own, None, sigma) if sensor == 0 else (None, own, sigma)
 
 
+N_LINEAR = 18
+"""Parameters of S and b before those of effects."""
 NO_WEIGHT = 1e3
 """Factor on a row's standard error at which it has no weight beside the others."""
 LEAST_SHRINK = 0.1
@@ -128,6 +131,17 @@ class SessionSolution:
     iterations: int
     observed: Observed
     core: _core.SessionFit
+
+    @property
+    def smooths_more_than_means(self) -> bool:
+        """Whether the moves by themselves, without the prior, show more smoothing than a mean over the sample interval
+        does (eq. 11.6d), by two standard errors."""
+        place, prior = N_LINEAR + self.observed.n_hidden, EITHER**2
+        variance = float(self.core.border_covariance()[place, place])
+        if variance >= prior:
+            return False
+        shown = (self.averaging - EITHER) * prior / (prior - variance)
+        return shown > 2.0 * max(EITHER, math.sqrt(variance * prior / (prior - variance)))
 
     @property
     def is_drifting(self) -> bool:

@@ -25,7 +25,6 @@ from trihedron.estimate.session.observed import Near, with_prior
 from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
-from trihedron.session.averaging import EITHER
 
 
 def calibrate_moves(
@@ -96,7 +95,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
     found = _fitted(log, measured, near)
     # Nonlinearities and delays would be taken for filters: that there is one the noise at rest must show.
-    if found.solution.averaging > EITHER and _has_low_pass(log.recording):
+    if found.solution.smooths_more_than_means and _has_low_pass(log.recording):
         log = replace(log, is_filtered=True)
         found = _fitted(log, measured, near)
     solution, seen = found.solution, found.seen
