@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
-from trihedron.arrays import TINY, rms_of
+from trihedron.arrays import TINY
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
@@ -25,9 +25,10 @@ from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
+from trihedron.report.calibration_charts import excluded_moves
+from trihedron.report.calibration_fit import angles_of, move_floor
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
-from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 BYS: tuple[By, ...] = get_args(By)
 LEFT_BY_S_AND_B = (
@@ -237,6 +238,7 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
     covariance = jacobian @ calibration.covariance @ jacobian.T
     recording = result.recording
     temperature, low, high, branch = _temperature(result)
+    tilt, moves = _tilt_error(gyro)
     return Session(
         name,
         group,
@@ -249,8 +251,8 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         branch,
         recording.sha256,
         *_gravity_error(accel),
-        *_tilt_error(gyro),
-        *_moves(gyro),
+        *tilt,
+        *moves,
     )
 
 
@@ -262,25 +264,14 @@ def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
     return quality.held_out_rms, quality.held_out_rms / quality.floor
 
 
-def _tilt_error(sensor: SensorCalibration | None) -> tuple[float, float]:
-    """Cross-validated rms after a rotation [deg], and over noise alone, without excluded moves."""
+def _tilt_error(sensor: SensorCalibration | None) -> tuple[tuple[float, float], tuple[int, int]]:
+    """Cross-validated rms after a rotation [deg], and over noise alone; excluded moves, and all."""
     quality = None if sensor is None else sensor.quality
-    if quality is None or quality.held_out_angle_deg is None:
-        return math.nan, math.nan
-    told = np.isfinite(quality.held_out_angle_deg)
-    if quality.weights is not None and len(quality.weights) == len(told):
-        told &= quality.weights > 0.0
-    if not told.any():
-        return math.nan, math.nan
-    noise = degrees_from_radians(rms_of(np.linalg.norm(quality.sigma[told], axis=1)) / STANDARD_GRAVITY_M_S2)
-    rms = rms_of(quality.held_out_angle_deg[told])
-    return rms, rms / max(noise, TINY)
-
-
-def _moves(sensor: SensorCalibration | None) -> tuple[int, int]:
-    """Excluded moves, and all."""
-    weights = None if sensor is None or sensor.quality is None else sensor.quality.weights
-    return (0, 0) if weights is None else (int(np.sum(weights == 0.0)), len(weights))
+    errors, is_out = ([], []) if quality is None else (angles_of(quality), excluded_moves(quality).tolist())
+    if quality is None or len(errors) < 2:
+        return (math.nan, math.nan), (sum(is_out), len(is_out))
+    rms = errors[-1][1]
+    return (rms, rms / max(move_floor(quality), TINY)), (sum(is_out), len(is_out))
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

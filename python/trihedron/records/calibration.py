@@ -77,7 +77,8 @@ class FitQuality(Frozen):
     @property
     def lone_pose(self) -> int | None:
         """The pose (from 0) whose cross-validated error is most of the sum of squares while it is within three σ of
-        its prediction: the others do not determine it, and the rms is no measure of them."""
+        its prediction, thrice as uncertain as usual (one of few equal errors is most by chance): the others do not
+        determine it, and the rms is no measure of them."""
         error, sigma = self.held_out, self.held_out_sigma
         if error is None or sigma is None or error.ndim > 1 or not np.isfinite(error).any():
             return None

@@ -122,7 +122,7 @@ def measure_noise(
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, 2] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
         if k < len(sigmas):
-            halves, lasts = _steps(readings, spans, np.eye(3)[None], 2)[:, 0], np.diff(spans, axis=1)[:, 0] * step_s
+            halves, lasts = half_changes(readings, spans), np.diff(spans, axis=1)[:, 0] * step_s
             variances[:, 2 + k] += coloured_variance(sigmas[k], halves, densities[k], lasts, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
@@ -196,7 +196,7 @@ def quiet_errors(readings: FloatArray, spans: IntArray, white: FloatArray) -> Fl
     long = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
     if not long.any():
         return white
-    halves, white_long = _steps(readings, spans[long], np.eye(3)[None], 2)[:, 0], white[long]
+    halves, white_long = half_changes(readings, spans[long]), white[long]
     of_all = _quiet(halves.reshape(-1, 1), white_long.reshape(-1, 1))
     return white * np.maximum(np.maximum(_quiet(halves, white_long), of_all), 1.0)
 
@@ -247,6 +247,11 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> Fl
     level = excess * white / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
     octaves = float(np.ptp(spans)) / (2.0 * float(np.median(spans[:, 1] - spans[:, 0])))
     return np.sqrt(level * max(math.log(octaves), 0.0))
+
+
+def half_changes(readings: FloatArray, spans: IntArray) -> FloatArray:
+    """(h, 3) mean over the second half of every range ``spans`` (h, 2) less that over the first."""
+    return np.asarray(_steps(readings, spans, np.eye(3)[None], 2)[:, 0])
 
 
 def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> FloatArray:

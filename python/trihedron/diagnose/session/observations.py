@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from trihedron.probability import MEDIAN_CHI2
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Change, Prior, SessionReadings, SessionState
-from trihedron.session.noise import along_gradient, measure_noise
+from trihedron.session.noise import along_gradient, half_changes, measure_noise
 from trihedron.session.support import Support, support_of
 
 FAR = 3.0
@@ -123,7 +123,8 @@ class Observations(SessionReadings):
         poses = self.segments.poses
         ranges = [span for pose in poses for span in pose.undisturbed()]
         owner = [i for i, pose in enumerate(poses) for _ in pose.undisturbed()]
-        means = _means(samples, ranges, owner, len(poses))
+        flat = np.ascontiguousarray(samples.reshape(len(samples), -1))
+        means = _core.column_means(flat, np.array(ranges), np.array(owner), len(poses))
         return np.asarray(means.reshape(-1, *samples.shape[1:]))
 
     def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
@@ -182,19 +183,6 @@ def _whitening(change: FloatArray, white: FloatArray) -> FloatArray:
     return np.where(z > 0.0, 1.0 / np.maximum(error, TINY), 0.0)
 
 
-def _means(values: FloatArray, ranges: Sequence[tuple[int, int]], owner: Sequence[int], n: int) -> FloatArray:
-    flat = np.ascontiguousarray(values.reshape(len(values), -1))
-    return _core.column_means(flat, np.array(ranges), np.array(owner), n)
-
-
-def _half_changes(values: FloatArray, segments: Segments) -> FloatArray:
-    """(poses, 3) mean over the second half of every pose less that over the first."""
-    middles = [(pose.start, (pose.start + pose.stop + 1) // 2, pose.stop) for pose in segments.poses]
-    halves = [span for a, b, c in middles for span in ((a, b), (b, c))]
-    means = _means(values, halves, range(len(halves)), len(halves)).reshape(-1, 2, 3)
-    return np.asarray(means[:, 1] - means[:, 0])
-
-
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
     """Observations of a segmented recording.
 
@@ -236,12 +224,13 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         )
     for own, ends in zip(of_moves, poses, strict=True):
         own[2:] += swing[list(ends)].sum(axis=0)
+    spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
         half_changes=(
-            _half_changes(recording.accelerometer, segments),
-            None if raw_rate is None else _half_changes(raw_rate, segments),
+            half_changes(recording.accelerometer, spans),
+            None if raw_rate is None else half_changes(raw_rate, spans),
         ),
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
         **vars(noise),

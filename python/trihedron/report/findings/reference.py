@@ -30,7 +30,7 @@ ENTRIES = {
     ),
     (Code.REFERENCE_APART, "slipped-in-noise", WARNING): Words(
         "the reference turned on the body by {angle_rad:.2g deg} at {at_s:.0f} s, which adds to its own error and so "
-        "to what is predicted, not to N; The slip makes K less certain.",
+        "to what is predicted, not to N; the slip makes K less certain.",
         "It slipped, or its tracked body was defined anew.",
         "Cut the reference's file at {at_s:.0f} s, and run `trihedron noise` with either part.",
         numbers=("sigma_rad",),
