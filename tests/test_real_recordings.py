@@ -1,5 +1,6 @@
 """Real recordings end to end, through the command line and the public interface."""
 
+import itertools
 import json
 import math
 from dataclasses import replace
@@ -18,6 +19,7 @@ from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.session import solved as of_session
 from trihedron.estimate.session.fit import refitted, solve_session
+from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, FindingCode, Recording, SensorCalibration
 from trihedron.records.noise import TermName
 from trihedron.sensor_model import other_form
@@ -285,6 +287,22 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
         assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)
         mine, theirs = axis.terms[TermName.BIAS_INSTABILITY], logged.terms[TermName.BIAS_INSTABILITY]
         assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
+
+
+def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
+    """240 differences of accelerometer scales between sessions of eight units: half lie within 0.5 to 0.9 of their
+    standard uncertainty, of a normal distribution within 0.67."""
+    z = []
+    for unit in range(1, 9):
+        logs = (trihedron.read(real_data / f"mimu4444/exp_{k}.npz", instance=unit) for k in (2, 3, 4, 5, 7))
+        found = [trihedron.calibrate(log, gravity_m_s2=9.8184).accelerometer for log in logs]
+        known = [invariants(one.S, one.b).log_scale for one in found]
+        slopes = [jacobian(one.S, one.b)[3:6] for one in found]
+        sigmas = [np.sqrt(np.diag(d @ one.covariance @ d.T)) for d, one in zip(slopes, found, strict=True)]
+        for (a, of_a), (b, of_b) in itertools.combinations(zip(known, sigmas, strict=True), 2):
+            z.extend((a - b) / np.hypot(of_a, of_b))
+    assert 0.5 < np.median(np.abs(z)) < 0.9
+    assert 0.93 < np.mean(np.abs(z) < 1.96) < 0.97
 
 
 def axes_of(x):

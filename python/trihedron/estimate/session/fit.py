@@ -146,7 +146,7 @@ class SessionSolution:
     @property
     def is_drifting(self) -> bool:
         """Whether the accelerometer's bias follows a curve, or walks more than the noise of parts explains."""
-        return self.core.strengths[0][0] < NOISE_CORNER_S or bool(self.accel_drift.any())
+        return self.core.strengths[0][0] < NOISE_CORNER_S or bool(self._accel_curves.any())
 
     def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
         """The moves with this solution's corrections: averaging over the interval, position of undithered biases inside
@@ -159,9 +159,18 @@ class SessionSolution:
         return replace(measured, rate=rate - measured.shared_errors @ shared, bias=measured.bias - place)
 
     @property
-    def accel_drift(self) -> FloatArray:
-        """Curves of the accelerometer's bias in the poses (n, 3, k), one prior σ each [m/s²]."""
+    def _accel_curves(self) -> FloatArray:
         return _drift_curves(self.observed, self.observed.force_effect, self.S_a)
+
+    @property
+    def accel_drift(self) -> FloatArray:
+        """Curves along which the accelerometer's bias changes from pose to pose (n, 3, k), one prior σ each [m/s²]:
+        those of time, and every step of its random walk (eq. 11.8)."""
+        observed = self.observed
+        step = np.sqrt(3.0 * np.diff(observed.pose_time_s)) / self.core.strengths[0][0]
+        later = np.tri(len(step) + 1, len(step), -1) * step
+        walk = np.einsum("nk,ij->nikj", later, self.S_a * observed.force_density)
+        return np.concatenate([self._accel_curves, walk.reshape(len(later), 3, -1)], axis=2)
 
     @property
     def has_gyro_drift(self) -> bool:
