@@ -137,10 +137,8 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
     doubted: dict[FindingCode, list[tuple[str, str, str]]] = {}
     for result, session in zip(results, sessions, strict=True):
         warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
-        if FindingCode.CLIPPING in warned:
-            seen = words("quoted", sentence=warned[FindingCode.CLIPPING])
-            yield Finding.of(FindingCode.CLIPPING, "of-recording", name=session.name, seen=seen)
-        for code in [code for code in LEFT_BY_S_AND_B if code in warned][:1]:
+        gravest = [code for code in LEFT_BY_S_AND_B if code in warned][:1]
+        for code in (*gravest, *(code for code in warned if code is FindingCode.CLIPPING)):
             one = session.name, warned[code], as_arguments(result.recording.source)
             doubted.setdefault(code, []).append(one)
     stated = {FindingCode.CLIPPING, *doubted}
@@ -150,10 +148,14 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
     ]
     if any(codes for _, codes in also):
         yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "others", recordings=[one for one in also if one[1]])
-    for said in doubted.values():
+    for code, said in doubted.items():
         name, warning, path = said[0]
         seen = words("quoted", sentence=warning)
-        if len(said) == 1:
+        if code is FindingCode.CLIPPING:
+            yield Finding.of(
+                FindingCode.CLIPPING, "of-recordings", n=len(said), n_all=len(results), name=name, seen=seen
+            )
+        elif len(said) == 1:
             yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=name, seen=seen, path=path)
         else:
             yield Finding.of(

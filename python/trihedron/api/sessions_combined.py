@@ -17,7 +17,7 @@ from trihedron.estimate.sessions.spread import next_session, repeated_parameters
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
 from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration, Severity
-from trihedron.records.recording import distinct_names
+from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.sessions import PARAMETERS, By, Change, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
@@ -162,7 +162,7 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     used = [session.name for session in model.sessions]
     names = distinct_names([*used, *(path for path, _ in model.left_out)])[len(used) :]
     out = [
-        Finding.of(FindingCode.SESSION_LEFT_OUT, name=name, why=words("because", sentence=why), path=path)
+        Finding.of(FindingCode.SESSION_LEFT_OUT, name=name, why=words("because", sentence=why), path=as_arguments(path))
         for name, (path, why) in zip(names, model.left_out, strict=True)
     ]
     n = len({session.group for session in model.sessions}) if model.by in ("date", "device") else len(model.sessions)

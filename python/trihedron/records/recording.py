@@ -292,9 +292,11 @@ class Recording(Presented):
 
 
 def as_arguments(source: str) -> str:
-    """A recording as arguments of a command: a log, or the files of accelerometer and gyro."""
+    """A recording as arguments of a command: a log, a device of an archive, or the files of accelerometer and gyro."""
+    source, of_archive, device = source.partition(", device ")
     files = [shlex.quote(part) for part in source.split(" + ")]
-    return f"--accel {files[0]} --gyro {files[1]}" if len(files) == 2 else files[0]
+    log = f"--accel {files[0]} --gyro {files[1]}" if len(files) == 2 else files[0]
+    return f"{log} --instance {device}" if of_archive else log
 
 
 def distinct_names(sources: Sequence[str]) -> list[str]:

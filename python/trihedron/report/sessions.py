@@ -25,7 +25,7 @@ from trihedron.report.document import USE_IT, Block, Document, Facts, Headline, 
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
-from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_sigma
+from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.segments import if_rate_is_right
 from trihedron.report.verification import USES
 
@@ -106,8 +106,8 @@ def _worst(model: SessionsModel) -> str:
         size += f", tilt error after a rotation up to {plain_number(most.tilt_error_deg)}°"
         size += f" ({plain_number(most.tilt_times_noise, 2)} times)"
     said = f"; gravity error in static poses up to {size}, cross-validated"
-    out = [f"{one.n_excluded} of {how_many(one.n_moves, 'move')} of {one.name}" for one in tilts if one.n_excluded]
-    return f"{said}, {listed(out)} excluded" if out else said
+    n_out, n_moves = sum(one.n_excluded for one in tilts), sum(one.n_moves for one in tilts)
+    return f"{said}, {n_out} of {how_many(n_moves, 'move')} excluded" if n_out else said
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:

@@ -244,8 +244,8 @@ _MANY_RECORDINGS = {
         "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
         "Run `trihedron diagnose {path}`, which looks for the cause.",
     ),
-    (Code.CLIPPING, "of-recording", WARNING): Words(
-        "in {name} {seen:clause}.",
+    (Code.CLIPPING, "of-recordings", WARNING): Words(
+        "in {n} of {n_all} recordings {seen:clause}; these are the figures of {name}.",
         "The motion left the measuring range; clipped moves count less, or are excluded.",
         "Turn with rates below about half the range limit, move gently, or set a wider range.",
     ),

@@ -12,7 +12,7 @@ A placeholder is a name and, after the colon, the format of its value:
 ``&, the ``              several words, joined by the text after the ``&``; ``and``: ``X, Y and Z``
 ``together``             ``x, y in combination``
 ``sentences``            ``X. Y.``
-``clause``               a sentence without its full stop
+``clause``               a sentence inside another one
 ``opening``              its first clause alone
 ``unit``                 ``m/s²`` for ``m/s^2``
 ``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth
@@ -127,7 +127,8 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how == "unit":
         return unit_in_print(value)
     if how == "clause":
-        return str(value).rstrip(".")
+        text = str(value).rstrip(".")
+        return f"{text[:1].lower()}{text[1:]}" if text[1:2].islower() else text
     if how == "opening":
         return opening(str(value))
     if how == "numbered":
