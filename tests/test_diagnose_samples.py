@@ -1,4 +1,4 @@
-"""What samples show: rows lost between even timestamps, noise of another level, codes that never occur."""
+"""What samples show: lost rows, noise of another level, codes that never occur; and what a table or a supply does."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ import trihedron
 from diagnosed_session import diagnosed, simulated, unit_of
 from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import observe
-from trihedron.simulate import hand_session, simulate
+from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect
 
 
 @pytest.mark.parametrize("seed", [0, 5])
@@ -79,3 +79,23 @@ def test_codes_that_never_occur_are_named_where_noise_spans_many():
     assert min(missing) > 40
     assert "never occur" in found.effects[0].statement
     assert diagnosed("", 4, 14).verdict == "consistent"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "effect_id", "size", "said"),
+    [
+        ("table-turns", "table-tilt", {"tilt_deg": (0.1, 0.0)}, {"tilt": 0.1}),
+        ("table-turns", "turn-angle-error", {"errors_deg": [0.0, 0.0, 0.5]}, {"error of move 3": 0.5}),
+        (
+            "hand-session", "supply-sensitivity", {"sensor": "accelerometer", "sag_v": 0.3, "sag_tau_s": 20.0},
+            {"accel_scale_x": 1.0, "accel_scale_y": 1.0, "accel_scale_z": 1.0},
+        ),
+    ],
+)  # fmt: skip
+def test_a_table_or_a_supply_is_named_with_its_size(scenario, effect_id, size, said):
+    recording, truth = simulate(with_effect(scenario_by_name(scenario), effect_id, **size), seed=3)
+    (effect,) = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2).effects
+    assert effect.id == effect_id
+    found = {one.name: one for one in effect.parameters}
+    for name, value in said.items():
+        assert abs(found[name].value - value) < 3.0 * found[name].std
