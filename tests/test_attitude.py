@@ -144,8 +144,8 @@ def test_a_move_is_integrated_with_the_order_of_the_model_on_uneven_steps(degree
 
 
 @pytest.mark.parametrize("degree", [0, 1, 3])
-@pytest.mark.parametrize("size", [0.0, 1e-7, 1.0])
-def test_derivatives_of_a_move_match_differences_at_zero_tiny_and_ordinary_rates(degree, size):
+@pytest.mark.parametrize("size", [0.0, 1e-7, 1.0, 40.0])
+def test_derivatives_of_a_move_match_differences_at_zero_tiny_ordinary_and_large_rates(degree, size):
     t, step = uneven(60, 2.5), 1e-5
     raw, b = size * wandering(t), size * np.array([[0.01, -0.02, 0.005], [-0.03, 0.01, 0.02]])
     R, *turned = of_move(t, raw, degree, MOVED, b)
@@ -153,8 +153,38 @@ def test_derivatives_of_a_move_match_differences_at_zero_tiny_and_ordinary_rates
         S, of_b = e[:9].reshape(3, 3), e[9:].reshape(2, 3)
         ahead, behind = (of_move(t, raw, degree, MOVED + sign * S, b + sign * of_b)[0] for sign in (1, -1))
         analytic = -R @ np.cross(np.eye(3), np.hstack(turned)[:, k])
-        # Central differences: truncation ~ step² |∫w'|³ < 1e-9, rounding 1e-15/step = 1e-10.
-        assert np.linalg.norm((ahead - behind) / (2 * step) - analytic) < 3e-9, k
+        # Central differences: truncation ~ step² |∫w'|³ < 1e-9 at ordinary rates, rounding 1e-15/step = 1e-10.
+        assert np.linalg.norm((ahead - behind) / (2 * step) - analytic) < 3e-9 * max(size, 1.0) ** 3, k
+
+
+@pytest.mark.parametrize("size", [1e-7, 1.0, 60.0])
+def test_a_move_is_its_two_parts_one_after_the_other(size):
+    # A sample at which both parts meet, straight lines in them: B = B₂ B₁, G = G₁ + B₁ᵀ G₂, C = C₁ + B₁ᵀ C₂ B₁.
+    t, b = uneven(61, 0.6), np.array([[0.01, -0.02, 0.005], [-0.03, 0.01, 0.02]])
+    noise = _core.RateNoise(np.array([0.01, 0.02, 0.03]), 1e-4, 0.012)
+
+    def of(start, stop):
+        at = np.array([[start, stop]]), np.array([[-1.5, 3.1]])
+        found = _core.integrate_moves(t, size * wandering(t), *at, MOVED, b[:1], b[1:], 1, noise)
+        return [part[0] for part in found]
+
+    (whole, *parts), (first, *begun), (second, *ended) = of(0, 61), of(0, 25), of(24, 61)
+    np.testing.assert_allclose(whole, second @ first, atol=1e-12)
+    ended[-1] = ended[-1] @ first
+    for one, before, after in zip(parts, begun, ended, strict=True):
+        # Some hundred products and sums of one order, each good to some ulp.
+        np.testing.assert_allclose(one, before + first.T @ after, rtol=0.0, atol=1e-12 * np.linalg.norm(one))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 0.4, 0.6, 3.0, np.pi - 1e-3, np.pi - 1e-6])
+def test_rotations_are_those_of_scipy_and_give_their_vectors_back(angle):
+    axes = np.random.default_rng(9).normal(size=(100, 3))
+    vectors = angle * axes / np.linalg.norm(axes, axis=1)[:, None]
+    found = _core.rotation_from_vector(vectors)
+    # Products of numbers near one: a few ulp.
+    np.testing.assert_allclose(found, Rotation.from_rotvec(vectors).as_matrix(), rtol=0.0, atol=2e-15)
+    # Half the digits would be lost near a half turn if the axis came from the antisymmetric part.
+    np.testing.assert_allclose(_core.vector_from_rotation(found), vectors, rtol=0.0, atol=1e-12)
 
 
 def test_a_move_bridges_lost_rows_and_repeated_timestamps_and_is_refused_outside_the_log():

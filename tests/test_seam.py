@@ -56,14 +56,13 @@ def contiguous_calls() -> dict[str, tuple]:
     vectors, unit = rng.standard_normal((50, 3)), rng.standard_normal((60, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     windows = np.array([[10, 60], [80, 150]], dtype=np.int64)
-    calls = {
+    return {
         "rotation_from_vector": (vectors,),
         "vector_from_rotation": (_core.rotation_from_vector(vectors),),
         "block_statistics": (rng.standard_normal((400, 3)), 8),
         "integrate_raw_rate": (np.arange(200) / 100.0, rng.standard_normal((200, 3)), windows, 1),
         "simulate_first_order": (rng.standard_normal((100, 3)), 0.01, [0.1, 0.2, 0.3]),
     }
-    return {name: call for name, call in calls.items() if hasattr(_core, name)}
 
 
 def rearranged(array: np.ndarray) -> list[np.ndarray]:
@@ -113,7 +112,9 @@ t = np.cumsum(rng.uniform(0.005, 0.015, 60_000)); w = 2.0 * rng.standard_normal(
 up = rng.standard_normal((60_000, 3)); up *= 9.8 / np.linalg.norm(up, axis=1, keepdims=True)
 readings = up @ np.array([[1.02, 0, 0], [0.01, 0.97, 0], [-0.02, 0.03, 1.0]]).T + [0.1, -0.2, 0.3]
 readings += 1e-3 * rng.standard_normal((60_000, 3))
-out = [trihedron.integrate_rate(t, w)[[1500, -1]], *_core.block_statistics(w, 7)[:2]]
+out = [trihedron.integrate_rate(t, w)[[1500, -1]]]
+for length in (2, 3, 7, 8, 9, 16, 41, 200):
+    out += _core.block_statistics(w[:9001], length)[:2]
 out += _core.allan_variance(readings, [1, 8, 512], _core.AllanKind.Overlapping)[:1]
 edges, anchors = np.array([[3, 700], [701, 1490]]), np.array([[-1.0, 8.0], [6.0, 20.0]])
 zero = np.full((2, 3), 0.01)

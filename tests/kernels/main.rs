@@ -5,7 +5,4 @@ mod ellipsoid;
 mod gauss_newton;
 mod made_session;
 mod norm_invariant;
-mod poisson;
-mod rotation;
 mod session_model;
-mod stillness;

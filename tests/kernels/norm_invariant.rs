@@ -8,11 +8,6 @@ use super::ellipsoid::{cube_poses, nine, readings, triad};
 
 const G: f64 = 9.81;
 
-/// Readings that share their noise, or have one each.
-fn of<'a>(values: &'a [Vector3<f64>], noise: &'a [Matrix3<f64>]) -> Readings<'a> {
-    Readings { values, noise }
-}
-
 proptest! {
     #[test]
     fn the_jacobian_is_the_derivative(e in nine(), u in prop::array::uniform3(-1.0..1.0f64)) {
@@ -38,9 +33,9 @@ proptest! {
         // S = 0, |b| = |g| fits exactly. From starts wrong by factors up to twenty the fit finds the triad or says no.
         let truth = triad(e);
         let values = readings(&truth, &cube_poses());
-        let noise = [Matrix3::identity()];
+        let values = Readings { values: &values, noise: &[Matrix3::identity()] };
         let start = Model { s: truth.s * scale.exp(), b: truth.b * scale.exp() + Vector3::from(shift) };
-        if let Ok(found) = fit(of(&values, &noise), G, Some(start)) {
+        if let Ok(found) = fit(values, G, Some(start)) {
             let volume = (found.model.s.determinant() / truth.s.determinant()).abs();
             prop_assert!(volume > 1e-3, "collapsed to {volume}");
             if found.stop.is_converged() && found.chi2 < 1.0 {
