@@ -10,7 +10,6 @@ import pytest
 
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Recording, Severity
-from trihedron.units import AccelerationUnit, RateUnit
 from true_segments import codes
 
 # By name: the package also exports a function called `read`.
@@ -209,19 +208,6 @@ def test_the_unit_of_time_is_told_by_its_step_or_its_date(tmp_path, scale, unit,
     # A date in seconds leaves 2.4e-7 s per digit of a float.
     np.testing.assert_allclose(recording.time_s, table[:, 0], atol=5e-7)
     assert recording.start_epoch_s == pytest.approx(start / scale)
-
-
-def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
-    path = write(tmp_path / "log.csv", readings())
-    recording = read_recording(path, accelerometer_unit="g", gyroscope_unit="deg/s", time_unit="ms")
-    assert recording.accelerometer_unit is AccelerationUnit.G
-    assert recording.gyroscope_unit is RateUnit.DEG_S
-    assert recording.rate_hz == pytest.approx(1e5, rel=1e-9)
-    assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
-    with pytest.raises(ReadError, match="not an acceleration unit"):
-        read_recording(path, accelerometer_unit="furlong")
-    with pytest.raises(ReadError, match="not a time unit"):
-        read_recording(path, time_unit="fortnight")
 
 
 def test_one_sensor_alone_is_a_recording(tmp_path):

@@ -123,7 +123,7 @@ def test_a_turn_about_one_axis_leaves_the_other_gyro_channels_free_to_read_noise
     assert FindingCode.STUCK_VALUES not in codes(read(tmp_path, table))
 
 
-def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):
+def test_a_channel_at_its_limit_is_clipped_and_not_stuck_is_told_at_rest_from_in_motion_and_changes_no_axes(tmp_path):
     table = counts()
     table[:, 4:] = np.minimum(table[:, 4:], 4096.0)
     recording = read(tmp_path, table)
@@ -132,6 +132,12 @@ def test_a_channel_that_stands_at_its_limit_is_clipped_and_not_stuck(tmp_path):
     assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, 4] == 4096.0)
     assert "accelerometer" not in clipped.seen
     assert FindingCode.STUCK_VALUES not in codes(recording)
+    table = counts()
+    table[:, 3] = np.minimum(table[:, 3], 16000.0)
+    assert finding(read(tmp_path, table), FindingCode.CLIPPING).cause != clipped.cause
+    table = counts()
+    table[N // 2 :, 1] = 32767.0
+    assert FindingCode.AXES_CHANGED not in codes(read(tmp_path, table))
 
 
 def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):
@@ -318,16 +324,3 @@ def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tm
     recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(table)) + "\n"))
     assert recording.n_samples == len(table)
     assert "repeated-rows" not in [f.code.value for f in recording.findings if "rows_left_out" in f.numbers]
-
-
-def test_a_channel_at_its_limit_at_rest_is_told_from_one_in_motion_and_no_axes_change_where_one_gets_stuck(tmp_path):
-    table = counts()
-    table[:, 3] = np.minimum(table[:, 3], 16000.0)
-    resting = finding(read(tmp_path, table), FindingCode.CLIPPING)
-    table = counts()
-    table[:, 4:] = np.minimum(table[:, 4:], 4096.0)
-    moving = finding(read(tmp_path, table), FindingCode.CLIPPING)
-    assert resting.cause != moving.cause
-    table = counts()
-    table[N // 2 :, 1] = 32767.0
-    assert FindingCode.AXES_CHANGED not in codes(read(tmp_path, table))
