@@ -159,7 +159,7 @@ def static(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(static):
     log, truth = before_a_tracker(5, 70)
-    return trihedron.filter_noise(log, static=static, reference=truth, horizons_s=[1, 10], gravity_m_s2=G)
+    return trihedron.filter_noise(log, static=static, reference=truth, horizons_s=[1, 10, 100], gravity_m_s2=G)
 
 
 def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
@@ -171,6 +171,8 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
     assert rest.upper > 0.5
     for one in gyro.consistency:
         assert 0.5 < one.nees < 9.0
+    # A horizon longer than the log has no shares.
+    assert {one.horizon_s for one in gyro.shares} == {1.0, 10.0}
     for h in (1.0, 10.0):
         middle = sum(s.share.value for s in gyro.shares if s.horizon_s == h)
         assert middle == pytest.approx(1.0, abs=0.25)
@@ -193,12 +195,6 @@ def test_an_n_that_is_uncertain_a_limit_the_references_or_below_the_quietest_is_
     assert found.sensors[0].quietest == pytest.approx(N, rel=0.2)
     noticed_now = noticed([replace(found.sensors[0], **change)])
     assert any(words in f"{one.code.value} {one.seen}" for one in noticed_now) is is_said
-
-
-def test_a_horizon_longer_than_the_log_has_no_shares():
-    log, truth = before_a_tracker(5, 45)
-    shares = trihedron.filter_noise(log, reference=truth, gravity_m_s2=G).sensors[0].shares
-    assert {one.horizon_s for one in shares} == {1.0, 10.0}
 
 
 def test_a_warning_about_n_stands_in_the_file_as_on_the_screen(found):

@@ -300,12 +300,6 @@ def test_a_filtered_curve_is_quoted_from_above_the_filter():
     assert axis.value("N") == pytest.approx(1e-2, rel=0.03)
 
 
-def switched(rng, n, held):
-    """A level (n,) that switches between 0 and 1, each held for ``held`` readings on average."""
-    ends = np.cumsum(rng.exponential(held, size=4 * n // held + 9))
-    return np.searchsorted(ends, np.arange(n)) % 2
-
-
 @pytest.mark.parametrize("kind", ["wave", "levels", "walk", "flicker", "white"])
 def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_is_taken_for_them(kind):
     rng, n = np.random.default_rng(7), 65_536
@@ -314,7 +308,8 @@ def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_i
     if kind == "wave":
         x += 0.2 * np.sin(2.0 * np.pi * 3.2 * np.arange(n) / n)
     if kind == "levels":
-        x += 0.3 * switched(rng, n, 2000)
+        # Each held for 2000 readings on average.
+        x += 0.3 * (np.searchsorted(np.cumsum(rng.exponential(2000, size=4 * n // 2000 + 9)), np.arange(n)) % 2)
     found = identify_noise(x, RATE, automatic=kind != "levels")
     waves = [f for axis in found.axes for f in axis.findings if "period_s" in f.numbers]
     assert bool(waves) is (kind == "wave")
