@@ -70,6 +70,23 @@ def test_a_row_that_the_recordings_best_shape_lacks_is_zero_there():
     assert compare_effects([given], found, alpha=0.01).surplus
 
 
+def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
+    def effect(effect_id, share):
+        size = EffectParameter("size", 0.01, 3e-4, "m/s^2")
+        return AcceptedEffect(effect_id, "", (size,), 0.0, 99.0, (), share=share)
+
+    def differ(given, *effects, tried=()):
+        found = SimpleNamespace(effects=effects, candidates=tried, domains=(), remaining=())
+        return compare_effects(given, found, alpha=0.01).differ
+
+    pushed, faint = effect("disturbed-pose", 0.7), effect("periodic-interference", 0.05)
+    assert not differ([], pushed, faint)
+    assert differ([], pushed, effect("periodic-interference", 0.25))
+    assert differ([], pushed, effect("accel-cubic", 0.9))
+    # What only the model has is no footnote of the recording.
+    assert differ([faint], tried=[Candidate("periodic-interference", 0.4, True)])
+
+
 def test_jacobians_agree_with_the_spread_of_perturbed_calibrations():
     S, b = sensor(RNG)
     S_g, _ = sensor(RNG)

@@ -20,15 +20,9 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
 from trihedron.records import FindingCode
-from trihedron.simulate import (
-    Accelerometer,
-    Gyroscope,
-    diagnosed_sizes,
-    hand_session,
-    profile_by_name,
-    simulate,
-    with_effect,
-)
+from trihedron.simulate import diagnosed_sizes, hand_session, profile_by_name, simulate, with_effect
+from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.scenario import Scenario
 
 K2 = (3e-4, -2e-4, 2e-4)

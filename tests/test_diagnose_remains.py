@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -12,7 +11,6 @@ from scipy.spatial.transform import Rotation
 import trihedron
 from diagnosed_session import simulated, unit_of, with_scatter
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.table import _error_of_mean
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
@@ -20,8 +18,6 @@ from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
-from trihedron.records.domains import HeldOut
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
@@ -187,12 +183,6 @@ def test_poses_that_lean_are_taken_off_static_rates_and_moves():
         assert after[domain].rms < {"static-gyro": 0.7, "moves": 0.5}[domain] * before[domain].rms
 
 
-def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share=0.9, variant="linear"):
-    parameter = EffectParameter("bias_per_kelvin_x", 0.01, 3e-4, "m/s^2/K")
-    held = (HeldOut(domain, 50.0, 1.0, before, after, "m/s^2"),)
-    return AcceptedEffect(effect_id, "Said.", (parameter,), 0.0, 99.0, held, model={"variant": variant}, share=share)
-
-
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     plain = unit_of(hand_session(20, pose_s=4.0, layout=5), 7, is_wide=True)
     # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.
@@ -203,19 +193,3 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     found = trihedron.diagnose(moved, gravity_m_s2=9.80665)
     assert [one.id for one in found.effects] == ["gyro-bias-drift", "gyro-bias-repeatability"]
     assert found.verdict == "missing-physics"
-
-
-def found(*effects, candidates=()):
-    return SimpleNamespace(effects=effects, candidates=candidates, domains=(), remaining=())
-
-
-def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
-    pushed = effect("disturbed-pose", share=0.7, variant="")
-    faint = effect("periodic-interference", share=0.05, variant="")
-    strong = effect("periodic-interference", share=0.25, variant="")
-    assert not compare_effects([], found(pushed, faint), alpha=0.01).differ
-    assert compare_effects([], found(pushed, strong), alpha=0.01).differ
-    assert compare_effects([], found(pushed, effect("accel-cubic")), alpha=0.01).differ
-    # What only the model has is no footnote of the recording.
-    tried = [Candidate("periodic-interference", 0.4, True)]
-    assert compare_effects([faint], found(candidates=tried), alpha=0.01).differ

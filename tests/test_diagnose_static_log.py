@@ -75,23 +75,19 @@ def test_branches_that_differ_while_heating_and_cooling_are_stated_in_degrees_pe
     assert told == pytest.approx(0.2 * DEG, rel=0.25)
 
 
-def test_a_zero_that_swings_without_a_logged_cause_is_bias_drift():
-    t, accelerometer, gyroscope = still(30000, 25.0, 46)
-    gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
-    d = trihedron.diagnose(Recording.from_arrays(t, accelerometer, gyroscope), gravity_m_s2=9.8)
-    assert [e.id for e in d.effects] == ["gyro-bias-drift"]
-    spans = {p.name: p.value for p in d.effects[0].parameters}
-    assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
-
-
-def test_a_warm_up_is_a_curve_in_counts_as_in_si():
+@pytest.mark.parametrize(("unit", "lsb"), [("counts", 1e-4), ("rad/s", 1e-9)])
+def test_a_warm_up_is_a_curve_in_counts_as_in_si(unit, lsb):
     """The size of a count is unknown: its drift is neither implausible nor a walk for it."""
     t, accelerometer, gyroscope = still(30000, 10.0, 49)
-    gyroscope[:, 1] += 0.02 * np.exp(-t / 350.0)
-    log = Recording.from_arrays(t, accelerometer, np.rint(gyroscope / 1e-4), gyroscope_unit="counts")
+    gyroscope[:, 1] += 0.007 * np.exp(-t / 350.0)
+    readings = np.rint(gyroscope / lsb) * (1.0 if unit == "counts" else lsb)
+    log = Recording.from_arrays(t, accelerometer, readings, gyroscope_unit=unit)
     d = trihedron.diagnose(log, gravity_m_s2=9.8)
     (effect,) = d.effects
+    assert effect.id == "gyro-bias-drift"
     assert effect.statement.startswith("The gyro bias drifts smoothly")
+    spans = {p.name: p.value for p in effect.parameters}
+    assert spans["range_y"] == pytest.approx(70.0 if unit == "counts" else 0.007, rel=0.1)
     held = next(one for one in effect.held_out if one.domain == "static-gyro")
     assert held.rms_after < 0.1 * held.rms_before
     assert not any(one.disagrees for one in d.remaining)

@@ -10,7 +10,6 @@ import tomllib
 
 import trihedron
 from diagnosed_session import simulated, unit_of
-from trihedron.api import driving
 from trihedron.api.improving import _mean_drift, improve
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.simulate import Drift, diagnosed_sizes, hand_session, read_scenario, simulate
@@ -18,8 +17,6 @@ from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.twin import unclipped
 
 pytestmark = pytest.mark.usefixtures("without_corners")
-G = 9.80665
-LIMIT_DEG_S = 150.0
 IDEAL = """# A perfect sensor.
 name = "ideal"  # and a name
 profile = "ideal"
@@ -32,51 +29,34 @@ b = [0, 0, 0]  # none
 """
 
 
-@pytest.fixture(scope="module")
-def clipped():
-    """A recording whose gyro ends at ±150 °/s of its ADC in several moves, with noise of its own."""
+@pytest.mark.usefixtures("few_simulations")
+def test_the_ends_of_a_recordings_range_and_its_noise_are_those_of_the_improved_scenario(tmp_path):
+    """Of a recording whose gyro ends at ±150 °/s of its ADC in several moves, with noise of its own."""
     unit = unit_of(hand_session(12, pose_s=2.5, move_s=1.6, layout=8), 5)
-    code = round(math.radians(LIMIT_DEG_S) / unit.gyroscope.S[0][0])
+    code = round(math.radians(150.0) / unit.gyroscope.S[0][0])
     adc = replace(unit.gyroscope.adc, low=-float(code), high=float(code))
-    return code, simulate(replace(unit, gyroscope=replace(unit.gyroscope, adc=adc)), 11)[0]
-
-
-@pytest.fixture(scope="module")
-def improved(clipped, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("range")
-    given, better = folder / "ideal.toml", folder / "better.toml"
+    clipped = simulate(replace(unit, gyroscope=replace(unit.gyroscope, adc=adc)), 11)[0]
+    given, better = tmp_path / "ideal.toml", tmp_path / "better.toml"
     given.write_text(IDEAL)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driving, "N_SEEDS", 2)
-        found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
-        better.write_text(improve(given, found).text)
-    return found, better
-
-
-def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipped, improved):
-    code, _ = clipped
-    found, better = improved
+    found = trihedron.diagnose(clipped, against=given, gravity_m_s2=9.80665)
+    text = improve(given, found).text
+    better.write_text(text)
     assert "gyro-saturation" in {e.id for e in found.effects}
-    table = tomllib.loads(better.read_text())
+    table = tomllib.loads(text)
     assert (table["gyroscope"]["adc"]["low"], table["gyroscope"]["adc"]["high"]) == (-code, code)
     # The ADC's, not an effect beside it; and none of the accelerometer, whose range nothing came to.
     assert "gyro-saturation" not in {e["id"] for e in table.get("effect", [])}
     assert "low" not in table["accelerometer"].get("adc", {})
     # What the scenario said of its old values is not kept; a stated bias of none is not asked about.
-    text = better.read_text()
     assert text.startswith("# ideal.toml, with the values of a recording")
     assert "perfect" not in text
     assert "# none" not in text
     assert "# and a name" in text
     assert {p.id for p in found.parameters if p.significant} >= {"accel-bias", "gyro-bias"}
     assert not any(p.remark for p in found.parameters if p.id.endswith("bias"))
-
-
-def test_a_scenario_without_noise_takes_the_recordings(improved):
     # Three axes of the part's data sheet; 12 poses of 2.5 s know a density to some per cent.
-    part = profile_by_name("mpu").unit(5)
-    scenario = read_scenario(improved[1])
-    for name, own in zip(("accelerometer", "gyroscope"), part, strict=True):
+    scenario = read_scenario(better)
+    for name, own in zip(("accelerometer", "gyroscope"), profile_by_name("mpu").unit(5), strict=True):
         density = np.array(getattr(scenario, name).noise.N) * np.ones(3)
         assert density == pytest.approx(np.array(own.noise.N) * np.ones(3), rel=0.15), name
 

@@ -23,11 +23,6 @@ from trihedron.session.model import DYNAMICS, MOVES, contiguous, core_state
 from trihedron.session.noise import ANYTHING
 from trihedron.simulate import diagnosed_sizes
 
-CASES = {
-    "accel-hysteresis": {"offset_m_s2": (0.01, 0.015, 0.01), "width_m_s2": 2.0},
-    "timing-jitter": {"jitter_s": 1e-3},
-}
-
 
 @cache
 def fitted(effect_id="", seed=3, n_poses=14, **size):
@@ -160,13 +155,6 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     thermal = effects["gyro-thermal-bias"]
     assert thermal.confounded_with == ("gyro-bias-drift",)
     assert "temperature" in thermal.separating_experiment
-
-
-@pytest.mark.parametrize("effect_id", CASES)
-def test_the_mechanism_is_named_first(effect_id):
-    diagnosis = diagnosed(effect_id, n_poses=14, **CASES[effect_id])
-    assert diagnosis.verdict == "missing-physics"
-    assert diagnosis.effects[0].id == effect_id
 
 
 def test_missing_codes_are_counted_and_lost_ones_by_chance_are_not():

@@ -113,9 +113,7 @@ def test_the_python_of_a_page_runs_on_logs_of_its_names(page, tmp_path, monkeypa
         assert main(["simulate", "si.toml", "--seed", str(seed), "-o", name]) == 0
     force = np.random.default_rng(1).normal([0.0, 0.0, 9.81], 0.02, (6000, 3))
     rate = np.random.default_rng(2).normal(0.0, 0.001, (6000, 3))
-    static = np.column_stack([np.arange(6000) / 100.0, force, rate])
-    header = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
-    np.savetxt("static.csv", static, delimiter=",", header=header, comments="")
+    trihedron.convert(trihedron.Recording.from_arrays(np.arange(6000) / 100.0, force, rate), "static.csv")
     shown = blocks(DOCS.parent / page, "python")
     assert shown
     for _, text in shown:
@@ -176,32 +174,19 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert Path("extended.json").is_file()
 
 
-@pytest.fixture(scope="module")
-def names(tmp_path_factory, without_corners):  # noqa: ARG001
-    """What the script leaves, its sessions shorter than they are printed."""
+@pytest.mark.usefixtures("without_corners", "few_simulations")
+def test_the_same_in_python_ends_the_same_way_and_counts_are_held_at_their_own_mean_scale(tmp_path, monkeypatch):
+    """The script with sessions shorter than they are printed."""
+    monkeypatch.chdir(tmp_path)
     script = (DOCS / "tutorials" / "simulation_against_recording.py").read_text(encoding="utf-8")
     session = 'kind = "hand"\\n'
     assert script.count(session) == 2
-    script = script.replace(session, session + "n_poses = 12\\npose_s = 4\\n")
     left = {}
-    with (
-        contextlib.chdir(tmp_path_factory.mktemp("tutorial")),
-        contextlib.redirect_stdout(io.StringIO()),
-        pytest.MonkeyPatch.context() as patch,
-    ):
-        # Improved scenarios are aimed by two simulations and not by eight.
-        patch.setattr("trihedron.api.driving.N_SEEDS", 2)
-        exec(compile(script, "simulation_against_recording.py", "exec"), left)
-    return left
-
-
-def test_the_same_in_python_ends_the_same_way(names):
-    assert [e.id for e in names["found"].effects] == ["gyro-g-sensitivity"]
-    assert names["again"].verdict == "consistent"
-
-
-def test_an_ideal_sensor_in_si_is_held_against_counts_at_their_own_mean_scale(names):
-    found = names["found"]
+    script = script.replace(session, session + "n_poses = 12\\npose_s = 4\\n")
+    exec(compile(script, "simulation_against_recording.py", "exec"), left)
+    found = left["found"]
+    assert [e.id for e in found.effects] == ["gyro-g-sensitivity"]
+    assert left["again"].verdict == "consistent"
     as_given = {seen.domain: seen.rms for seen in found.stages[0].domains}
     # Zeros of 0.35 m/s² and scales 1.4 % apart; counts taken for m/s² would be 16000 m/s² wrong.
     assert 0.05 < as_given["static-accel"] < 0.5
