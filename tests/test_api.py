@@ -57,17 +57,6 @@ def test_a_gyro_that_maps_degrees_as_radians_is_refused():
         trihedron.export(given((np.eye(3), np.zeros(3)), (np.eye(3) * np.pi / 180.0, np.zeros(3))), "c")
 
 
-def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted():
-    recording, result, _ = usual()
-    grave = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "The fit did not converge.")
-    doubted = replace(result.calibration, findings=(grave,))
-    done = trihedron.apply(doubted, recording)
-    said = [f for f in done.findings if f.code is FindingCode.CALIBRATION_DOUBTED]
-    assert [f.severity for f in said] == [Severity.SERIOUS]
-    assert "did not converge" in said[0].seen
-    assert not [f for f in trihedron.apply(result, recording).findings if f.code is FindingCode.CALIBRATION_DOUBTED]
-
-
 def test_a_bias_that_drifted_in_its_own_recording_is_allowed_that_change_in_another_and_said():
     recording, result, _ = usual()
     change = 0.06

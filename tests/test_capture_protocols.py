@@ -113,15 +113,6 @@ def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declara
     assert sequence.tally.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
 
 
-@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof", "sbg", "witmotion-clock"])
-def test_frames_do_not_depend_on_the_pieces_in_which_bytes_come(name, declaration):
-    _, _, data = stream(name, declaration, 500, 100.0, parse_faults("5%"))
-    whole = decoder_of(name, declaration)
-    expected = [*whole.feed(data), *whole.finish()]
-    for seed in range(3):
-        assert decode(decoder_of(name, declaration), data, seed) == expected
-
-
 def test_a_garbled_counter_is_not_a_thousand_lost_frames_and_one_that_begins_anew_a_restart():
     tally, placed = sequenced([*range(10), 5010, *range(11, 20)], 1 << 16)
     assert (tally.lost, tally.garbled) == (1, 1)
@@ -278,8 +269,7 @@ def test_what_a_clock_says_is_lost_stands_in_the_log(board, tmp_path):
 
 def test_a_reader_that_joins_within_a_sample_has_its_clock_all_the_same():
     data = sent_as("witmotion-clock", still())
-    decoder = decoder_factory("witmotion")()
-    frames = [*decoder.feed(data[11:]), *decoder.finish()]
+    frames = decode(decoder_factory("witmotion")(), data[11:], 1)
     assert len(frames) == N - 1
     assert frames[0].ticks is not None
 

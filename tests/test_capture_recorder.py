@@ -140,10 +140,8 @@ def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_l
     write = GrowingLog._write
     monkeypatch.setattr(GrowingLog, "_write", lambda log, text: (time.sleep(0.4), write(log, text)))
     with Board(counts_recording(900, 1000.0), "xsens-mtdata2", speed=1.0) as board:
-        source, found = open_device(board.port)
-        log = tmp_path / "log.csv"
-        recorder = Recorder(source, found.make_decoder, log, first_bytes=found.first_bytes, wait_for_return_s=0.0)
-        n = sum(len(block.time_s) for block in recorder)
+        recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=0.0)
+    n = sum(len(block.time_s) for block in blocks)
     assert recorder.count.lost == 0
     back = trihedron.read(tmp_path / "log.csv")
     # The start may be lost to the reader that was not there yet; what is saved is in steps of the board's clock.

@@ -12,7 +12,7 @@ import pytest
 from small_session import G, log_text, made_once, rejected, rows_of, simulated, usual
 from trihedron import read, segment
 from trihedron.cli import main
-from trihedron.simulate import Motion, MoveTo, Pose, hand_session
+from trihedron.simulate import hand_session, scenario_by_name
 
 
 @pytest.fixture
@@ -112,11 +112,8 @@ def test_a_reader_that_leaves_early_is_no_error(session):
 
 
 def test_poses_that_do_not_determine_the_answer_end_with_status_two_and_poses_to_add(tmp_path, capsys):
-    steps = [Pose(5.0)]
-    for angle in 2.0 * np.pi * np.arange(1, 14) / 14:
-        steps += [MoveTo((0.0, float(np.sin(angle)), float(np.cos(angle))), 1.5), Pose(3.0)]
     log = tmp_path / "log.csv"
-    log.write_text(log_text(rows_of(simulated(Motion(tuple(steps))))))
+    log.write_text(log_text(rows_of(simulated(scenario_by_name("six-faces").motion))))
     assert main(["calibrate", str(log), "--gravity", G]) == 2
     out = capsys.readouterr().out
     assert "NOT TO BE TRUSTED" in out

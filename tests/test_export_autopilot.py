@@ -144,21 +144,6 @@ def log_of(autopilot, parameters, stage="body"):
     return replace(recording, temperature_degc=np.linspace(15.0, 55.0, n), onboard=onboard)
 
 
-def with_temperature(known, reference=28.0):
-    """Biases quadratic in temperature, as a diagnosis finds them: v an axis, in SI, counted from a reference."""
-    effects = []
-    for sensor, size in (("accel", 4e-3), ("gyro", 2e-4)):
-        values = [size * v for v in (1.0, -0.6, 0.3, 0.01, 0.02, -0.015)]
-        names = [f"{symbol}_{a}" for symbol in ("bias_per_kelvin", "bias_per_kelvin2") for a in "xyz"]
-        effects.append({
-            "id": f"{sensor}-thermal-bias",
-            "parameters": [{"name": name, "value": value} for name, value in zip(names, values, strict=True)],
-            "model": {"variant": "quadratic", "values": values},
-        })  # fmt: skip
-    extensions = {**known.extensions, "effects": effects, "references": {"temperature_degc": reference}}
-    return replace(known, extensions={**extensions, "valid_range": {"temperature_degc": [15.0, 55.0]}})
-
-
 @pytest.mark.parametrize(
     ("autopilot", "p", "R"),
     [
@@ -175,7 +160,19 @@ def test_temperature_terms_are_added_to_those_that_the_board_holds_already(autop
     raw = rng.normal(0, 6, (len(T), 3)), rng.normal(0, 1, (len(T), 3))
     logged = corrected(autopilot, p, raw, T, R)
     recording = replace(recording, accelerometer=logged[0], gyroscope=logged[1])
-    known = with_temperature(diagonal_in(R, recording))
+    # Biases quadratic in temperature, as a diagnosis finds them: v an axis, in SI, counted from a reference.
+    effects = []
+    for sensor, size in (("accel", 4e-3), ("gyro", 2e-4)):
+        values = [size * v for v in (1.0, -0.6, 0.3, 0.01, 0.02, -0.015)]
+        names = [f"{symbol}_{a}" for symbol in ("bias_per_kelvin", "bias_per_kelvin2") for a in "xyz"]
+        effects.append({
+            "id": f"{sensor}-thermal-bias",
+            "parameters": [{"name": name, "value": value} for name, value in zip(names, values, strict=True)],
+            "model": {"variant": "quadratic", "values": values},
+        })  # fmt: skip
+    at = {"references": {"temperature_degc": 28.0}, "valid_range": {"temperature_degc": [15.0, 55.0]}}
+    known = diagonal_in(R, recording)
+    known = replace(known, extensions={**known.extensions, "effects": effects, **at})
     parameters = parameters_in(export_calibration(known, autopilot))
     assert autopilot == "px4" or parameters["INS_ACC_ID"] == 2753036
     assert_alike(corrected(autopilot, p | parameters, raw, T, R), trihedron.apply(known, recording))

@@ -109,10 +109,9 @@ def test_imu_calib_corrects_the_accelerometer_as_apply_does():
 
 def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     rng = np.random.default_rng(3)
-    t = np.arange(20_000) / 100.0
-    table = np.column_stack([t, [0, 0, 9.81, 0, 0, 0] + np.repeat([1e-2, 1e-3], 3) * rng.standard_normal((len(t), 6))])
-    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
-    np.savetxt(tmp_path / "static.csv", table, delimiter=",", header=head, comments="", fmt="%.9g")
+    force, rate = [0, 0, 9.81] + 1e-2 * rng.standard_normal((20_000, 3)), 1e-3 * rng.standard_normal((20_000, 3))
+    static = trihedron.Recording.from_arrays(np.arange(20_000) / 100.0, force, rate)
+    trihedron.convert(static, tmp_path / "static.csv")
     assert main(["allan", str(tmp_path / "static.csv"), "--json", str(tmp_path / "allan.json")]) == 0
     file = tmp_path / "c.json"
     write_calibration(calibration("si"), file)

@@ -19,16 +19,8 @@ from trihedron.estimate.kalman.session import calibrate_session, noise_from_pose
 from trihedron.read import ReadError, read_axis_noise, read_pose_table
 from trihedron.records import AxisNoise, FindingCode, PoseTable, Recording
 from trihedron.segment import segment_recording
-from trihedron.simulate import (
-    Accelerometer,
-    Clock,
-    NoiseTerms,
-    Scenario,
-    dividing_head,
-    long_static,
-    scenario_by_name,
-    simulate,
-)
+from trihedron.simulate import Clock, NoiseTerms, Scenario, dividing_head, long_static, scenario_by_name, simulate
+from trihedron.simulate.accelerometer import Accelerometer
 from twins_kalman import B_TRUE, DIVIDING_HEAD_ANGLES_DEG, GRAVITY, S_TRUE, normalised_error_squared
 
 S_NORM = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
@@ -99,6 +91,10 @@ def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
     assert np.max(np.abs(difference[free] / scale[free])) < 0.01
 
 
+def pose_table(path):
+    return read_pose_table(path, gravity_m_s2=GRAVITY)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -112,28 +108,33 @@ def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
 def test_a_pose_table_is_read_by_its_header(tmp_path, text, expected):
     path = tmp_path / "poses.csv"
     path.write_text(text)
-    table = read_pose_table(path, gravity_m_s2=GRAVITY)
-    np.testing.assert_allclose(table.specific_force / GRAVITY, expected, atol=1e-12)
+    np.testing.assert_allclose(pose_table(path).specific_force / GRAVITY, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("reader", "text", "message"),
     [
-        ("1,2\n3,4\n5,6\n", "no header"),
-        ("a,b\n3,4\n5,6\n", "neither angles .* nor a direction"),
-        ("pitch,theta\n3,4\n5,6\n", "both mean pitch"),
-        ("fx,fy,fz\n0,0,1\n0,0,0\n", "line 3: the direction has no length"),
-        ("pose,pitch\n0,0\n1,10\n", "count poses from 1"),
-        ("start,pitch\n0,0\n1,10\n", "both start and stop"),
-        ("start,stop,pitch\n0,1,0\n3,2,10\n", "stops before it starts"),
-        ("pitch,roll\n0,0\n10,nan\n", "roll is missing"),
+        (read_axis_noise, "white: 1", "not JSON"),
+        (read_axis_noise, "[1, 2]", "as one object"),
+        (read_axis_noise, '{"pink": 1}', "no noise term 'pink'"),
+        (read_axis_noise, '{"white": [1, 2]}', "one number, or three"),
+        (read_axis_noise, '{"white": "much"}', "one number, or three"),
+        (read_axis_noise, '{"white": -1}', "white must be zero or positive"),
+        (pose_table, "1,2\n3,4\n5,6\n", "no header"),
+        (pose_table, "a,b\n3,4\n5,6\n", "neither angles .* nor a direction"),
+        (pose_table, "pitch,theta\n3,4\n5,6\n", "both mean pitch"),
+        (pose_table, "fx,fy,fz\n0,0,1\n0,0,0\n", "line 3: the direction has no length"),
+        (pose_table, "pose,pitch\n0,0\n1,10\n", "count poses from 1"),
+        (pose_table, "start,pitch\n0,0\n1,10\n", "both start and stop"),
+        (pose_table, "start,stop,pitch\n0,1,0\n3,2,10\n", "stops before it starts"),
+        (pose_table, "pitch,roll\n0,0\n10,nan\n", "roll is missing"),
     ],
 )
-def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, text, message):
-    path = tmp_path / "poses.csv"
+def test_a_pose_table_or_a_noise_file_that_cannot_be_used_is_refused_in_plain_words(tmp_path, reader, text, message):
+    path = tmp_path / "given"
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
-        read_pose_table(path, gravity_m_s2=GRAVITY)
+        reader(path)
 
 
 def session(seed, *, n=24, S=S_NORM, b=B_NORM, noise=NOISE):
@@ -183,19 +184,12 @@ def test_errors_are_as_large_as_stated():
     assert low < np.sum(nees) < high
 
 
-def written(path, scenario, seed):
-    log = simulate(scenario, seed)[0]
-    rows = np.column_stack([log.time_s, log.accelerometer])
-    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
-    return path
-
-
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("head")
     accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
     scenario = Scenario(motion=dividing_head(), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    written(folder / "log.csv", scenario, 1)
+    trihedron.convert(replace(simulate(scenario, 1)[0], gyroscope=None), folder / "log.csv")
     np.savetxt(folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, "%g", ",", header="pitch,roll", comments="")
     (folder / "noise.json").write_text('{"white": 0.01, "walk": [0.001, 0.001, 0.001]}')
     return folder
@@ -246,7 +240,8 @@ def test_noise_of_a_log_with_both_sensors_in_counts_is_that_of_the_accelerometer
 def rest_log(path, seconds, **noise):
     accelerometer = Accelerometer(noise=NoiseTerms(**noise))
     scenario = Scenario(motion=long_static(seconds), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    return written(path, scenario, 2)
+    trihedron.convert(replace(simulate(scenario, 2)[0], gyroscope=None), path)
+    return path
 
 
 def test_a_log_of_rest_in_counts_of_another_range_is_refused(files, tmp_path, capsys):
@@ -256,24 +251,6 @@ def test_a_log_of_rest_in_counts_of_another_range_is_refused(files, tmp_path, ca
     np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
     assert kalman(files, "--reference", files / "angles.csv", "--noise", rest) == 1
     assert "another ADC, range or unit" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("white: 1", "not JSON"),
-        ("[1, 2]", "as one object"),
-        ('{"pink": 1}', "no noise term 'pink'"),
-        ('{"white": [1, 2]}', "one number, or three"),
-        ('{"white": "much"}', "one number, or three"),
-        ('{"white": -1}', "white must be zero or positive"),
-    ],
-)
-def test_a_noise_file_that_cannot_be_used_is_refused_in_plain_words(tmp_path, text, message):
-    path = tmp_path / "noise.json"
-    path.write_text(text)
-    with pytest.raises(ReadError, match=message):
-        read_axis_noise(path)
 
 
 def test_nine_poses_for_nine_parameters_test_nothing():

@@ -14,24 +14,19 @@ from trihedron.records import FindingCode, Recording, Severity
 from trihedron.report.ranking import said_of
 
 RATE = FindingCode.STATIC_RATE_ABOVE_NOISE
-SWAPPED = np.eye(3)[[1, 0, 2]]
-
-
-def five_wrong(known, gravity):
-    """The same calibration with one mistake each, by the mistake's name."""
-    a, w = known.accelerometer, known.gyroscope
-    used = 9.95
-    return {
-        "bias-sign": replace(known, accelerometer=replace(a, b=-a.b)),
-        "unit": replace(known, accelerometer=replace(a, S=a.S / 9.80665, b=a.b / 9.80665)),
-        "gravity": replace(known, accelerometer=replace(a, S=a.S * used / gravity, b=a.b * used / gravity)),
-        "axes": replace(known, gyroscope=replace(w, S=w.S @ SWAPPED)),
-        "gyro-unit": replace(known, gyroscope=replace(w, S=np.degrees(w.S), b=np.degrees(w.b))),
-    }
 
 
 def check_ranked(known, log, gravity):
-    wrong = five_wrong(known, gravity)
+    """Of the same calibration with one mistake each, by the mistake's name, and the right one."""
+    a, w = known.accelerometer, known.gyroscope
+    used = 9.95 / gravity
+    wrong = {
+        "bias-sign": replace(known, accelerometer=replace(a, b=-a.b)),
+        "unit": replace(known, accelerometer=replace(a, S=a.S / 9.80665, b=a.b / 9.80665)),
+        "gravity": replace(known, accelerometer=replace(a, S=a.S * used, b=a.b * used)),
+        "axes": replace(known, gyroscope=replace(w, S=w.S @ np.eye(3)[[1, 0, 2]])),
+        "gyro-unit": replace(known, gyroscope=replace(w, S=np.degrees(w.S), b=np.degrees(w.b))),
+    }
     ranking = trihedron.rank([*wrong.values(), known], log, gravity_m_s2=gravity)
     names = dict(zip((f"calibration {k + 1}" for k in range(6)), [*wrong, "right"], strict=True))
     assert names[ranking.best.name] == "right"

@@ -39,7 +39,6 @@ def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path):
     assert odd == [plain, plain]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
 @pytest.mark.parametrize(("closed", "status", "is_written"), [("<&- 2>&-", 0, True), ("<&- >&- 2>&-", 0, None)])
 def test_closed_streams_lose_no_result_and_reach_no_file(tmp_path, closed, status, is_written):
     folder = copied(tmp_path)

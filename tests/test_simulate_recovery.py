@@ -13,10 +13,6 @@ from trihedron.simulate import Clock, NoiseTerms, make_noise, scenario_by_name, 
 from true_segments import segments_from_truth
 
 DT = 0.02
-N_SAMPLES = 4096
-CLUSTERS = (1, 4, 16, 64, 256)
-# Realisations: seeds times three axes.
-N_SEEDS = 20
 
 
 @pytest.mark.parametrize(
@@ -83,8 +79,9 @@ EXPECTED = {
 @pytest.mark.parametrize("term", list(EXPECTED))
 def test_the_allan_variance_of_a_term_is_the_one_that_defines_it(term):
     terms = NoiseTerms(**{term: (1.0,) * 3})
-    series = np.concatenate([make_noise(terms, N_SAMPLES, DT, seed, "gyroscope").T for seed in range(N_SEEDS)])
-    for m in CLUSTERS:
+    # Realisations: seeds times three axes.
+    series = np.concatenate([make_noise(terms, 4096, DT, seed, "gyroscope").T for seed in range(20)])
+    for m in (1, 4, 16, 64, 256):
         # Overlapping, by block means, straight from its definition.
         means = np.lib.stride_tricks.sliding_window_view(series, m, axis=1).mean(axis=2)
         variances = 0.5 * np.mean((means[:, m:] - means[:, :-m]) ** 2, axis=1)

@@ -42,9 +42,13 @@ class Attack(ABC):
     def rng(self, number: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, number, len(type(self).__name__)])
 
-    @abstractmethod
     def describe(self, number: int) -> str:
         """What a case does, in one line."""
+        return self._case(number)[0]
+
+    def _case(self, number: int) -> tuple[str, Any]:
+        """Name and damaged content of a file."""
+        raise NotImplementedError
 
     @abstractmethod
     def run(self, number: int) -> str:

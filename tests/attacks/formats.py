@@ -51,10 +51,6 @@ class Formats(Attack):
         data = (of_json if is_document else of_bytes)(rng, log.files[harmed])
         return name, Log(log.files | {harmed: data}, log.options, log.per_sensor)
 
-    def describe(self, number: int) -> str:
-        name, log = self._case(number)
-        return f"{name}, {sum(map(len, log.files.values()))} bytes"
-
     def run(self, number: int) -> str:
         name, log = self._case(number)
         path = self.folder / str(os.getpid()) / name

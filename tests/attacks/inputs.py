@@ -89,10 +89,6 @@ class Inputs(Attack):
             return name, of_json(rng, data)
         return name, of_bytes(rng, data)
 
-    def describe(self, number: int) -> str:
-        name, data = self._case(number)
-        return f"{name}, {len(data)} bytes"
-
     def run(self, number: int) -> str:
         name, data = self._case(number)
         path = self.folder / f"{os.getpid()}" / name
