@@ -156,12 +156,14 @@ def identify_noise(
 
 @dataclass(frozen=True, eq=False)
 class _Undisturbed:
-    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings."""
+    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings, and
+    whether events that its means show are its warm-up."""
 
     column: FloatArray
     cuts: list[tuple[int, int]]
     steps: list[Event]
     findings: list[Finding]
+    is_warming: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +197,7 @@ def _leave_out(column: FloatArray, stretches: Sequence[tuple[int, int]]) -> None
 
 def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturbed:
     """A channel's impacts and intervals of vibration, to be excluded, and its steps."""
-    steps, impacts = steps_and_impacts(bridged(column))
+    steps, impacts, is_warming = sudden_changes(column, rate_hz)
     calm = column.copy() if impacts else column
     _leave_out(calm, [(impact.start, impact.stop) for impact in impacts])
     shocks = shaken(calm, rate_hz)
@@ -208,7 +210,20 @@ def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturb
         # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
         findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
         steps, cuts = [], []
-    return _Undisturbed(column, cuts, steps, findings)
+    return _Undisturbed(column, cuts, steps, findings, is_warming)
+
+
+def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], list[Event], bool]:
+    """Steps and impacts of a channel, beside its warm-up where that explains some of them: what a bias does in its
+    first minutes is far outside the spread of its later changes."""
+    whole = bridged(column)
+    steps, impacts = steps_and_impacts(whole)
+    warm = warm_up(column, rate_hz) if steps or impacts else None
+    if warm is not None:
+        beside = steps_and_impacts(whole - warm.at(np.arange(len(column)) / rate_hz))
+        if (len(beside[0]), len(beside[1])) < (len(steps), len(impacts)):
+            return *beside, True
+    return steps, impacts, False
 
 
 def _screen(
@@ -219,8 +234,8 @@ def _screen(
     column, steps, findings = quiet.column, quiet.steps, quiet.findings
     breaks = [0.5 * (e.start + e.stop) for e in steps]
     share = 0.0 if heat is None else share_of_temperature(column, heat, breaks)
-    if automatic and not steps and share <= MOSTLY:
-        findings += _level(column, rate_hz, unit, heat)
+    if automatic and (not steps or quiet.is_warming) and share <= MOSTLY:
+        findings += without_slow_changes(column, rate_hz, unit, heat, has_steps=bool(steps))
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
@@ -228,15 +243,17 @@ def _screen(
     return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, share)
 
 
-def _level(column: FloatArray, rate_hz: float, unit: str, heat: FloatArray | None) -> list[Finding]:
-    """Findings for a warm-up and a wave, which are subtracted from the ``column`` (n,) in place."""
+def without_slow_changes(
+    column: FloatArray, rate_hz: float, unit: str, heat: FloatArray | None, *, has_steps: bool
+) -> list[Finding]:
+    """Findings for a warm-up and a wave, which are subtracted from the ``column`` (n,) in place; steps hide a wave."""
     time_s, findings = np.arange(len(column)) / rate_hz, []
     warm = warm_up(column, rate_hz)
     if warm is not None:
         range_degc = remarks.UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
         findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
         column -= warm.at(time_s)
-    slow = wave(column, rate_hz)
+    slow = None if has_steps else wave(column, rate_hz)
     if slow is not None:
         findings.append(
             Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=slow.period_s, amplitude=slow.amplitude, unit=unit)

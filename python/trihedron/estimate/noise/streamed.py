@@ -19,7 +19,8 @@ from trihedron.estimate.noise.allan import (
     default_clusters,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
-from trihedron.estimate.noise.screening import readout, steps_and_impacts, tail_error
+from trihedron.estimate.noise.identify import sudden_changes, without_slow_changes
+from trihedron.estimate.noise.screening import readout, tail_error
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
@@ -45,8 +46,8 @@ def stream_noise(
 ) -> Noise:
     """Noise terms and Allan curve of a log that is read in chunks (k, channels), in one pass (docs/noise.md, 4).
 
-    Slow terms come from means over the whole log, fast ones from its first million readings. Steps are detected in the
-    means; impacts are not excluded.
+    Slow terms come from means over the whole log, fast ones from its first million readings. Steps are detected, a
+    warm-up and a wave subtracted, in the means; impacts are not excluded.
 
     ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
     pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``InputError``
@@ -108,7 +109,10 @@ def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray
     if blank.sample_sigma == 0.0:
         return blank
     means, size = stream.means(channel, -(-n // LONGEST_TRANSFORM))
-    steps, _ = steps_and_impacts(means)
-    blank = replace(blank, findings=(*remarks.events(steps, [], [], rate_hz / size, unit), *blank.findings))
+    steps, _, is_warming = sudden_changes(means, rate_hz / size)
+    findings = [*remarks.events(steps, [], [], rate_hz / size, unit)]
+    if not steps or is_warming:
+        findings += without_slow_changes(means, rate_hz / size, unit, None, has_steps=bool(steps))
+    blank = replace(blank, findings=(*findings, *blank.findings))
     bands = ordinates_of_means(means, size, rate_hz, stretches_between(len(means), steps), head)
     return identify_axis(bands, blank, curve, channel, tail_error(head))
